@@ -1,0 +1,330 @@
+"""Claims about an attitude loop for the kernel: its programs as they fly, its numbers exactly, levels and evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from math import acos, asin, inf, isfinite, sqrt
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.quaternion import derivative, vector_part
+from starhold.algebra.vector import apply, dot
+from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
+from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved
+from starhold.certification.subject import Subject, above, make_subject
+from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.polynomials import Poly
+from starhold.kernel.programs import digest
+from starhold.kernel.rules import Solves, Squares
+from starhold.laws.interface import Measurement
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.bodies import rigid_body
+from starhold.parts.craft import tensor
+from starhold.parts.effectors.wheels import BAND
+from starhold.trace.straight_line import labelled, straight_line
+
+V3, Q4 = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+FULL = (V3, V3, V3)
+NOWHERE: dict[str, int] = dict.fromkeys(("q0", "q1", "q2", "q3", "w1", "w2", "w3"), 0)
+ASKED = Measurement(Q4, V3, V3, V3, V3, V3, V3, 0.0, V3, V3)
+"""A measurement of which every number is an input."""
+TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
+"""The other quaternion of the target, and half turns."""
+CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
+SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
+GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
+"""Shares of a largest level that are given away, for at the largest the matrices are singular."""
+
+
+@dataclass
+class Loop:
+    """The programs and numbers of a closed loop, and the claims that were found."""
+
+    loop: ClosedLoop
+    disturbance: float = 0.0
+    programs: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    claims: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    failed: dict[str, str] = field(default_factory=dict[str, str])
+
+    @cached_property
+    def known(self) -> Subject:
+        """The bounds of what acts on the loop from outside."""
+        return make_subject(self.loop, self.disturbance)
+
+    @cached_property
+    def roles(self) -> dict[str, str]:
+        """The digests of the programs that every claim is about."""
+        loop, law = self.loop, self.loop.law
+        memory = law.remember(loop.gains, loop.known, loop.period)
+        plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
+
+        def torque(measurement: Any, gains: Any, craft: Any) -> Any:
+            return law.command(measurement, gains, craft, memory)[0]
+
+        return {
+            "law": self.add(torque, measurement=ASKED, gains=loop.gains, craft=loop.known),
+            "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=plant),
+            "turning": self.add(derivative, q=Q4, rate=V3),
+        }
+
+    def add(self, equation: Callable[..., Any], **given: Any) -> str:
+        """Record a program, and return its digest."""
+        program = straight_line(equation, **given)
+        self.programs.append(program)
+        return digest(program)
+
+    def lyapunov(self, stiffness: float | None = None) -> str:
+        """Record V: the law's own, or the kinetic energy and 2 stiffness (1 - q0)."""
+        loop = self.loop
+        plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
+        if stiffness is None:
+            return self.add(loop.law.lyapunov, measurement=ASKED, gains=loop.gains, craft=plant)  # pyright: ignore
+
+        def energy(measurement: Measurement, craft: Any) -> Any:
+            return rigid_body.kinetic_energy(measurement.rate, craft) + 2.0 * stiffness * (1.0 - measurement.attitude[0])
+
+        return self.add(energy, measurement=ASKED, craft=plant)
+
+    @cached_property
+    def subject(self) -> dict[str, str]:
+        """The exact numbers that programs and the body may ask for."""
+        loop, J = self.loop, tensor(self.loop.craft.inertia).tolist()
+        named = [*labelled("gains", loop.gains), *labelled("craft", loop.known), ("measurement.period", float(loop.period))]
+        found = {name: x.hex() for name, x in named if isfinite(x)}
+        found |= {f"body.inertia.{i}.{k}": float(J[i][k]).hex() for i in range(3) for k in range(i, 3)}
+        if loop.wheels is not None:
+            for k, (axis, p) in enumerate(zip(loop.wheels.axes, loop.rotors, strict=True)):
+                found |= {f"wheel.{k}.axis.{i}": float(x).hex() for i, x in enumerate(axis)}
+                found[f"wheel.{k}.momentum"] = float(p).hex()
+        return found
+
+    @property
+    def words(self) -> list[str]:
+        """Name what the loop is taken with, as far as it has it."""
+        loop, known = self.loop, self.known
+        found = [OUTSIDE] if any(known.modelled) else []
+        found += [MOVING] if known.moving else []
+        return found + ([WHEELS] if loop.wheels is not None else [])
+
+    def claim(self, theorem: str, taken: list[str], V: str | None, **numbers: Any) -> dict[str, Any]:
+        """Return a claim without evidence."""
+        roles = self.roles | ({} if V is None else {"lyapunov": V})
+        exact = {name: str(Fraction(x)) for name, x in numbers.items()}
+        return {
+            "theorem": theorem,
+            "taken": taken,
+            "programs": roles,
+            "subject": self.subject,
+            "numbers": exact,
+            "evidence": {},
+        }
+
+    @property
+    def by_digest(self) -> dict[str, Any]:
+        """The programs by their digests."""
+        return {digest(program): program for program in self.programs}
+
+    def scales(self, V: str | None, level: float | None = None) -> dict[str, float]:
+        """Return about how large variables become on {V <= level}."""
+        known, J, top = self.known, tensor(self.loop.craft.inertia), self.potential(V)
+        energy = min(level or top, top)
+        found = {f"q{k}": sqrt(energy / top) for k in (1, 2, 3)}
+        found |= {f"w{k}": sqrt(2.0 * energy / self.kinetic(V)[k - 1]) for k in (1, 2, 3)}
+        found |= {f"r{k}": float(known.target_rate) or 1.0 for k in (1, 2, 3)}
+        found |= {f"a{k}": float(known.target_acceleration) or 1.0 for k in (1, 2, 3)}
+        return found | {f"h{k}": float(known.total_momentum) or float(J.max()) * found["w1"] for k in (1, 2, 3)}
+
+    def form(self, V: str | None) -> Poly:
+        """Return V as a polynomial."""
+        if V is None:
+            return Poly({})
+        return AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
+
+    def potential(self, V: str | None) -> float:
+        """Return the largest of V at rest."""
+        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
+        values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
+        return max(*map(abs, values), 1e-300) if V is not None else 1.0
+
+    def kinetic(self, V: str | None) -> list[float]:
+        """Return twice the coefficients of the squares of the rates in V."""
+        p = self.form(V)
+        return [2.0 * float(p.terms.get((f"w{k}", f"w{k}"), 0.5)) for k in (1, 2, 3)]
+
+    def try_to_show(self, claim: dict[str, Any], scales: Mapping[str, float]) -> bool:
+        """Add a claim if evidence for it is found."""
+        try:
+            self.claims.append(complete(claim, self.by_digest, scales))
+        except NotFoundError as reason:
+            self.failed[claim["theorem"]] = str(reason)
+            return False
+        self.failed.pop(claim["theorem"], None)
+        return True
+
+    def show_end(self) -> None:
+        """Find where motions end, by the law's own V or by the kinetic energy in its place."""
+        V, signs = self.lyapunov(), sign_words(self.loop)
+        widths = {"hysteresis": self.loop.hysteresis_width} if HYSTERESIS in signs else {}
+        ways = [
+            (theorem, words)
+            for theorem in (CONVERGES, EVENLY)
+            for words in (self.words, [w for w in self.words if w != OUTSIDE])
+        ]
+        for theorem, words in ways:
+            own = signs if theorem == CONVERGES else []
+            more: dict[str, Any] = widths if own else {}
+            if SHORTEST in own:
+                # Below V where the sign changes.
+                level = Fraction(self.cap(theorem, own, V)) * (1 - GIVEN_AWAY[0])
+                more = {"level": level, **self.contents(self.form(V), level)}
+            if self.try_to_show(self.claim(theorem, [*words, *own], V, **more), self.scales(V)):
+                self.show_limits(theorem, [*words, *own], V, widths if own else {})
+                more = {name: x for name, x in more.items() if name != "rate"}
+                self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
+                return
+        if not signs:
+            self.show_strictly()
+
+    def show_any_inertia(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> None:
+        """Find the claim for every inertia, by the law's own V or by the kinetic energy and its stiffness."""
+        every = f"{theorem} whatever the inertia"
+        if self.try_to_show(self.claim(every, words, V, **more), self.scales(V)) or theorem != CONVERGES:
+            return
+        rest = obligations(self.claim(theorem, words, V, **more), self.by_digest)[0]["only equilibrium"]
+        assert isinstance(rest, Solves)
+        energy = self.lyapunov(-float(rest.given[0].terms.get(("q1",), 0)))
+        self.try_to_show(self.claim(every, words, energy, **more), self.scales(energy))
+
+    def show_strictly(self) -> None:
+        """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that falls strictly: V' is linear in s and epsilon."""
+        words = [w for w in self.words if w != OUTSIDE]
+        try:
+            base, *own = (self.falling(words, *pair) for pair in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+        except RefusedError as reason:
+            self.failed[STRICTLY] = str(reason)
+            return
+        steps = [o.p - base.p for o in own]
+        others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, 18), strict=True) for c in parts]
+        unit = (
+            sqrt(float(abs(steps[0].terms[("q1", "w1")]) / tensor(self.loop.craft.inertia).max())) if steps[0].terms else 1.0
+        )
+        found = solved(posed(base.p, [-p for p in steps], others, base.z[:18]), {f"w{k}": unit for k in (1, 2, 3)})
+        if found is None:
+            self.failed[STRICTLY] = "no V was found"
+            return
+        V = self.crossed(*(float(f"{x:.4g}") for x in found[:2]))
+        self.try_to_show(self.claim(STRICTLY, words, V), self.scales(V))
+
+    def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
+        """Return what has to be shown of V'."""
+        claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
+        found = obligations(claim, self.by_digest)[0]["V falls"]
+        assert isinstance(found, Squares)
+        return found
+
+    def crossed(self, s: float, epsilon: float) -> str:
+        """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw."""
+
+        def energy(measurement: Measurement, craft: Any) -> Any:
+            lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
+            return (
+                rigid_body.kinetic_energy(measurement.rate, craft)
+                + 2.0 * s * (1.0 - measurement.attitude[0])
+                + epsilon * lean
+            )
+
+        return self.add(energy, measurement=ASKED, craft=self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL))
+
+    def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> bool:
+        """Find the largest level on which everything is within its limits."""
+        loop, known, wheels = self.loop, self.known, self.loop.wheels
+        numbers: dict[str, Any] = dict(more)
+        if OUTSIDE in words:
+            numbers |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
+        if MOVING in words:
+            numbers |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
+        if WHEELS in words:
+            numbers["momentum"] = float(known.total_momentum)
+        limit = loop.craft.torque_limit if loop.limit != "none" else inf
+        if wheels is not None and wheels.allocation == 0 and isfinite(max(*wheels.torque_limit, *wheels.momentum_limit)):
+            for k, (torque, momentum) in enumerate(zip(wheels.torque_limit, wheels.momentum_limit, strict=True)):
+                numbers |= {f"motors.{k}": torque, f"stored.{k}": momentum * (1.0 - BAND)}
+        elif isfinite(limit):
+            numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
+        else:
+            return False
+        claim = self.claim(theorem, words, V, level=1, **numbers)
+        cap = self.cap(theorem, words, V)
+        level = self.largest_level(claim, V, cap)
+        if level is None:
+            self.failed[f"{theorem}, limits"] = "no level was found"
+            return False
+        form, scales = self.form(V), self.scales(V, float(level))
+        for share in GIVEN_AWAY:
+            told = numbers | self.contents(form, level * (1 - share))
+            if self.try_to_show(self.claim(theorem, words, V, level=level * (1 - share), **told), scales):
+                return True
+        return False
+
+    def cap(self, theorem: str, words: list[str], V: str) -> float:
+        """Return a level below V where other rests are, or where the sign of the quaternion changes."""
+        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
+        values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
+        half = theorem == EVENLY or SHORTEST in words
+        return inf if HYSTERESIS in words else min(values[1:]) if half else values[0]
+
+    def largest_level(self, claim: dict[str, Any], V: str, cap: float) -> Fraction | None:
+        """Return the largest level that keeps all limits of a claim, and stays below the cap."""
+        try:
+            wanted, _ = obligations(claim, self.by_digest)
+        except RefusedError:
+            return None
+        limits = [
+            o
+            for name, o in wanted.items()
+            if isinstance(o, Squares) and name.startswith(("torque", "norm", "motor", "wheel"))
+        ]
+        level = cap
+        for _ in range(3):
+            scales = self.scales(V, level if isfinite(level) else None)
+            found = [highest(o, scales) for o in limits]
+            if any(x is None or x <= 0.0 for x in found):
+                return None
+            level = min(cap, *(x for x in found if x is not None)) if found else cap
+        return Fraction(level) if isfinite(level) else None
+
+    def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
+        """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less."""
+        P, N = (
+            np.array(
+                [[form.slope(f"{x}{i}").slope(f"{x}{k}").at(NOWHERE).number for k in (1, 2, 3)] for i in (1, 2, 3)],
+                dtype=float,
+            )
+            for x in "wq"
+        )
+        less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
+        if s > 0.0:
+            angle = 2.0 * acos(max(1.0 - float(level) / s, -0.98))
+        else:
+            angle = 2.0 * asin(min(sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
+        rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
+        return {"angle": angle * less, "rate": rate * less}
+
+
+def highest(o: Squares, scales: Mapping[str, float]) -> float | None:
+    """Return the largest level of V for which an obligation about a limit holds: p >= 0 on {V <= level} where V - level is
+    a multiple of -p and sums of squares. It was made for the level 1."""
+    *bounds, inside = o.known
+    V, p = 1 - inside, o.p
+    others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
+    return largest_number(posed(V, [-p, *bounds], others, o.z), scales, Poly({(): Fraction(1)}))
+
+
+def sign_words(loop: ClosedLoop) -> list[str]:
+    """Return how the quaternion's sign is chosen, in the kernel's words."""
+    return {"shortest": [SHORTEST], "hysteresis": [HYSTERESIS]}.get(loop.sign_policy, [])

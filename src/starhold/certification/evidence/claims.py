@@ -1,0 +1,119 @@
+"""Finds all claims about an attitude loop that the kernel can be shown; here those near rest and on sliding surfaces."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import asin
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.certification.evidence.attitude import ASKED, SAMPLED, SLIDING, Loop, sign_words
+from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.squares import rounded
+from starhold.kernel.loops import MOVING, OUTSIDE
+from starhold.kernel.numbers import RefusedError, Rows, plus
+from starhold.kernel.rules import Contracts, Definite
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.craft import tensor
+
+
+def find_claims(flown: ClosedLoop, disturbance: float = 0.0) -> Loop:
+    """Find the claims that can be proved: where motions end, for every inertia, within limits, between samples."""
+    loop = Loop(flown, disturbance)
+    if not flown.remembers:
+        if flown.law.lyapunov is not None:
+            loop.show_end()
+        if hasattr(flown.law.module, "surface"):
+            find_sliding(loop)
+        find_sampled(loop)
+    return loop
+
+
+def find_sampled(loop: Loop) -> None:
+    """Find the claim about the torque held between samples."""
+    h = Fraction(loop.loop.period)
+    try:
+        wanted, _ = obligations(
+            loop.claim(SAMPLED, [], None, period=h, radius=Fraction(1, 2), longest=2 * h), loop.by_digest
+        )
+    except RefusedError as reason:
+        loop.failed[SAMPLED] = str(reason)
+        return
+    step, K = wanted["step"], wanted["stiffness"]
+    J, C = wanted["inertia outweighs damping"], wanted["damping outweighs stiffness"]
+    assert isinstance(step, Contracts)
+    assert isinstance(J, Definite)
+    assert isinstance(C, Definite)
+    assert isinstance(K, Definite)
+    roots: Any = np.linalg.eigvals(floats(step.A))
+    radius = float(np.abs(roots).max())
+    told = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
+    with np.errstate(all="ignore"):
+        # They were made for twice the period.
+        damping = plus(C.a, K.a, h / 2)
+        longest = min(2.0 / largest_ratio(damping, plus(J.a, damping, h)), 4.0 / largest_ratio(K.a, damping))
+    if longest > float(h) and loop.try_to_show(
+        loop.claim(SAMPLED, [], None, **told, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
+    ):
+        return
+    loop.try_to_show(loop.claim(SAMPLED, [], None, **told), {})
+
+
+def find_sliding(loop: Loop) -> None:
+    """Find the claim that the surface is reached."""
+    roles, flown = loop.roles, loop.loop
+    roles["surface"] = loop.add(flown.law.module.surface, measurement=ASKED, gains=flown.gains)
+    m = [fraction(x) + Fraction(loop.disturbance) for x in loop.known.modelled]
+    told: dict[str, Any] = {f"outside.{k}": x for k, x in enumerate(m)} if any(m) else {}
+    words = [*([OUTSIDE] if any(m) else []), *([MOVING] if MOVING in loop.words else [])]
+    layer = float(getattr(flown.gains, "boundary_layer", 0.0))
+    if layer > 0.0 and any(m):
+        told |= in_layer(loop, layer, list(map(float, m)))
+    if signs := sign_words(flown):
+        told |= signed(loop, told)
+    loop.try_to_show(loop.claim(SLIDING, [*words, *signs], None, **told), {})
+    del roles["surface"]
+
+
+def signed(loop: Loop, told: dict[str, Any]) -> dict[str, Any]:
+    """Return the numbers of the set from which the quaternion's sign never changes."""
+    J, K = tensor(loop.loop.craft.inertia), tensor(loop.loop.gains.surface_gain)
+    low = told.get("inertia.low", float(np.linalg.eigvalsh(J)[0]) * (1.0 - 1e-6))
+    k = told.get("surface.low", float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) * (1.0 - 1e-6))
+    return {"inertia.low": low, "surface.low": k, "level": 0.5 * low * k * k * (1.0 - 1e-6)}
+
+
+def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
+    """Return the numbers of where motions end in a boundary layer."""
+    J, K, more = tensor(loop.loop.craft.inertia), tensor(loop.loop.gains.surface_gain), 1.0 + 1e-6
+    reach = np.array(loop.loop.gains.switching_gain)
+    slope, bound = reach / layer, np.array(m)
+    total = float((bound**2 / (4.0 * slope)).sum())
+    far = np.maximum(total / (reach - bound), (bound + np.sqrt(bound**2 + 4.0 * slope * total)) / (2.0 * slope)) * more
+    moments, steep = np.linalg.eigvalsh(J), float(np.linalg.norm(K, 2)) * more
+    low, high = float(moments[0]) / more, float(moments[-1]) * more
+    k, size = float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) / more, float(np.sqrt(high / low * (far**2).sum())) * more
+    found: dict[str, Any] = {f"far.{i}": float(x) for i, x in enumerate(far)} | {
+        "inertia.low": low,
+        "inertia.high": high,
+    }
+    found |= {"surface.low": k, "surface.high": steep, "surface": size, "rate": (size + steep * size / k) * more}
+    return found | {"angle": 2.0 * asin(min(size / k, 1.0)) * more}
+
+
+def floats(rows: Rows) -> NDArray[np.float64]:
+    """Return a matrix in floats."""
+    return np.array([[float(x) for x in row] for row in rows], dtype=np.float64)
+
+
+def largest_ratio(a: Any, b: Any) -> float:
+    """Return the largest eigenvalue of b^-1 a."""
+    found: Any = np.linalg.eigvals(np.linalg.solve(floats(b), floats(a)))
+    return float(found.real.max())
+
+
+def fraction(x: Any) -> Fraction:
+    """Return a rational number of FLINT."""
+    return Fraction(int(x.p), int(x.q))

@@ -1,0 +1,112 @@
+"""Finds the evidence for what a theorem asks to be shown about a claim."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from starhold.certification.evidence.squares import rounded, squares, text
+from starhold.kernel import rules
+from starhold.kernel.numbers import Account, RefusedError, inverse, rational
+from starhold.kernel.polynomials import Poly
+from starhold.kernel.programs import Program, digest
+from starhold.kernel.reading import Claim, Told
+from starhold.kernel.theorems import THEOREMS
+
+linalg: Any = import_module("scipy.linalg")
+
+
+class NotFoundError(Exception):
+    """No evidence was found for an obligation; the text names it and says why."""
+
+
+def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
+    """Return a claim as the kernel has it, without its evidence."""
+    return Claim(
+        claim["theorem"],
+        Told("words", dict.fromkeys(claim["taken"], True)),
+        Told("programs", {role: Program.read(programs[name]) for role, name in claim["programs"].items()}),
+        Told("subject", {name: rational(x) for name, x in claim["subject"].items()}),
+        Told("numbers", {name: rational(x) for name, x in claim["numbers"].items()}),
+        Told("evidence", {}),
+    )
+
+
+def obligations(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> tuple[dict[str, rules.Obligation], Claim]:
+    """Return what has to be shown of a claim, and the claim, which knows what of it was read."""
+    known = read(claim, programs)
+    Account.left = 10**12
+    return dict(THEOREMS[known.theorem](known)), known
+
+
+def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping[str, float]) -> dict[str, Any]:
+    """Return a claim with evidence, and without the numbers of the subject that it does not need. NotFoundError where an
+    obligation does not hold, or no evidence for it was found."""
+    try:
+        wanted, known = obligations(claim, programs)
+        Account.left = 10**12
+        found = {name: evidence(name, wanted, scales) for name in wanted}
+    except RefusedError as reason:
+        raise NotFoundError(str(reason)) from None
+    subject = {name: x for name, x in claim["subject"].items() if name not in known.subject.unread}
+    return claim | {"subject": subject, "evidence": {name: x for name, x in found.items() if x is not None}}
+
+
+def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[str, float]) -> Any:
+    """Return the evidence of an obligation; None for one that needs none."""
+    found: Any = None
+    o = wanted[name]
+    if isinstance(o, rules.Squares):
+        found = squares(o, scales)
+        if found is None:
+            raise NotFoundError(f"{name}: no sum of squares was found")
+    elif isinstance(o, rules.Solves):
+        found = solves(o)
+    elif isinstance(o, rules.Vanishes) and o.modulo:
+        found = [text(c) for c in euler(name, wanted)]
+    elif isinstance(o, rules.Contracts):
+        found = contracts(o)
+    try:
+        o.check(found)
+    except RefusedError as reason:
+        raise NotFoundError(f"{name}: {reason}") from None
+    return found
+
+
+def solves(o: rules.Solves) -> dict[str, Any]:
+    """Return the matrix that takes what is given, linear, to what is wanted."""
+    names = sorted({name for p in o.wanted for name in p.names})
+    rows = [[p.terms.get((name,), Fraction(0)) for name in names] for p in o.given]
+    try:
+        taken = inverse(rows)
+    except RefusedError:
+        raise NotFoundError("the torque at rest vanishes elsewhere too") from None
+    none = [[text(Poly({})) for _ in o.modulo] for _ in o.wanted]
+    return {"matrix": [[str(x) for x in row] for row in taken], "cofactors": none}
+
+
+def euler(name: str, wanted: Mapping[str, rules.Obligation]) -> list[Poly]:
+    """Return the cofactors of J J^-1 = 1 in Euler's equation: of the relations of its row the right sides J w'."""
+    zero = {f"i{i}{k}": 0 for i in range(3) for k in range(3)}
+    sides = [-o.p.at(zero) for k in range(3) if isinstance(o := wanted[f"{name[:-1]}{k}"], rules.Vanishes)]
+    return [side if row == int(name[-1]) else Poly({}) for row in range(3) for side in sides]
+
+
+def contracts(o: rules.Contracts) -> list[list[str]]:
+    """Return Lyapunov's matrix of a motion."""
+    A = np.array([[float(x) for x in row] for row in o.A])
+    size = np.eye(len(A))
+    solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
+    found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
+    return [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
+
+
+def certificate(programs: list[dict[str, Any]], claims: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the content of a certificate with these claims and those of the programs that they are about."""
+    used = {name for claim in claims for name in claim["programs"].values()}
+    found = {digest(program): program for program in programs}
+    return {"format": "starhold certificate 3", "programs": {n: p for n, p in found.items() if n in used}, "claims": claims}

@@ -1,0 +1,255 @@
+"""Guesses of sums of squares: multipliers, cofactors and a Gram matrix by an interior point (Clarabel), then made exact.
+
+All of them are linear in the polynomial. In floats the matrix is made as definite as can be, in units in which the variables
+are about one; rounded to short numbers, what is then amiss is put on the matrix, monomial by monomial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib import import_module
+from itertools import combinations_with_replacement
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+
+from starhold.errors import InputError
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.polynomials import Monomial, Poly, dot, poly
+from starhold.kernel.rules import Squares
+
+sparse: Any = import_module("scipy.sparse")
+DIGITS = (12, 14, 9, 16)
+DEFINITE = -1e-8
+"""The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """p = sum of columns, each with its factor, the last of which are the entries of the upper triangle of the Gram matrix.
+    The first `signed` factors are not negative."""
+
+    p: Poly
+    columns: list[Poly]
+    signed: int
+    pairs: list[tuple[int, int]]
+    z: Sequence[Poly]
+
+
+def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
+    """Return evidence that the kernel accepts; None where none was found. scales: about how large variables become."""
+    p, known, fixed = settled(o)
+    for count in counts(o):
+        ansatz = cofactors(o, p, count)
+        problem = posed(
+            p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count]
+        )
+        guess = solved(problem, scales)
+        for digits in DIGITS if guess is not None else ():
+            found = exactly(problem, guess, digits)  # pyright: ignore[reportArgumentType]
+            if found is None:
+                continue
+            evidence = written(o, problem, found, fixed, ansatz)
+            try:
+                o.check(evidence)
+            except RefusedError:
+                continue
+            return evidence
+    return None
+
+
+def counts(o: Squares) -> list[int]:
+    """Return how many of z a matrix may be about: up to where another kind of monomial begins."""
+    kinds = ["".join(sorted(name[0] for name in max(z.terms))) for z in o.z]
+    ends = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]]
+    return sorted({max(o.least, 1), *(k for k in ends if k > o.least > 0), len(o.z)})
+
+
+def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
+    """Return p and what is known, without what is known of variables that z has not: p has as much of it as its coefficient
+    says, if it has the sign."""
+    own, p, fixed = {name for z in o.z for name in z.names}, o.p, dict[int, Fraction]()
+    known = [*o.strict, *o.known]
+    for place, g in enumerate(known):
+        strange = next((m for m in g.terms if not own.issuperset(m)), None)
+        if strange is not None:
+            fixed[place] = max(p.terms.get(strange, Fraction(0)) / g.terms[strange], Fraction(0))
+            p = p - g * fixed[place]
+    return p, [g for place, g in enumerate(known) if place not in fixed], fixed
+
+
+def cofactors(o: Squares, p: Poly, count: int) -> list[list[Poly]]:
+    """Return for each relation the monomials of its cofactor, of degrees that fit."""
+    top = max([degree(p), *(2 * degree(z) for z in o.z[:count]), *(degree(g) for g in o.known)])
+    found: list[list[Poly]] = []
+    for relation in o.modulo:
+        names = sorted({name for z in o.z[:count] for name in z.names})
+        spare = range(top - degree(relation) + 1)
+        found.append([Poly({m: Fraction(1)}) for d in spare for m in combinations_with_replacement(names, d)])
+    return found
+
+
+def degree(p: Poly) -> int:
+    """Return the degree of a polynomial."""
+    return max(map(len, p.terms), default=0)
+
+
+def posed(p: Poly, known: list[Poly], others: list[Poly], z: Sequence[Poly]) -> Problem:
+    """Return the problem of finding multipliers of what is known, factors of the others and a Gram matrix."""
+    pairs = [(i, k) for k in range(len(z)) for i in range(k + 1)]
+    grams = [z[i] * z[k] * (1 if i == k else 2) for i, k in pairs]
+    return Problem(p, [*known, *others, *grams], len(known), pairs, z)
+
+
+def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly] = ()) -> tuple[Any, Any, Any]:
+    """Return the linear equations in floats, a row for each monomial in scaled variables, and the columns' scales."""
+    columns = [*problem.columns, *more]
+    rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *columns) for m in q.terms}))}
+
+    def size(m: Monomial) -> float:
+        return float(np.prod([scales.get(name, 1.0) for name in m]))
+
+    entries = [(rows[m], k, float(c) * size(m)) for k, q in enumerate(columns) for m, c in q.terms.items()]
+    largest = np.zeros(len(columns))
+    for _, k, c in entries:
+        largest[k] = max(largest[k], abs(c))
+    # Rows and columns of the matrix are scaled alike, or it would not stay definite.
+    sizes = [max(abs(float(c)) * size(m) for m, c in z.terms.items()) for z in problem.z]
+    head = len(problem.columns) - len(problem.pairs)
+    for k, (i, j) in enumerate(problem.pairs, head):
+        largest[k] = sizes[i] * sizes[j] * (1.0 if i == j else 2.0)
+    A = sparse.csc_matrix(
+        ([c / largest[k] for _, k, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])),
+        (len(rows), len(columns)),
+    )
+    b = np.zeros(len(rows))
+    for m, c in problem.p.terms.items():
+        b[rows[m]] = float(c) * size(m)
+    return A, b, largest
+
+
+def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
+    """Minimise cost.x with A x + s = b, s in the cones; None where that fails."""
+    try:
+        clarabel: Any = import_module("clarabel")
+    except ImportError:
+        raise InputError("certify", "", "no clarabel", "pip install clarabel, which guesses matrices") from None
+    cones = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(signed), *map(clarabel.PSDTriangleConeT, sides)]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    solver = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, sparse.csc_matrix(A), b, cones, settings)
+    found = solver.solve()
+    return np.array(found.x) if "Solved" in str(found.status) or "Insufficient" in str(found.status) else None
+
+
+def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
+    """Return the factors in floats that make the Gram matrix most definite; None where it is not."""
+    A, b, largest = equations(problem, scales)
+    unit = float(np.abs(b).max()) or 1.0
+    count, size, head = A.shape[1], len(problem.z), A.shape[1] - len(problem.pairs)
+    # The Gram matrix in scaled units: an entry's column has its largest coefficient for a scale.
+    half = np.array([1.0 if i == k else np.sqrt(2.0) / 2.0 for i, k in problem.pairs])
+    least = sparse.csc_matrix([[float(i == k)] for i, k in problem.pairs])
+    cone = sparse.hstack([sparse.csc_matrix((len(half), head)), -sparse.diags(half), least])
+    signs = sparse.hstack([-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed + 1))])
+    top = sparse.csc_matrix(([1.0], ([0], [count])), (1, count + 1))
+    whole = sparse.vstack([sparse.hstack([A, sparse.csc_matrix((A.shape[0], 1))]), signs, top, cone])
+    right = np.r_[b / unit, np.zeros(problem.signed), 1.0, np.zeros(len(half))]
+    x = interior_point(np.r_[np.zeros(count), -1.0], whole, right, A.shape[0], problem.signed + 1, [size])
+    if x is None or x[-1] < DEFINITE:
+        return None
+    x = x[:-1]
+    # What is only rounding would have to be made up for elsewhere.
+    return np.where(np.abs(x) < 1e-11 * np.abs(x).max(), 0.0, x) * unit / largest
+
+
+def largest_number(problem: Problem, scales: Mapping[str, float], wanted: Poly) -> float | None:
+    """Return the largest x for which p - x wanted is a sum as the problem says; None where there is none."""
+    A, b, largest = equations(problem, scales, [wanted])
+    unit = float(np.abs(b).max()) or 1.0
+    count, head = A.shape[1], A.shape[1] - 1 - len(problem.pairs)
+    half = np.array([1.0 if i == k else np.sqrt(2.0) / 2.0 for i, k in problem.pairs])
+    cone = sparse.hstack([sparse.csc_matrix((len(half), head)), -sparse.diags(half), sparse.csc_matrix((len(half), 1))])
+    signs = sparse.hstack([-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed))])
+    right = np.r_[b / unit, np.zeros(problem.signed + len(half))]
+    x = interior_point(
+        np.r_[np.zeros(count - 1), -1.0],
+        sparse.vstack([A, signs, cone]),
+        right,
+        A.shape[0],
+        problem.signed,
+        [len(problem.z)],
+    )
+    return None if x is None else float(x[-1] * unit / largest[-1])
+
+
+def rounded(x: float, digits: int) -> Fraction:
+    """Return a short number near a float, a multiple of a power of two."""
+    if x == 0.0:
+        return Fraction(0)
+    exponent = int(np.floor(np.log2(abs(x)))) + 1 - int(digits * 3.33)
+    return Fraction(round(Fraction(x) / Fraction(2) ** exponent)) * Fraction(2) ** exponent
+
+
+def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
+    """Return exact factors near the guess; None where there are none."""
+    x, head = [rounded(float(v), digits) for v in guess], len(problem.columns) - len(problem.pairs)
+    x[: problem.signed] = [max(v, Fraction(0)) for v in x[: problem.signed]]
+    found = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
+    if found is not None:
+        return found
+    rest = problem.p - dot(x, problem.columns)
+    rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *problem.columns) for m in q.terms}))}
+    A, b = fmpq_mat(len(rows), len(x)), fmpq_mat(len(rows), 1)
+    for k, q in enumerate(problem.columns):
+        for m, c in q.terms.items():
+            A[rows[m], k] = fmpq(c.numerator, c.denominator)
+    for m, c in rest.terms.items():
+        b[rows[m], 0] = fmpq(c.numerator, c.denominator)
+    echelon, rank = A.transpose().rref()
+    kept = [next(c for c in range(len(rows)) if echelon[r, c] != 0) for r in range(rank)]
+    own = fmpq_mat(rank, len(x), [A[r, k] for r in kept for k in range(len(x))])
+    step = own.transpose() * (own * own.transpose()).solve(fmpq_mat(rank, 1, [b[r, 0] for r in kept]))
+    return [v + Fraction(int(step[k, 0].p), int(step[k, 0].q)) for k, v in enumerate(x)]
+
+
+def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction] | None:
+    """Put what is amiss of each monomial on the entries of the matrix that have it; None where none has."""
+    x = list(x)
+    places: dict[Monomial, list[int]] = {}
+    for k, column in enumerate(problem.columns[head:], head):
+        places.setdefault(next(iter(column.terms)), []).append(k)
+    rest = problem.p - dot(x, problem.columns)
+    for m, c in rest.terms.items():
+        own = places.get(m)
+        if own is None:
+            return None
+        share = c / sum((problem.columns[k].terms[m] for k in own), Fraction(0))
+        for k in own:
+            x[k] += share
+    return x
+
+
+def written(
+    o: Squares, problem: Problem, x: list[Fraction], fixed: dict[int, Fraction], ansatz: list[list[Poly]]
+) -> dict[str, Any]:
+    """Return the evidence as the kernel reads it."""
+    loose, place = iter(x[: problem.signed]), problem.signed
+    multipliers = [fixed[k] if k in fixed else next(loose) for k in range(len(o.strict) + len(o.known))]
+    combined: list[dict[str, str]] = []
+    for parts in ansatz:
+        combined.append(text(dot(x[place : place + len(parts)], parts) if parts else poly(0)))
+        place += len(parts)
+    gram = [["0"] * len(problem.z) for _ in problem.z]
+    for (i, k), v in zip(problem.pairs, x[place:], strict=True):
+        gram[i][k] = gram[k][i] = str(v)
+    return {"multipliers": list(map(str, multipliers)), "cofactors": combined, "gram": gram}
+
+
+def text(p: Poly) -> dict[str, str]:
+    """Return a polynomial as evidence."""
+    return {" ".join(m): str(c) for m, c in p.terms.items()}

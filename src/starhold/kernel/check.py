@@ -1,0 +1,64 @@
+"""Checks certificates: python3 -I -S kernel.pyz certificate.json prints what is proved, or one line why it is refused."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+
+from .numbers import Account, RefusedError, demand
+from .reading import BYTES, Claim, read_certificate
+from .sentences import Statement
+from .theorems import THEOREMS
+
+
+@dataclass(frozen=True)
+class Proved:
+    """A claim that is proved, and what it says."""
+
+    claim: Claim
+    statement: Statement
+
+
+def check(text: str) -> list[Proved]:
+    """Return what a certificate proves; RefusedError where any of its claims is not proved."""
+    Account.open()
+    return [Proved(claim, prove(claim)) for claim in read_certificate(text)]
+
+
+def prove(claim: Claim) -> Statement:
+    """Check each obligation of a claim's theorem, and return what the theorem then says."""
+    demand(claim.theorem in THEOREMS, "there is no such theorem")
+    shown = THEOREMS[claim.theorem](claim)
+    while True:
+        try:
+            name, obligation = next(shown)
+        except StopIteration as end:
+            claim.close()
+            return end.value
+        try:
+            obligation.check(claim.evidence.get(name))
+        except RefusedError as fault:
+            raise RefusedError(f"{claim.theorem}, {name}: {fault}") from None
+
+
+def main(arguments: list[str]) -> int:
+    """Print what a certificate proves; return 0, or 1 where it is refused."""
+    try:
+        demand(len(arguments) == 1, "one certificate is checked at a time")
+        with open(arguments[0], "rb") as file:
+            lines = [line for proved in check(file.read(BYTES + 1).decode()) for line in written(proved)]
+    except (RefusedError, OSError, UnicodeDecodeError, RecursionError, MemoryError) as fault:
+        print(f"refused: {' '.join(str(fault).split()) or type(fault).__name__}")
+        return 1
+    print("The programs were not compared with those of a scenario.", *lines, sep="\n")
+    return 0
+
+
+def written(proved: Proved) -> list[str]:
+    """Return the lines about a claim: what it says, and the programs that it says it of."""
+    programs = proved.claim.programs.content.items()
+    return [f"proved: {proved.statement.written()}", *(f"  {role} {program.digest}" for role, program in programs)]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

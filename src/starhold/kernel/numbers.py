@@ -1,0 +1,158 @@
+"""Exact rational numbers, matrices of them, and the account of the work that a check may do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from typing import Any, TypeAlias, cast
+
+Rows: TypeAlias = list[list[Fraction]]
+
+WORK = 4_000_000
+"""Units of work that one check may do: a few microseconds each."""
+LONGEST = 20_000
+"""Bits of the longest number."""
+_TEXT = re.compile(r"-?[0-9]{1,3000}(/[0-9]{1,3000})?|-?0x[01](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}", re.ASCII)
+
+
+class RefusedError(Exception):
+    """A certificate is refused; the text says why in one line."""
+
+
+def demand(truth: bool, otherwise: str) -> None:
+    """Refuse what is not so."""
+    if not truth:
+        raise RefusedError(otherwise)
+
+
+class Account:
+    """The work that is left. It is counted and not timed, so that a certificate is refused on every machine or on none."""
+
+    left = WORK
+
+    @classmethod
+    def open(cls) -> None:
+        """Begin a check."""
+        cls.left = WORK
+
+    @classmethod
+    def spend(cls, operations: int, bits: int = 64) -> None:
+        """Pay for operations on numbers of so many bits before they are done."""
+        demand(bits <= LONGEST, "a number becomes too long")
+        cls.left -= operations * (2 + bits // 64)
+        demand(cls.left >= 0, "the check takes too much work")
+
+
+def size(x: Fraction) -> int:
+    """Return the bits of a number."""
+    return x.numerator.bit_length() + x.denominator.bit_length()
+
+
+def longest(numbers: Iterable[Fraction]) -> int:
+    """Return the bits of the longest of some numbers."""
+    return max(map(size, numbers), default=0)
+
+
+def rational(given: Any) -> Fraction:
+    """Read an exact number: -2, 3/4, or the hexadecimal form of a float, which is its exact value."""
+    text = given if isinstance(given, str) else ""
+    demand(_TEXT.fullmatch(text) is not None, "a number is not written as one")
+    if "x" in text:
+        sign, (mantissa, exponent) = text[0] == "-", text.lstrip("-0").lstrip("x").split("p")
+        digits, _, after = mantissa.partition(".")
+        demand(abs(int(exponent)) <= 1100, "a float is out of range")
+        size_of = Fraction(int(digits + after, 16), 16 ** len(after)) * Fraction(2) ** int(exponent)
+        return -size_of if sign else size_of
+    upper, _, lower = text.partition("/")
+    demand(lower == "" or int(lower) != 0, "a denominator is zero")
+    return Fraction(int(upper), int(lower or "1"))
+
+
+def read_list(given: Any, count: int | None = None) -> list[Any]:
+    """Read a list, of so many entries if that is told."""
+    demand(isinstance(given, list), "evidence is not a list")
+    found = cast(list[Any], given)
+    demand(count is None or len(found) == count, "a list has another length")
+    return found
+
+
+def read_dict(given: Any, most: int) -> dict[str, Any]:
+    """Read a table of no more than so many entries."""
+    demand(isinstance(given, dict), "evidence is not a table")
+    found = cast(dict[str, Any], given)
+    demand(len(found) <= most, "a table is too long")
+    return found
+
+
+def read_table(given: Any, *keys: str) -> list[Any]:
+    """Read the entries of a table that has these keys and no other."""
+    found = read_dict(given, len(keys))
+    demand(set(found) == set(keys), f"a table has other keys than {', '.join(keys)}")
+    return [found[key] for key in keys]
+
+
+def matrix(given: Any, rows: int, columns: int) -> Rows:
+    """Read a matrix."""
+    return [[rational(x) for x in read_list(row, columns)] for row in read_list(given, rows)]
+
+
+def definite(a: Rows, strictly: bool = True) -> bool:
+    """Tell whether a matrix is symmetric and positive definite (not strictly: nowhere negative), by elimination."""
+    rest = [list(row) for row in a]
+    demand(all(len(row) == len(rest) for row in rest), "a matrix is not square")
+    demand(rest == transpose(rest), "a matrix is not symmetric")
+    for k, pivots in enumerate(rest):
+        if pivots[k] < 0 or (pivots[k] == 0 and (strictly or any(pivots[k:]))):
+            return False
+        for i in range(k + 1, len(rest)) if pivots[k] else ():
+            Account.spend(len(rest) - k, longest(rest[i]) + longest(pivots))
+            factor = rest[i][k] / pivots[k]
+            rest[i] = [x - factor * y if factor and y else x for x, y in zip(rest[i], pivots, strict=True)]
+    return True
+
+
+def inverse(a: Rows) -> Rows:
+    """Invert a positive definite matrix exactly, by elimination without exchanges."""
+    count = len(a)
+    rest = [[*row, *(Fraction(i == k) for k in range(count))] for i, row in enumerate(a)]
+    for k in range(count):
+        demand(rest[k][k] != 0, "a matrix has no inverse")
+        Account.spend(2 * count * count, sum(map(longest, rest)))
+        rest[k] = [x / rest[k][k] for x in rest[k]]
+        for i in range(count):
+            if i != k:
+                rest[i] = [x - rest[i][k] * y for x, y in zip(rest[i], rest[k], strict=True)]
+    return [row[count:] for row in rest]
+
+
+def times(a: Rows, b: Rows) -> Rows:
+    """Return the product of two matrices."""
+    Account.spend(len(a) * len(b) * len(b[0]), longest(x for row in a for x in row) + longest(x for row in b for x in row))
+    columns = transpose(b)
+    return [[sum((x * y for x, y in zip(row, column, strict=True)), Fraction(0)) for column in columns] for row in a]
+
+
+def plus(a: Rows, b: Rows, c: Fraction | int = 1) -> Rows:
+    """Return a + c b."""
+    return [[x + c * y for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
+
+
+def transpose(a: Sequence[Sequence[Fraction]]) -> Rows:
+    """Return the transpose of a matrix."""
+    return [list(column) for column in zip(*a, strict=True)]
+
+
+def scalar(c: Fraction | int, count: int = 3) -> Rows:
+    """Return c times the identity."""
+    return [[Fraction(c) * (i == k) for k in range(count)] for i in range(count)]
+
+
+def cosine_below(angle: Fraction) -> Fraction:
+    """Return a number not above the cosine of an angle from 0 to 3: its alternating series, ended after a negative term."""
+    demand(0 <= angle <= 3, "an angle is not between 0 and 3")
+    Account.spend(80, 40 * size(angle))
+    total, term = Fraction(0), Fraction(1)
+    for k in range(1, 25):
+        total, term = total + term, -term * angle * angle / (2 * k * (2 * k - 1))
+    return total

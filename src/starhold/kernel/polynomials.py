@@ -1,0 +1,140 @@
+"""Polynomials with exact coefficients, their derivatives, and variables put in place of one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from itertools import product
+from typing import Any, TypeAlias
+
+from .numbers import Account, demand, longest, rational, read_dict
+
+Monomial: TypeAlias = tuple[str, ...]
+"""The sorted names of its factors, each as often as it occurs."""
+
+DEGREE, TERMS = 24, 100_000
+
+
+class Poly:
+    """A polynomial holds its coefficients, none of them zero, by monomial."""
+
+    __slots__ = ("terms",)
+
+    def __init__(self, terms: dict[Monomial, Fraction]) -> None:
+        self.terms = {m: c for m, c in terms.items() if c}
+        demand(len(self.terms) <= TERMS, "a polynomial is too long")
+
+    def __add__(self, other: Poly | Fraction | int) -> Poly:
+        found, more = dict(self.terms), poly(other).terms
+        Account.spend(len(found) + len(more) + 1, longest(more.values()))
+        for m, c in more.items():
+            found[m] = found.get(m, Fraction(0)) + c
+        return Poly(found)
+
+    def __mul__(self, other: Poly | Fraction | int) -> Poly:
+        found: dict[Monomial, Fraction] = {}
+        other = poly(other)
+        bits = longest(self.terms.values()) + longest(other.terms.values())
+        Account.spend(len(self.terms) * len(other.terms) + 1, bits)
+        for (m, c), (n, d) in product(self.terms.items(), other.terms.items()):
+            demand(len(m) + len(n) <= DEGREE, "a degree is too high")
+            both = tuple(sorted(m + n))
+            found[both] = found.get(both, Fraction(0)) + c * d
+        return Poly(found)
+
+    def __neg__(self) -> Poly:
+        Account.spend(len(self.terms))
+        return Poly({m: -c for m, c in self.terms.items()})
+
+    def __pos__(self) -> Poly:
+        return self
+
+    def __sub__(self, other: Poly | Fraction | int) -> Poly:
+        return self + -poly(other)
+
+    def __rsub__(self, other: Fraction | int) -> Poly:
+        return poly(other) - self
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    @property
+    def names(self) -> set[str]:
+        """Return the variables that occur."""
+        return {name for m in self.terms for name in m}
+
+    @property
+    def number(self) -> Fraction:
+        """Return the value of a polynomial without variables."""
+        demand(not self.names, "a number depends on the state")
+        return self.terms.get((), Fraction(0))
+
+    def slope(self, name: str) -> Poly:
+        """Return the derivative: every monomial with the name loses one, and gains its count as a factor."""
+        Account.spend(len(self.terms))
+        found: dict[Monomial, Fraction] = {}
+        for m, c in self.terms.items():
+            if name in m:
+                place = m.index(name)
+                found[m[:place] + m[place + 1 :]] = c * m.count(name)
+        return Poly(found)
+
+    def over(self, name: str) -> Poly:
+        """Return the polynomial divided by a variable, which every monomial must have."""
+        demand(all(name in m for m in self.terms), f"a polynomial is not a multiple of {name}")
+        return Poly({m[: m.index(name)] + m[m.index(name) + 1 :]: c for m, c in self.terms.items()})
+
+    def at(self, values: Mapping[str, Poly | Fraction | int]) -> Poly:
+        """Return the polynomial with numbers or polynomials in place of variables, all at once."""
+        total = Poly({})
+        for m, c in self.terms.items():
+            term = Poly({tuple(name for name in m if name not in values): c})
+            for name in m:
+                if name in values:
+                    term = term * values[name]
+            total = total + term
+        return total
+
+
+def poly(value: Poly | Fraction | int) -> Poly:
+    """Return a number as a polynomial."""
+    return value if isinstance(value, Poly) else Poly({(): Fraction(value)})
+
+
+def var(name: str) -> Poly:
+    """Return a variable."""
+    return Poly({(name,): Fraction(1)})
+
+
+def variables(letter: str, first: int = 1, last: int = 3) -> list[Poly]:
+    """Return variables of one letter: q0 to q3, w1 to w3."""
+    return [var(f"{letter}{k}") for k in range(first, last + 1)]
+
+
+def total(parts: Iterable[Poly]) -> Poly:
+    """Return a sum."""
+    return sum(parts, Poly({}))
+
+
+def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) -> Poly:
+    """Return the sum of products."""
+    return total(poly(x) * y for x, y in zip(a, b, strict=True))
+
+
+def apply(rows: Sequence[Sequence[Poly | Fraction | int]], v: Sequence[Poly]) -> list[Poly]:
+    """Return a matrix times a vector."""
+    return [dot(row, v) for row in rows]
+
+
+def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
+    """Return the vector product."""
+    return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]
+
+
+def read_poly(given: Any) -> Poly:
+    """Read a polynomial of the evidence: {"q0 w1 w1": "3/4"}."""
+    found: dict[Monomial, Fraction] = {}
+    for names, c in read_dict(given, TERMS).items():
+        m = tuple(sorted(names.split()))
+        demand(m not in found and len(m) <= DEGREE, "a monomial stands twice, or is of too high a degree")
+        found[m] = rational(c)
+    return Poly(found)

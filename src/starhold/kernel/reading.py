@@ -1,0 +1,114 @@
+"""Strict reading of a certificate: what is told twice, or told and not read, is refused, and so is what is too large."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Generic, TypeVar
+
+from .numbers import RefusedError, demand, rational, read_dict, read_list, read_table
+from .programs import Program
+
+FORMAT = "starhold certificate 3"
+BYTES, CLAIMS, NUMBERS = 8_000_000, 50, 2_000
+_T = TypeVar("_T")
+
+
+class Told(Generic[_T]):
+    """A table of what a claim is told, which knows what of it was read."""
+
+    def __init__(self, name: str, content: Mapping[str, _T]) -> None:
+        self.name, self.content, self.unread = name, dict(content), set(content)
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.content
+
+    def __getitem__(self, key: str) -> _T:
+        demand(key in self.content, f"{self.name} lack {key}")
+        self.unread.discard(key)
+        return self.content[key]
+
+    def get(self, key: str) -> _T | None:
+        """Return an entry that may be absent."""
+        self.unread.discard(key)
+        return self.content.get(key)
+
+    def close(self) -> None:
+        """Refuse what was not read."""
+        demand(not self.unread, f"nothing depends on {', '.join(sorted(self.unread))} of the {self.name}")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim names its theorem, what the loop is taken with, and the loop's programs by their roles; it has the exact
+    numbers of the programs and of the body (subject), those that it claims (numbers), and the evidence by obligations."""
+
+    theorem: str
+    taken: Told[bool]
+    programs: Told[Program]
+    subject: Told[Fraction]
+    numbers: Told[Fraction]
+    evidence: Told[Any]
+
+    def close(self) -> None:
+        """Refuse what was told and not read."""
+        for told in (self.taken, self.programs, self.subject, self.numbers, self.evidence):
+            told.close()
+
+
+def read_certificate(text: str) -> list[Claim]:
+    """Read the claims of a certificate."""
+    demand(len(text) <= BYTES, "the certificate is too large")
+    try:
+        content = json.loads(
+            text, object_pairs_hook=_once, parse_float=_no_number, parse_constant=_no_number, parse_int=_place
+        )
+    except json.JSONDecodeError as fault:
+        raise RefusedError(f"the certificate is no JSON: {fault.msg} in line {fault.lineno}") from None
+    except RecursionError:
+        raise RefusedError("the certificate is nested too deeply") from None
+    kind, programs, claims = read_table(content, "format", "programs", "claims")
+    demand(kind == FORMAT, f"the format is not {FORMAT!r}")
+    found = Told("programs", _table(programs, Program.read))
+    for name in found.content:
+        demand(found.content[name].digest == name, "a program is another one than its digest says")
+    demand(1 <= len(read_list(claims)) <= CLAIMS, "there are no claims, or too many")
+    read = [_claim(claim, found) for claim in claims]
+    found.close()
+    return read
+
+
+def _claim(given: Any, programs: Told[Program]) -> Claim:
+    keys = ("theorem", "taken", "programs", "subject", "numbers", "evidence")
+    theorem, taken, roles, subject, numbers, evidence = read_table(given, *keys)
+    demand(isinstance(theorem, str), "a theorem has no name")
+    demand(all(isinstance(word, str) for word in read_list(taken)) and len(set(taken)) == len(taken), "a word stands twice")
+    return Claim(
+        theorem,
+        Told("words", dict.fromkeys(taken, True)),
+        Told("programs", _table(roles, lambda name: programs[name if isinstance(name, str) else ""])),
+        Told("subject", _table(subject, rational)),
+        Told("numbers", _table(numbers, rational)),
+        Told("evidence", _table(evidence, lambda part: part)),
+    )
+
+
+def _table(given: Any, read: Callable[[Any], _T]) -> dict[str, _T]:
+    return {name: read(part) for name, part in read_dict(given, NUMBERS).items()}
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    demand(len(found) == len(pairs), "a key stands twice")
+    return found
+
+
+def _no_number(text: str) -> Any:
+    raise RefusedError("a number stands outside of a text")
+
+
+def _place(text: str) -> int:
+    demand(len(text) <= 9, "a whole number is too long")
+    return int(text)

@@ -1,0 +1,69 @@
+"""Sentences about what was checked, and the assumptions under which it holds of a spacecraft. Numbers are rounded so as to
+say no more than was proved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
+from fractions import Fraction
+
+ASSUMPTIONS = {
+    "rigid-body": "the body is rigid",
+    "inertia-as-given": "its inertia is exactly as given",
+    "exact-measurement": "measurements are exact",
+    "ideal-actuators": "actuators give at once what the law asks",
+    "continuous-torque": "the torque is applied continuously",
+    "unlimited-torque": "the torque is not limited",
+    "no-outside-torque": "there is no torque from outside",
+    "known-outside-torque": "a torque from outside is as the law is told",
+    "bounded-outside-torque": "a torque from outside is at most as told",
+    "target-at-rest": "the target is at rest",
+    "known-target": "the target's motion is as the law is told",
+    "bounded-target": "the target turns, and its rate changes, no faster than told",
+    "no-wheels": "no wheels turn",
+    "frictionless-wheels": "wheels have no friction, and share the torque by least squares",
+    "unlimited-wheels": "wheels are not limited",
+    "bounded-momentum": "body and wheels have no more momentum together than told",
+    "linear-motion": "the motion is linear, as it is near rest",
+    "quaternion-as-fed": "the quaternion that is fed back never jumps",
+    "sign-at-once": "the sign of the quaternion is chosen at once",
+}
+"""What identifiers of assumptions say."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A sentence, and the identifiers of what it assumes."""
+
+    text: str
+    assumptions: tuple[str, ...]
+
+    def written(self) -> str:
+        """Return the sentence with its assumptions."""
+        return f"{self.text}; if {', '.join(ASSUMPTIONS[name] for name in self.assumptions)}"
+
+
+def below(x: Fraction) -> str:
+    """Write a number with seven digits, rounded down."""
+    return _rounded(x, ROUND_FLOOR)
+
+
+def above(x: Fraction) -> str:
+    """Write a number with seven digits, rounded up."""
+    return _rounded(x, ROUND_CEILING)
+
+
+def _rounded(x: Fraction, rounding: str) -> str:
+    # A float of few digits as it was written.
+    if abs(x) < 2**60 and x.denominator < 2**200 and x == Fraction(float(x)) and len(repr(float(x))) <= 9:
+        return f"{float(x):g}" if float(x) == float(f"{float(x):g}") else repr(float(x))
+    # Digits enough that the quotient of two exact numbers is rounded once only.
+    wide, narrow = Context(prec=400, rounding=rounding), Context(prec=7, rounding=rounding)
+    quotient = wide.divide(wide.create_decimal(x.numerator), wide.create_decimal(x.denominator))
+    return f"{narrow.plus(quotient):g}"
+
+
+def enumerated(parts: Sequence[str]) -> str:
+    """Join some parts of a sentence."""
+    return ", and ".join(parts)

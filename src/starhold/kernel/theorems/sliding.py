@@ -1,0 +1,158 @@
+"""The theorem that a sliding-mode law reaches its surface, and what becomes of the motion then. Proof: docs/kernel.md, 6."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from ..loops import AXES, HYSTERESIS, SHORTEST, AttitudeLoop, slopes
+from ..numbers import Rows, demand, plus, scalar, times, transpose
+from ..polynomials import Poly, apply, dot, poly
+from ..programs import Case
+from ..reading import Claim
+from ..rules import Definite, Exceeds, Obligation, Shown, Squares, Vanishes
+from ..sentences import Statement, above, below
+
+
+@dataclass(frozen=True)
+class Axis:
+    """(J s')_i - e_i is -reach sign(s_i) at most, or where `slope` is told -slope s_i within a boundary layer."""
+
+    reach: Fraction
+    slope: Fraction | None
+
+
+def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
+    """The motion reaches s = w + Kq = 0 in a finite time, against any torque from outside that is at most as told, and
+    slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target.
+
+    s.Js/2 falls at sum (reach_i - outside_i) |s_i| at least (Filippov solutions), and on s = 0 q0' = q.Kq/2. In a layer each
+    s_i (J s')_i <= outside_i |s_i| - slope_i s_i^2 <= outside_i^2/(4 slope_i); the sum of these is `total`. Where |s_i| is
+    above far_i, axis i loses more than that, so s.Js/2 ends at its largest value in the box |s_i| <= far_i, and |s| at most
+    sqrt(high/low sum far_i^2) with low <= J <= high; then q0 grows while |q| > surface/k, where q.Kq >= k |q|^2."""
+    loop = AttitudeLoop(claim)
+    numbers = claim.numbers
+    yield from loop.sound()
+    s = [cases[0].value for cases in loop.read("surface", 3, loop.told) if len(cases) == 1]
+    demand(len(s) == 3, "the surface switches")
+    K = slopes(s, "q", {})
+    for k, (p, row) in enumerate(zip(s, K, strict=True)):
+        yield f"surface {k}", Vanishes(p - loop.w[k] - dot(row, loop.q[1:]))
+    yield "q0 grows on the surface", Squares(dot(loop.q[1:], apply(K, loop.q[1:])), loop.q[1:], 3)
+    # J s' = J w' + J K q'.
+    without = loop.balance([Poly({})] * 3)
+    moved = [a + b for a, b in zip(without, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
+    axes, outside = list[Axis](), [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
+    for i in AXES:
+        axes.append(taken_apart(loop, i, moved[i] - loop.e[i], s[i]))
+        demand(outside[i] >= 0, "a bound is negative")
+        yield f"reach {i}", Exceeds(axes[i].reach, outside[i])
+    layered = any(axis.slope is not None for axis in axes)
+    squares, ending = Fraction(0), "slides to rest on target, on either quaternion"
+    if layered and any(outside):
+        squares = yield from losses(loop, axes, outside)
+        ending = yield from ending_in_the_layer(loop, squares, K)
+    said, begun = "approaches" if layered else "reaches in a finite time", "every attitude and rate"
+    signed = bool(claim.taken.get(SHORTEST) or claim.taken.get(HYSTERESIS))
+    if signed:
+        # At q0 = 0 q0' = (q.Kq - s.q)/2 > 0 while |s| < k, and low |s|^2 <= s.Js.
+        level, low, k = numbers["level"], numbers["inertia.low"], numbers["surface.low"]
+        yield from bounded(loop, K)
+        yield (
+            "the sign never changes",
+            Exceeds(low * k * k, max(2 * level, numbers["inertia.high"] * squares if squares else 0)),
+        )
+        begun = f"{{s.Js/2 <= {below(level)}}}"
+    text = f"from {begun} the motion {said} the law's surface and {ending}"
+    torque = "bounded-outside-torque" if loop.outside else "no-outside-torque"
+    target = "known-target" if loop.moving else "target-at-rest"
+    assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators", "continuous-torque")
+    demand(not loop.wheels, "no law of this kind is taken with wheels")
+    return Statement(
+        text,
+        (*assumptions, "unlimited-torque", torque, target, "no-wheels", "sign-at-once" if signed else "quaternion-as-fed"),
+    )
+
+
+def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
+    """Return the axis: in each case of the law (J s')_i - e_i is a number against the sign of s_i, or -slope s_i."""
+    reaches, linear = list[Fraction](), list[Fraction]()
+    for case in loop.law[i]:
+        found = case.value + moved
+        sides = [sign for sign in (1, -1) if on_side(case, sign * s)]
+        if len(sides) == 1 and not found.names:
+            reaches.append(-sides[0] * found.number)
+        elif not on_surface(case, s):
+            slope = -found.slope(f"w{i + 1}").number
+            demand(not (found + slope * s).terms and slope > 0, "the law is neither a switch nor a layer about its surface")
+            linear.append(slope)
+    demand(bool(reaches), "the law does not switch")
+    return Axis(min(reaches), min(linear) if linear else None)
+
+
+def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:
+    """Return f and c with p = f s + c; f is 0 where there are none."""
+    first = next(iter(s.terms))
+    factor = p.terms.get(first, Fraction(0)) / s.terms[first]
+    rest = p - factor * s
+    return (factor, rest.number) if not rest.names else (Fraction(0), Fraction(0))
+
+
+def on_side(case: Case, s: Poly) -> bool:
+    """Tell whether a case says that s > c with a c that is not negative."""
+    found = (multiple(Poly(dict(p)), s) for p, truth in case.guards if truth)
+    return any(factor > 0 and offset <= 0 for factor, offset in found)
+
+
+def on_surface(case: Case, s: Poly) -> bool:
+    """Tell whether a case is about s = 0 alone."""
+    found = [multiple(Poly(dict(p)), s) for p, truth in case.guards if not truth]
+    return all(any(sign * factor > 0 and offset == 0 for factor, offset in found) for sign in (1, -1))
+
+
+def losses(
+    loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]
+) -> Generator[tuple[str, Obligation], None, Fraction]:
+    """Show that s.Js/2 falls outside of the box |s_i| <= far_i, and return the sum of far_i^2."""
+    total, squares = Fraction(0), Fraction(0)
+    for axis, m in zip(axes, outside, strict=True):
+        total += m * m / (4 * axis.slope) if axis.slope is not None else 0
+    for i, (axis, m) in enumerate(zip(axes, outside, strict=True)):
+        far = loop.claim.numbers[f"far.{i}"]
+        demand(far > 0, "a bound is not positive")
+        yield f"beyond the layer {i}", Exceeds((axis.reach - m) * far, total)
+        if axis.slope is not None:
+            yield f"in the layer {i}", Exceeds(axis.slope * far * far - m * far, total)
+        squares += far * far
+    return squares
+
+
+def bounded(loop: AttitudeLoop, K: Rows) -> Shown:
+    """low |x|^2 <= x.Jx, and k |x|^2 <= x.Kx."""
+    low, k = loop.claim.numbers["inertia.low"], loop.claim.numbers["surface.low"]
+    demand(low > 0 and k > 0, "a bound is not positive")
+    J: Rows = [[poly(x).number for x in row] for row in loop.J]
+    yield "least moment", Definite(plus(J, scalar(1), -low))
+    yield "least slope", Definite(plus([[x / 2 for x in row] for row in plus(K, transpose(K))], scalar(1), -k))
+
+
+def ending_in_the_layer(loop: AttitudeLoop, squares: Fraction, K: Rows) -> Generator[tuple[str, Obligation], None, str]:
+    """Show where motions end in a boundary layer."""
+    numbers = loop.claim.numbers
+    low, high, k, steep = (numbers[name] for name in ("inertia.low", "inertia.high", "surface.low", "surface.high"))
+    size, angle, rate = numbers["surface"], numbers["angle"], numbers["rate"]
+    demand(min(high, steep, size, angle, 3 - angle) > 0, "a bound is not positive, or an angle too large")
+    yield from bounded(loop, K)
+    J: Rows = [[poly(x).number for x in row] for row in loop.J]
+    yield "largest moment", Definite(plus(scalar(high), J, -1))
+    yield "largest slope", Definite(plus(scalar(steep * steep), times(transpose(K), K), -1))
+    yield "surface", Exceeds(size * size * low, high * squares)
+    # sin^2 = 1 - cos^2 from below, as cos x <= 1 - x^2/2 + x^4/24.
+    half = angle * angle / 4
+    cosine = 1 - half / 2 + half * half / 24
+    yield "cosine", Exceeds(cosine)
+    yield "angle", Exceeds((1 - cosine * cosine) * k * k, size * size)
+    yield "less than a half turn", Exceeds(k, size)
+    yield "rate", Exceeds(rate, size + steep * size / k)
+    return f"ends turned by no more than {above(angle)} rad at no more than {above(rate)} rad/s"

@@ -1,0 +1,68 @@
+"""Prints an equation as a straight-line program for the proof kernel: inputs by name, steps, places of outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from starhold.algebra.structure import leaves
+from starhold.errors import InputError
+from starhold.trace.program import Load, Op, Store
+from starhold.trace.recording import Recorder
+
+
+def labelled(name: str, value: Any) -> Iterator[tuple[str, float]]:
+    """Yield the floats of a nested value by the names that a program gives its inputs: craft.inertia.0."""
+    if isinstance(value, tuple):
+        fields = getattr(value, "_fields", range(len(value)))  # pyright: ignore[reportUnknownArgumentType]
+        for field, part in zip(fields, value, strict=True):  # pyright: ignore[reportUnknownVariableType,reportUnknownArgumentType]
+            yield from labelled(f"{name}.{field}", part)
+    elif isinstance(value, float):
+        yield name, value
+
+
+def straight_line(equation: Callable[..., Any], **given: Any) -> dict[str, Any]:
+    """Return an equation as a program of the proof kernel; its arguments are shaped like those given, whose floats become
+    the inputs that it reads. InputError where it has loops, buffers or words."""
+    recorder = Recorder()
+    x, y = recorder.memory("x"), recorder.memory("y", writable=True)
+    names = [label for name, value in given.items() for label, _ in labelled(name, value)]
+    place = iter(range(len(names)))
+
+    def handle(value: Any) -> Any:
+        if isinstance(value, tuple):
+            parts = [handle(part) for part in value]  # pyright: ignore[reportUnknownVariableType]
+            return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)  # pyright: ignore
+        return x[next(place)] if isinstance(value, float) else value
+
+    with recorder.recording():
+        for k, leaf in enumerate(leaves(equation(*(handle(value) for value in given.values())))):
+            y[k] = leaf
+    body = recorder.program("program").main.body
+    used = sorted({s.index for s in body if isinstance(s, Load)})
+    steps, outputs = list[list[Any]](), list[int]()
+    places, constants = dict[str, int](), dict[str, int]()
+
+    def at(value: Any) -> int:
+        if isinstance(value, str):
+            return places[value]
+        # Zero has two signs.
+        text = float(value).hex()
+        if text not in constants:
+            constants[text] = step("constant", text)
+        return constants[text]
+
+    def step(*parts: Any) -> int:
+        steps.append([*parts])
+        return len(used) + len(steps) - 1
+
+    for s in body:
+        if isinstance(s, Load):
+            places[s.ref] = used.index(s.index)
+        elif isinstance(s, Op):
+            places[s.ref] = step(s.operation.name, *[at(value) for value in s.args])
+        elif isinstance(s, Store):
+            outputs.append(at(s.value))
+        else:
+            raise InputError("law", "", "loops or calls", "an equation without them: the kernel reads straight lines")
+    return {"inputs": [names[k] for k in used], "steps": steps, "outputs": outputs}

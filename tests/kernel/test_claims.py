@@ -1,0 +1,135 @@
+"""The claims of built-in attitude scenarios, shown by evidence that the kernel accepts, run by itself."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import starhold as sh
+from starhold.certification.evidence.bundle import kernel_bundle
+from starhold.kernel.check import check, main
+from starhold.kernel.numbers import WORK, Account
+from starhold.kernel.sentences import ASSUMPTIONS
+from tests.kernel.certificates import contents, found, text
+from tests.kernel.oracle import Oracle, number
+from tests.tiers import leading
+
+KINDS = {
+    "converges": "convergence",
+    "converges from both quaternions": "convergence",
+    "converges whatever the inertia": "inertia",
+    "converges from both quaternions whatever the inertia": "inertia",
+    "stays stable between samples": "sampling",
+    "reaches its surface": "sliding",
+}
+LEFT = {
+    "disturbance": "not yet among the theorems",
+}
+LAWS = [
+    ("three-laws", "lyapunov"), ("cubesat-slew", "lyapunov"), ("three-laws", "sliding"), ("cubesat-slew", "pd"),
+    ("cubesat-slew", "sliding"), ("flexible-slew", "pd"), ("flexible-slew", "stiff"), ("geostationary", "pd"),
+    ("geostationary", "matrix-pd"), ("geostationary", "lyapunov"), ("geostationary", "sliding"), ("wheels-orbital", "wheel"),
+    ("wheels-orbital", "uncompensated"), ("cubesat-nadir", "wheel"), ("cubesat-nadir", "lyapunov"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def bundle(tmp_path_factory):
+    path = tmp_path_factory.mktemp("kernel") / "kernel.pyz"
+    path.write_bytes(kernel_bundle())
+    return path
+
+
+def kind(claim):
+    if {"limit", "limit.norm"} & claim["numbers"].keys():
+        return "torque-limit"
+    return "wheels" if "motors.0" in claim["numbers"] else KINDS[claim["theorem"]]
+
+
+@pytest.mark.parametrize(("scenario", "law"), leading(LAWS, 3))
+def test_every_claim_of_today_is_proved_by_the_kernel_alone(scenario, law, bundle, tmp_path):
+    (today,) = (c for c in sh.certify(sh.load(scenario), law) if c.name == law)
+    content = contents(scenario, law)
+    path = tmp_path / "certificate.json"
+    path.write_text(text(content))
+    done = subprocess.run([sys.executable, "-I", "-S", bundle, path], capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("proved: ") == len(content["claims"])
+    claims = {kind(claim): claim for claim in reversed(content["claims"])}
+    for own in today.claims:
+        if own.outcome != "proved" or own.kind in LEFT:
+            continue
+        numbers = {name: number(x) for name, x in claims[own.kind]["numbers"].items()}
+        for name, mine in (("level", "level"), ("slew_angle", "angle"), ("rate", "rate"), ("longest", "longest")):
+            old = own.numbers.get(name)
+            if own.kind != "sliding" and old and mine in numbers:
+                assert numbers[mine] >= 0.98 * old, (own.kind, name)
+        if own.kind == "sliding" and own.numbers["angle"]:
+            assert numbers["angle"] <= own.numbers["angle"] / 0.98
+    for claim in content["claims"]:
+        assert Oracle(content, claim).holds()
+    check(text(content))
+    assert WORK - Account.left < WORK / 3
+
+
+def test_strict_functions_and_limits_of_the_norm_are_found():
+    assert contents("by hand", "strict")["claims"][0]["theorem"] == "converges strictly"
+    (limited,) = (c for c in contents("by hand", "norm")["claims"] if "limit.norm" in c["numbers"])
+    assert 0.98 * 0.006 < number(limited["numbers"]["level"]) < 0.0063
+    for law in ("strict", "norm"):
+        content = contents("by hand", law)
+        assert len(check(text(content))) == len(content["claims"])
+        assert all(Oracle(content, claim).holds() for claim in content["claims"])
+
+
+def test_levels_are_nearly_the_largest():
+    """On the border of the set the torque comes near its limit."""
+    content = contents("three-laws", "lyapunov", 1)
+    (claim,) = content["claims"]
+    oracle = Oracle(content, claim)
+    worst = max(abs(oracle.law(q, w, *oracle.environment())[0]).max() for q, w in edge(oracle))
+    assert 0.98 * oracle.numbers["limit"] < worst <= oracle.numbers["limit"] * (1 + 1e-9)
+
+
+def edge(oracle):
+    """States on the border of the set where its torque is largest: turned, and turning on, about one axis."""
+    level, target, zero = oracle.numbers["level"], np.eye(4)[0], np.zeros(3)
+    V0 = oracle.lyapunov(target, zero)
+    for axis in np.eye(3):
+        for angle in np.linspace(0, oracle.numbers["angle"], 60):
+            q = np.concatenate([[math.cos(angle / 2)], math.sin(angle / 2) * axis])
+            yield q, axis * math.sqrt((level - oracle.lyapunov(q, zero) + V0) / (oracle.lyapunov(target, axis) - V0))
+
+
+def test_sentences_name_what_they_assume():
+    for proved in check(text(contents("three-laws", "lyapunov"))):
+        assert set(proved.statement.assumptions) <= ASSUMPTIONS.keys()
+        assert len(set(proved.statement.assumptions)) == len(proved.statement.assumptions)
+    assert "0.01 N m about any axis" in check(text(contents("three-laws", "lyapunov", 1)))[0].statement.text
+
+
+def test_bundle_has_the_same_bytes_each_time_and_imports_nothing_installed(bundle, tmp_path):
+    assert bundle.read_bytes() == kernel_bundle()
+    done = subprocess.run([sys.executable, "-I", "-S", bundle, tmp_path / "none.json"], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stdout.startswith("refused: ")
+    assert len(done.stdout.splitlines()) == 1
+    assert done.stderr == ""
+
+
+def test_refusal_is_one_line(capsys, tmp_path):
+    path = tmp_path / "c.json"
+    for broken in ("", "[", "{}", "[" * 100_000, '{"a": 1, "a": 2}', "\x00", json.dumps({"format": "other"}), "1" * 50):
+        path.write_text(broken)
+        assert main([str(path)]) == 1
+        (line,) = capsys.readouterr().out.splitlines()
+        assert line.startswith("refused: ")
+    path.write_bytes(b"\xff\xfe")
+    assert main([str(path)]) == 1
+
+
+def test_found_says_why_a_law_has_no_claim():
+    assert "depends on more than the state" in found("wheels-orbital", "uncompensated").failed["converges"]
