@@ -104,7 +104,7 @@ def _note(names: tuple[str, ...]) -> Any:
 
 def _square(value: Any) -> Any:
     numbers: list[Any] = flatten((value,))
-    found = numbers[0] * numbers[0]
+    total = numbers[0] * numbers[0]
     for number in numbers[1:]:
-        found = found + number * number
-    return found
+        total = total + number * number
+    return total

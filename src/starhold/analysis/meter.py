@@ -130,32 +130,32 @@ class Meter:
         control step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other
         metrics of a motion that diverged are NaN."""
         kept = lost < 0.0
-        found = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
+        metrics = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
         for name, metric in self.table.items():
             values = self._values(metric, noted, windows, self.cuts())
             if metric.kind == INSTANT:
                 values = np.where((values <= self.steps) & ~self._late(metric, values), values, np.nan)
-            found[name] = np.where(kept, self._scaled(metric, values), np.nan)
-        return found
+            metrics[name] = np.where(kept, self._scaled(metric, values), np.nan)
+        return metrics
 
     def of_recording(self, run: Recording, limit: float) -> dict[str, Any]:
         """Metrics of a recording whose samples are the instants. Those without a value are None; `cut_off` names the times
         that come too late to count, `diverged_at` is the time at which the motion diverged."""
         lost, ends = run.attrs.get("diverged_at"), [*self.marks, self.steps + 1]
         noted, windows = self._replayed(run, limit, ends)
-        found: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
+        metrics: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
         for name, metric in self.table.items():
             values = self._values(metric, noted, windows, ends)
             there = lost is None or not (metric.final or metric.kind == INSTANT)
             if there and metric.kind == INSTANT:
                 there = bool(values[0] <= self.steps)
                 if there and self._late(metric, values)[0]:
-                    found["cut_off"].append(name)
+                    metrics["cut_off"].append(name)
                     there = False
             value = float(self._scaled(metric, values)[0])
             value = int(value) if there and metric.kind == INSTANT and metric.unit == "1" else value
-            found[name] = value if there and not math.isnan(value) else None
-        return found
+            metrics[name] = value if there and not math.isnan(value) else None
+        return metrics
 
     def program(self, columns: Columns, limit: float) -> Program:
         """The notes from the last of `marks` on, of samples with these columns, recorded; see `over_samples`."""
@@ -190,7 +190,7 @@ class Meter:
         kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
         shared = Arguments(self.numbers, limit).shared
         rows = [window.row for window in self.windows.values()]
-        noted, found, done = self.begun(1), np.empty((len(ends), len(rows), 1)), 0
+        noted, by_window, done = self.begun(1), np.empty((len(ends), len(rows), 1)), 0
         for window, end in enumerate(ends):
             while done < end:
                 last = min(end, done + PIECE)
@@ -200,9 +200,9 @@ class Meter:
                 memories = {"record": record, "noted": noted, "shared": shared, "own": shared, "tables": shared}
                 kernels[done >= self.marks[-1]](memories, done, last - done)
                 done = last
-            found[window] = noted[rows]
+            by_window[window] = noted[rows]
             noted[rows] = 0.0
-        return noted, found
+        return noted, by_window
 
 
 def _is_sampled(values: Any, run: Recording) -> bool:
@@ -249,19 +249,19 @@ def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
 
 def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterator[Any]:
     """Return what is recorded of effectors, from the last to the first, and of the body, whose names count most."""
-    own, records, _, _ = make_step(parts).sample(decided, step, setup)
-    return reversed((own, *records))
+    body, records, _, _ = make_step(parts).sample(decided, step, setup)
+    return reversed((body, *records))
 
 
 def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
     """The control steps at which windows of a flight end, every mark among them. The last window holds the last instant too;
     where that is a mark, it has a window of its own."""
     edges = [0, *marks, steps]
-    found: set[int] = set()
+    ends: set[int] = set()
     for first, last in itertools.pairwise(edges):
         count = max(1, round(WINDOWS * (last - first) / steps))
-        found |= {round(cut) for cut in np.linspace(first, last, count + 1)[1:].tolist()}
-    return sorted(found - {0}) + [steps + 1] * (steps in marks)
+        ends |= {round(cut) for cut in np.linspace(first, last, count + 1)[1:].tolist()}
+    return sorted(ends - {0}) + [steps + 1] * (steps in marks)
 
 
 def tail_start(steps: int) -> int:

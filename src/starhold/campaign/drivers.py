@@ -282,12 +282,12 @@ Correlate: TypeAlias = Callable[[Array], tuple[float, float]]
 """From a metric's ranks (n,), less their mean, to the strength of a dependence and its p-value."""
 
 
-def _rank_correlation(own: Array) -> Correlate | None:
+def _rank_correlation(values: Array) -> Correlate | None:
     """Return Spearman's correlation with an input's ranks (n,); None where they are all equal."""
-    n, norm = len(own), _product(own, own)
+    n, norm = len(values), _product(values, values)
 
     def correlate(ranks: Array) -> tuple[float, float]:
-        strength = max(-1.0, min(1.0, _product(own, ranks) / math.sqrt(norm * _product(ranks, ranks))))
+        strength = max(-1.0, min(1.0, _product(values, ranks) / math.sqrt(norm * _product(ranks, ranks))))
         return strength, float(special.betainc(0.5 * n - 1.0, 0.5, 1.0 - strength**2))
 
     return correlate if norm > 0.0 else None

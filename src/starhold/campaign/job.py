@@ -143,12 +143,12 @@ class Job:
         """Return what tells of the runs of a block as they are flown, lot after lot."""
         if self.progress is None:
             return None
-        tell, told, whole = self.progress, [0], [0]
+        tell, reported, whole = self.progress, [0], [0]
 
         def progress(done: int, lanes: int) -> None:
             now = whole[0] + done
-            tell(law, now - told[0])
-            told[0] = now
+            tell(law, now - reported[0])
+            reported[0] = now
             if done == lanes:
                 whole[0] += lanes
 
@@ -167,16 +167,18 @@ class Job:
         """Begin to fly runs of a law. What is returned waits for their metrics and the numbers read back, (lanes,), by name.
         columns: what was drawn; runs: their numbers, which number their random ones; take: called with metrics and windows
         of each lot; refused: as `Lanes.lots` takes it, without numbers for lanes marked there."""
-        under_way = [(at, told, self._begin(lot, pool)) for lot, at, told in self.lanes(law).lots(columns, runs, refused)]
+        under_way = [
+            (at, numbers, self._begin(lot, pool)) for lot, at, numbers in self.lanes(law).lots(columns, runs, refused)
+        ]
 
         def finish() -> Metrics:
-            found: Metrics = {}
-            for at, told, flown in under_way:
+            gathered: Metrics = {}
+            for at, numbers, flown in under_way:
                 metrics, windows = flown(progress)
                 take(metrics, windows)
-                for name, values in (told | metrics).items():
-                    found.setdefault(name, np.full(len(runs), np.nan))[at] = values
-            return found
+                for name, values in (numbers | metrics).items():
+                    gathered.setdefault(name, np.full(len(runs), np.nan))[at] = values
+            return gathered
 
         return finish
 

@@ -150,5 +150,5 @@ class CampaignResult:
         return fly_again(self.folder, run, law)
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{law.law}: {law.failed} of {law.runs} failed" for law in self.laws)
-        return f"<campaign {self.name}: {told}>"
+        failures = ", ".join(f"{law.law}: {law.failed} of {law.runs} failed" for law in self.laws)
+        return f"<campaign {self.name}: {failures}>"

@@ -133,8 +133,8 @@ def least(holds: Callable[[int], bool], start: int) -> int:
 
 def greatest(holds: Callable[[int], bool], end: int) -> int | None:
     """Return the greatest whole number from 0 to `end` for which something holds that holds for all smaller ones as well."""
-    found = least(lambda number: number > end or not holds(number), 0) - 1
-    return None if found < 0 else found
+    last = least(lambda number: number > end or not holds(number), 0) - 1
+    return None if last < 0 else last
 
 
 def _edge(ruled_out: Callable[[float], bool], inside: float, outside: float) -> float:

@@ -84,18 +84,18 @@ def print_campaign(result: CampaignResult, body: str) -> None:
     for law in result.laws:
         outcome = outcome_of(law)
         shown = f"{marked(Cell(outcome, outcome))}  " if outcome else ""
-        told = escape(_plain(headline(law, result.sampling, words)))
-        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {told}", highlight=False)
+        text = escape(_plain(headline(law, result.sampling, words)))
+        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {text}", highlight=False)
     _print(verdicts(result, words), columns=7)
-    _print(metrics(result, words, METRICS), told=False)
-    _print(brackets(result, words), told=result.contradicted)
+    _print(metrics(result, words, METRICS), with_note=False)
+    _print(brackets(result, words), with_note=result.contradicted)
     for section in indices(result, words):
         _print(section)
     for law in result.laws:
         if law.drivers is not None:
-            found = drivers(law.drivers, words, DRIVERS)
-            _print(found._replace(heading=law.law, note=f"{law.law}: {found.note}"))
-    _print(again(result, AGAIN), told=False)
+            causes = drivers(law.drivers, words, DRIVERS)
+            _print(causes._replace(heading=law.law, note=f"{law.law}: {causes.note}"))
+    _print(again(result, AGAIN), with_note=False)
     console.print(f"\ndigest {result.digest}", highlight=False)
     if result.flown and result.seconds > 0.0:
         rate = figure(result.flown / result.seconds, 3)
@@ -103,7 +103,7 @@ def print_campaign(result: CampaignResult, body: str) -> None:
         console.print(flown, highlight=False)
 
 
-def _print(section: Section | None, columns: int | None = None, told: bool = True) -> None:
+def _print(section: Section | None, columns: int | None = None, with_note: bool = True) -> None:
     """Print the first columns of a section's table, and what is told of it."""
     if section is None:
         return
@@ -112,7 +112,7 @@ def _print(section: Section | None, columns: int | None = None, told: bool = Tru
         rows = [[*map(marked, row[:columns])] for row in table.rows]
         title = "" if section.heading == "Verdicts" else marked(section.heading)
         print_rows(table._replace(columns=table.columns[:columns], rows=rows, title=title), apart=True)
-    if told and section.note:
+    if with_note and section.note:
         console.print(marked(section.note), highlight=False)
 
 

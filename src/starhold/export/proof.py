@@ -39,8 +39,8 @@ def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
             claims.append(f"{claim.outcome}: {text}")
             assumed |= dict.fromkeys(claim.assumptions)
             if claim.outcome != "proved":
-                found = claim.refutation()
-                why = f" ({evidence(found)})" if found is not None else ""
+                refutation = claim.refutation()
+                why = f" ({evidence(refutation)})" if refutation is not None else ""
                 wrong.append(f"{'REFUTED' if claim.outcome == 'refuted' else 'NOT DECIDED'}: {text}{why}.")
     outcomes = {certificate.outcome for certificate in certificates}
     outcome = next((one for one in ("refuted", "undecided") if one in outcomes), "proved")

@@ -67,9 +67,9 @@ def _basilisk(code: Code) -> dict[str, str]:
             )
     reads: list[str] = []
     for message in ("attitude", "translation"):
-        own = [name for name in wanted if SOURCES[name][0] == message]
-        if own:
-            reads += [f"        read = self.{message}InMsg()", *(f"        {name} = {SOURCES[name][1]}" for name in own)]
+        fields = [name for name in wanted if SOURCES[name][0] == message]
+        if fields:
+            reads += [f"        read = self.{message}InMsg()", *(f"        {name} = {SOURCES[name][1]}" for name in fields)]
     return filled("basilisk", code, READS="\n".join(reads), GIVEN=", ".join(f"*{name}" for name in wanted))
 
 

@@ -127,10 +127,10 @@ class Types:
     def within(self, value: Any) -> Any:
         """Return what tuples of one value hold."""
         while isinstance(value, tuple) and not hasattr(value, "_fields"):
-            held = [part for part in value if self.of(part) is not None]  # pyright: ignore
-            if len(held) != 1:
+            typed = [part for part in value if self.of(part) is not None]  # pyright: ignore
+            if len(typed) != 1:
                 break
-            value = held[0]
+            value = typed[0]
         return value
 
 

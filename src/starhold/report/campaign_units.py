@@ -27,7 +27,7 @@ class Wording:
     """How a campaign's numbers are told: its body's metrics, the requirements by name, the SI units of metrics by name."""
 
     metric_set: MetricSet
-    asked: Mapping[str, Requirement]
+    requirements: Mapping[str, Requirement]
     units: Mapping[str, str]
 
     @classmethod
@@ -44,17 +44,17 @@ class Wording:
 
     def required(self, name: str) -> Measure:
         """Tell how the metric of the requirement of this name is shown."""
-        return self.measure(self.asked[name].column if name in self.asked else name)
+        return self.measure(self.requirements[name].column if name in self.requirements else name)
 
     def is_loss(self, name: str) -> bool:
         """Tell whether the requirement of this name is that the motion is not lost."""
-        return name in self.asked and self.asked[name].column == LOST
+        return name in self.requirements and self.requirements[name].column == LOST
 
     def asks(self, name: str) -> str:
         """Tell what the requirement of this name asks for; empty where only the name is known."""
-        if name not in self.asked:
+        if name not in self.requirements:
             return ""
-        item, measure = self.asked[name], self.required(name)
+        item, measure = self.requirements[name], self.required(name)
         if self.is_loss(name):
             return "the motion is not lost"
         return f"{measure.heading} at {'most' if item.at_most else 'least'} {with_unit(item.bound, measure)}"
@@ -62,7 +62,7 @@ class Wording:
     def called(self, name: str) -> str:
         """Tell the requirement of this name, and what it asks for."""
         asks = self.asks(name)
-        return f"{name}: {asks}" if asks and name != self.asked[name].metric else asks or name
+        return f"{name}: {asks}" if asks and name != self.requirements[name].metric else asks or name
 
     def margin(self, name: str, value: float | None) -> str:
         """Show a margin of the requirement of this name, with its unit; it is minus infinity where a run has no value."""
@@ -127,9 +127,9 @@ def count_text(number: int) -> str:
 
 def headings_of(result: CampaignResult, words: Wording) -> list[str]:
     """List the metrics of a campaign: those of the body first, in its order, then the others as they come."""
-    found = dict.fromkeys(spread.metric for law in result.laws for spread in law.spreads)
-    known: list[str] = [metric for metric in words.metric_set.measures if metric in found]
-    return [*known, *(metric for metric in found if metric not in known)]
+    metrics = dict.fromkeys(spread.metric for law in result.laws for spread in law.spreads)
+    known: list[str] = [metric for metric in words.metric_set.measures if metric in metrics]
+    return [*known, *(metric for metric in metrics if metric not in known)]
 
 
 def bounds_text(verdict: Verdict) -> str:

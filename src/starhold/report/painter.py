@@ -90,11 +90,11 @@ class Painter:
         """Wait for the files. Returns why they cannot be written; RuntimeError tells what else went wrong."""
         self._sent()
         _, said = self._process.communicate()
-        told = said.decode(errors="replace").strip()
+        message = said.decode(errors="replace").strip()
         if self._process.returncode == UNWRITABLE:
-            return InputError(told.splitlines()[0], "", "", "")
+            return InputError(message.splitlines()[0], "", "", "")
         if self._process.returncode != 0:
-            raise RuntimeError(f"the figures could not be drawn: {told[-2000:]}")
+            raise RuntimeError(f"the figures could not be drawn: {message[-2000:]}")
         return None
 
 

@@ -111,6 +111,6 @@ def nothing_more(extras: Sequence[str], cones: Cones) -> None:
 
 def body_module(package: str, body: str) -> Any:
     """The module of a package that is named for a body, else its `any_body`."""
-    own = f"{package}.{body.replace('-', '_')}"
-    there = body.replace("-", "").isalnum() and find_spec(own) is not None
-    return import_module(own if there else f"{package}.any_body")
+    name = f"{package}.{body.replace('-', '_')}"
+    there = body.replace("-", "").isalnum() and find_spec(name) is not None
+    return import_module(name if there else f"{package}.any_body")

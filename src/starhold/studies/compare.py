@@ -45,9 +45,9 @@ def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight) -> Flight:
     """The flight with the certificates of its law, and how it leaves their claims; without where the law takes the craft for
     another one, of which they would speak."""
     study = study_of(scenario.body)
-    found = [] if loop.nominal is not None else study.certify(scenario, entry, loop)
-    left = tuple(study.departures(issued, loop, flight.recording) for issued in found)
-    return replace(flight, certificates=tuple(issued.certificate for issued in found), departures=left)
+    certified = [] if loop.nominal is not None else study.certify(scenario, entry, loop)
+    left = tuple(study.departures(issued, loop, flight.recording) for issued in certified)
+    return replace(flight, certificates=tuple(issued.certificate for issued in certified), departures=left)
 
 
 def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress | None = None) -> Flight:

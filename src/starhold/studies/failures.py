@@ -108,14 +108,14 @@ def study(
     losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
     intact = authority(wheels)
     eta = _degree(scenario, entry, entry.gains)
-    found: list[Failure] = []
+    failures: list[Failure] = []
     for done, lost in enumerate(losses):
         failure = _left(wheels, lost, intact)
         notice(done, len(losses), failure.name)
         failure = replace(failure, eta_intact=eta)
-        found.append(_flown(scenario, entry, failure) if failure.controllable else failure)
+        failures.append(_flown(scenario, entry, failure) if failure.controllable else failure)
     notice(len(losses), len(losses), "")
-    return found
+    return failures
 
 
 def directions_lacking(axes: Array) -> Array:
@@ -183,9 +183,9 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         FaultTable(time=0.0, wheel=wheel, lost=True, action="both" if retune else "reallocate") for wheel in failure.lost
     ]
     # What the law does about faults of the file is no matter here.
-    own = replace(entry, options=entry.options._replace(fault_action=None))
+    plain_entry = replace(entry, options=entry.options._replace(fault_action=None))
     try:
-        loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), own)
+        loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), plain_entry)
     except InputError as error:
         if not faults:
             raise

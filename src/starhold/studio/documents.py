@@ -14,9 +14,9 @@ from starhold.files import atomic_write
 class RefusedError(Exception):
     """A file is not written; `told` is the answer."""
 
-    def __init__(self, error: str, **told: Any) -> None:
+    def __init__(self, error: str, **details: Any) -> None:
         super().__init__(error)
-        self.told = {"error": error, **told}
+        self.answer = {"error": error, **details}
 
 
 class Documents:

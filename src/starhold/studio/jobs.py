@@ -34,7 +34,7 @@ class Job:
     state: dict[str, Any] = field(default_factory=dict[str, Any])
     ended: bool = False
 
-    def told(self) -> dict[str, Any]:
+    def status(self) -> dict[str, Any]:
         """Tell the page of it."""
         return {
             "number": self.number,
@@ -62,13 +62,13 @@ class Jobs:
             number = len(self._jobs) + 1
             folder = Path(self._place.name) / str(number)
             folder.mkdir()
-            told, teller = SPAWN.Pipe(duplex=False)
+            reports, teller = SPAWN.Pipe(duplex=False)
             process = SPAWN.Process(target=work, args=(teller, kind, text, where, beside, folder, laws))
             process.start()
             # The end of the process closes the last teller.
             teller.close()
             job = self._jobs[number] = Job(number, kind, name, folder, process, laws)
-        threading.Thread(target=_follow, args=(job, told), daemon=True).start()
+        threading.Thread(target=_follow, args=(job, reports), daemon=True).start()
         return job
 
     def get(self, number: int) -> Job | None:
@@ -77,7 +77,7 @@ class Jobs:
 
     def all(self) -> list[dict[str, Any]]:
         """Tell the page of all of them."""
-        return [job.told() for job in self._jobs.values()]
+        return [job.status() for job in self._jobs.values()]
 
     def stop(self, number: int) -> None:
         """End a job; what it has not written is lost."""
@@ -96,11 +96,11 @@ class Jobs:
         self._place.cleanup()
 
 
-def _follow(job: Job, told: Connection) -> None:
+def _follow(job: Job, reports: Connection) -> None:
     """Note what a process tells until it ends."""
     with suppress(EOFError):
         while True:
-            state = told.recv()
+            state = reports.recv()
             if "error" not in job.state:
                 job.state = state
     job.process.join()

@@ -157,10 +157,10 @@ class Command(NamedTuple):
             return self.present(*subject, self.study(*subject))
         doing = self.doing
 
-        def told(done: int, total: int, what: str) -> None:
+        def notify(done: int, total: int, what: str) -> None:
             notice(done, total, doing.format(what) if what else "flown")
 
-        return self.present(*subject, self.study(*subject, told))
+        return self.present(*subject, self.study(*subject, notify))
 
 
 def names() -> list[str]:

@@ -30,18 +30,18 @@ def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
     return (problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem),)
 
 
-def present(problem: InvariantProblem, found: Certificate) -> Result:
+def present(problem: InvariantProblem, certificate: Certificate) -> Result:
     """Each claim with its outcome, how it was shown and what it lacks; the phase portrait with the sets."""
     from starhold.certification import invariant as sets
     from starhold.studies.phase_portraits import portraits
 
-    shown = portraits(problem, found)
+    shown = portraits(problem, certificate)
     drawn = [item for item in shown if item.V is not None]
-    told = dict.fromkeys(a for claim in found.claims for a in claim.assumptions)
-    blocks = ["", Heading(found.name), _table(found, shown), f"  assuming: {'; '.join(told)}", ""]
+    assumptions = dict.fromkeys(a for claim in certificate.claims for a in claim.assumptions)
+    blocks = ["", Heading(certificate.name), _table(certificate, shown), f"  assuming: {'; '.join(assumptions)}", ""]
     figure = partial(_draw, drawn, problem.name) if drawn else None
-    outcome = {"proved": "met", "refuted": "missed"}.get(found.outcome, "undecided")
-    written: Any = partial(sets.write, found)
+    outcome = {"proved": "met", "refuted": "missed"}.get(certificate.outcome, "undecided")
+    written: Any = partial(sets.write, certificate)
     return Result(problem.name, blocks, figure=figure, certificate=written, outcome=outcome)  # type: ignore[arg-type]
 
 

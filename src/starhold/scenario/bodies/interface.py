@@ -86,7 +86,7 @@ class Body(Protocol):
         """The numbers that validated tables make. InputError where no body has them."""
         ...
 
-    def complete(self, scenario: Scenario, law: Law, spec: Any, own: Any) -> Any:
+    def complete(self, scenario: Scenario, law: Law, spec: Any, law_table: Any) -> Any:
         """The inputs of a law's design form, with what they leave to the scenario; `own` is the law's validated table.
         ValueError where the scenario cannot give it."""
         return spec
@@ -96,7 +96,7 @@ class Body(Protocol):
         where it gives none."""
         raise InputError(scenario.where, key, "a target", "none, for this body has no attitude")
 
-    def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> Any:
+    def options(self, scenario: Scenario, law_table: Any, gains: Any, key: str) -> Any:
         """The options of a law beside its gains, from its validated table (called `key` in errors) or else from the
         scenario. InputError if they do not fit the gains."""
         return None

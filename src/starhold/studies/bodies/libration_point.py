@@ -36,10 +36,10 @@ class LibrationPointStudy(BodyStudy):
         return replace(run, attrs=run.attrs | worth)
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
-        told = run.attrs
-        units = Units(float(told["length_unit_m"]), float(told["rate_unit_rad_per_s"]))
-        goal = CircleGoal(*map(float, told["circle"])) if "circle" in told else EquilibriumGoal(vector(told["rest"]))
-        return measure(run, units, goal, float(told["settling_tolerance"]))
+        attrs = run.attrs
+        units = Units(float(attrs["length_unit_m"]), float(attrs["rate_unit_rad_per_s"]))
+        goal = CircleGoal(*map(float, attrs["circle"])) if "circle" in attrs else EquilibriumGoal(vector(attrs["rest"]))
+        return measure(run, units, goal, float(attrs["settling_tolerance"]))
 
     def meter(
         self,
