@@ -1,4 +1,4 @@
-"""Metrics of a body of which nothing is known but what is recorded of it, in the units of the recording."""
+"""Metrics of a body of which only the recording is known, in the units of the recording."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class Linear:
 
     @cached_property
     def stepped_loop(self) -> System:
-        """The sampled loop, cut at the command, from a command to the negative of what the law answers with."""
+        """The sampled loop, cut at the command, from a command to the negative of the law's answer."""
         return in_series(self.stepped, self.stepped_law)
 
     @cached_property
@@ -143,7 +143,7 @@ def _listed(readings: tuple[str, ...]) -> str:
 
 def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
     """The loop at rest on target, in inertial axes that are those of the target, so that the error there is exactly zero;
-    names what was taken from it."""
+    appends to `left_out` the names of the parts removed."""
     counted = loop.law.counters(loop.law.remember(loop.gains, loop.known, loop.period))
     if counted is not None or buffers(loop.carry().memory):
         raise LinearityError(f"the law {loop.law.name} iterates, and has no derivative")
@@ -253,7 +253,7 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
 
 
 def _filled(rates: Any, states: Any) -> list[Any]:
-    """The rates of states, 0 where a part says that there are none."""
+    """The rates of states, 0 where a part has none."""
     numbers: list[Any] = []
     for rate, state in zip(rates or (None,) * len(states), states, strict=True):
         values = flatten((state,))
@@ -271,8 +271,8 @@ def _flat(rate: Any, state: Any) -> list[Any]:
 
 
 def _needed(plant: System, law: System) -> tuple[System, System]:
-    """Both without states of the plant that nothing depends on, as the momenta of wheels whose friction is none, without
-    what the law remembers and its command does not depend on, and without what never changes, as a flag."""
+    """Plant and law without states that nothing needs: states of the plant that nothing depends on, such as the momenta of
+    wheels without friction; memory that the command does not depend on; and states that never change, such as flags."""
     law = _remembered(law)
     feeds = plant.A != 0.0
     heard = (law.D != 0.0).any(axis=0) | (law.B != 0.0).any(axis=0)
@@ -291,7 +291,7 @@ def _needed(plant: System, law: System) -> tuple[System, System]:
 
 
 def _remembered(law: System) -> System:
-    """The law without states that are none."""
+    """The law without memory that its command does not depend on, or that never changes."""
     size = len(law.states)
     constant = (np.eye(size) == law.A).all(axis=1) & (law.B == 0.0).all(axis=1)
     needed = (law.C != 0.0).any(axis=0)
@@ -338,7 +338,7 @@ def sampled(plant: System, period: float, delay: float = 0.0) -> System:
 
 
 def _under_hold(plant: System, time: float) -> tuple[Array, Array]:
-    """Return what the states, and inputs that are held, make of the states in a time (s)."""
+    """Return the matrices by which the states and held inputs give the states after a time (s)."""
     size, inputs = plant.B.shape
     whole = np.zeros((size + inputs, size + inputs))
     whole[:size] = np.hstack([plant.A, plant.B])

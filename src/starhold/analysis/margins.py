@@ -22,12 +22,11 @@ UNITS = {"gain": "1", "less": "1", "phase": "rad", "delay": "s", "crossover": "r
 
 
 class Margins(NamedTuple):
-    """These are what the loop about one axis bears before it loses its stability, those about the others being closed.
-
-    gain: the least factor above 1 of the command that does (inf for none); less: the greatest factor below 1 that does (0
-    for none); phase (rad) and delay (s): the least further lag that does (inf for none); crossover: the highest frequency
-    (rad/s) at which the loop's gain is 1, its bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse
-    is the least distance of L from -1. NaN, but for the crossover, where the loop is not stable in the first place."""
+    """The margins of the loop about one axis, those about the others closed. gain: the least factor above 1 of the command
+    that loses stability (inf for none); less: the greatest factor below 1 that does (0 for none); phase (rad) and delay (s):
+    the least further lag that does (inf for none); crossover: the highest frequency (rad/s) at which the loop's gain is 1,
+    its bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse is the least distance of L from -1. All
+    but the crossover are NaN where the loop is not stable."""
 
     axis: str
     gain: float

@@ -1,7 +1,7 @@
-"""Metrics of flights: notes that an equation takes at each control instant, and what is made of them at the end.
+"""Metrics of flights: notes that an equation takes at each control instant, and the numbers made of them at the end.
 
-The same notes are taken inside a kernel, of many flights at once of which no samples are kept, and of a recording, whose
-samples are the instants. What makes a metric of the notes is a row of a table, which the report's page reads too.
+The same notes are taken inside a kernel, of many flights at once without keeping samples, and of a recording, whose samples
+are the instants. A row of a table says how a metric is made of the notes; the report's page reads that table too.
 """
 
 from __future__ import annotations
@@ -126,9 +126,9 @@ class Meter:
         return window_ends(self.steps, self.marks)
 
     def metrics(self, noted: Array, windows: Array, lost: Array) -> Metrics:
-        """Metrics of lanes from what is noted of them, (numbers, lanes), of windows (windows, quantities, lanes), and the
-        control step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other
-        metrics of a motion that diverged are NaN."""
+        """Metrics of lanes from their notes (numbers, lanes), those of windows (windows, quantities, lanes), and the control
+        step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other metrics of a
+        motion that diverged are NaN."""
         kept = lost < 0.0
         metrics = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
         for name, metric in self.table.items():
@@ -206,7 +206,7 @@ class Meter:
 
 
 def _is_sampled(values: Any, run: Recording) -> bool:
-    """Tell whether values are numbers of each sample: a Dataset may hold whatever a user puts there."""
+    """Tell whether values are numbers of each sample: users may add anything to a Dataset."""
     return values.dtype.kind in "fiu" and values.ndim in (1, 2) and len(values) == len(run["time"])
 
 
@@ -232,7 +232,7 @@ def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
-    """Return what gives the recorded quantities of a control instant, of the body and of effectors, by name:
+    """Return the function that reads the recorded quantities of a control instant, of the body and of effectors, by name:
     read(decided, step, setup)."""
 
     def read(decided: Any, step: Any, setup: Any) -> dict[str, Any]:
@@ -248,7 +248,7 @@ def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterator[Any]:
-    """Return what is recorded of effectors, from the last to the first, and of the body, whose names count most."""
+    """Return the recorded quantities of effectors, from the last to the first, and of the body, whose names win."""
     body, records, _, _ = make_step(parts).sample(decided, step, setup)
     return reversed((body, *records))
 
@@ -275,7 +275,7 @@ def middle(steps: int) -> int:
 
 
 def outside(then: Any, square: Any, bound: Any, now: Any) -> Any:
-    """The last instant at which a square was beyond its bound; what is no number is beyond it."""
+    """The last instant at which a square was beyond its bound; NaN is beyond it."""
     return where(less_equal(square, bound), then, now)
 
 

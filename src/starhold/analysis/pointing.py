@@ -77,8 +77,8 @@ def shortfall(apart: int, length: int) -> float:
 
 
 def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:
-    """Errors (runs, number) about each body axis, with their signs, and the angle about whatever axis; with a boresight (any
-    length, body axes) by how much that is tilted: half the cone that it sweeps."""
+    """Errors (runs, number) about each body axis, with their signs, and the size of the rotation; with a boresight (any
+    length, body axes) also its tilt: half the cone that it sweeps."""
     components = {axis: vectors[..., place] for place, axis in enumerate("xyz")}
     components[ANGLE] = np.linalg.norm(vectors, axis=-1)
     if boresight is not None:

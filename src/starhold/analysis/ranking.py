@@ -35,8 +35,8 @@ class Metrics(dict[str, Any]):
 
 @dataclass(frozen=True)
 class MetricSet:
-    """How results of laws on a body are told: the metrics that are shown, less being better in each; those that laws are
-    ranked by in turn; and the unit of time, with its seconds."""
+    """How results of laws on a body are shown: the metrics shown, less being better in each; those that laws are ranked by
+    in turn; and the unit of time, with its seconds."""
 
     measures: Mapping[str, Measure]
     order: tuple[str, ...]

@@ -20,12 +20,12 @@ from starhold.studies.compare import fly_law
 from starhold.studies.flight import Flight
 
 WORDS = ("name", "description", "type", "campaign")
-"""Keys of what names no file."""
+"""Keys whose texts name no file."""
 
 
 class FlownAgain(NamedTuple):
-    """A run of a campaign, flown again: its scenario, its flight, and the columns in which the campaign holds other bits
-    than come out now, which are none unless the machine computes otherwise."""
+    """A run of a campaign, flown again: its scenario, its flight, and the columns whose bits differ from those that the
+    campaign holds, as another machine may compute them."""
 
     scenario: Scenario
     flight: Flight
@@ -56,7 +56,7 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
 
 @lru_cache(maxsize=1)
 def _job_of(source: Source) -> Job:
-    """The job that flew a campaign, kept from one of its runs to the next."""
+    """The job that flew a campaign, kept so that several of its runs share it."""
     return Job(source, source.read().table.campaign)
 
 

@@ -40,7 +40,7 @@ Notice = Callable[[str, int], None]
 
 @dataclass(frozen=True)
 class Options:
-    """How a campaign is flown; nothing of it changes results. engine: None for all cores of this process."""
+    """How a campaign is flown; no option changes results. engine: None for all cores of this process."""
 
     engine: Engine | None = None
     resume: bool = False
@@ -51,8 +51,8 @@ class Options:
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with other entries of its [campaign] table, or with one; None leaves an entry as it is. InputError where
-    there is none, and nothing is said of what is drawn or how many runs there are."""
+    """The scenario with other entries of its [campaign] table, or with such a table; None leaves an entry as it is.
+    InputError where there is no such table and the entries lack distributions or the number of runs."""
     given = {key: value for key, value in changes.items() if value is not None}
     if scenario.table.campaign is None and not given.keys() & {"runs", "over"}:
         raise InputError(scenario.where, "campaign", "no [campaign] table", NO_TABLE)
@@ -60,7 +60,7 @@ def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
 
 def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
-    """The job of a campaign. InputError for whatever is wrong with it, before anything is flown."""
+    """The job of a campaign. InputError for any mistake in it, before anything is flown."""
     table = scenario.table.campaign
     job = Job(Source.of(scenario), table)
     reached: set[str] = set()
@@ -191,7 +191,7 @@ def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int
 
 
 def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
-    """Runs of a block: enough for each worker to have a few, and no more than memory has room for."""
+    """Runs of a block: enough blocks that each worker has a few, and no more runs than memory has room for."""
     most = CHUNK if at_once else SMALL
     if isinstance(engine, Workers):
         most = min(most, -(-runs // (4 * engine.count)))

@@ -74,7 +74,7 @@ class Dispersion:
         return values if self.scale is None else np.array(self.scale)[:, None] * values
 
     def possible(self, u: Array) -> NDArray[np.bool_]:
-        """Which of the draws (n,) for uniforms u (dims, n) their keys take, as far as bounds of each number tell."""
+        """Which of the draws (n,) for uniforms u (dims, n) the keys take, judged by the bounds of each number alone."""
         kept = np.ones(u.shape[1], dtype=bool)
         if self.wordy:
             return kept
@@ -117,7 +117,7 @@ def _plain(place: Place, value: Any) -> Any:
 
 
 def read_dispersions(scenario: Scenario, over: Mapping[str, Distribution]) -> tuple[Dispersion, ...]:
-    """The dispersions of a scenario's keys, from the tables of [campaign.over]. InputError where one of them cannot be."""
+    """The dispersions of a scenario's keys, from the tables of [campaign.over]. InputError for a table that makes none."""
     dispersions: list[Dispersion] = []
     taken: list[Place] = []
     for keys, table in over.items():
@@ -155,8 +155,8 @@ def _read(scenario: Scenario, places: list[Place], table: Any) -> Dispersion:
 
 
 def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
-    """The raw tables for [nominal]: of what laws take the craft for or are designed with, and are not told. InputError for
-    `known_to_law` of what they cannot know, or not otherwise."""
+    """The raw tables for [nominal]: those that laws take the craft's numbers from, or are designed with, whose drawn values
+    laws are not told. InputError where `known_to_law` claims what laws cannot know, or denies what they always do."""
     scenario, table = readings[0].scenario, readings[0].table
     tables, body = read_toml(scenario.text, scenario.where), scenario.hooks
     nominal: dict[str, Any] = {}

@@ -116,8 +116,8 @@ def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool) -> Iterator[Chunk
 
 
 def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> Iterator[Chunk]:
-    """Blocks of workers that return what they should. Of the first block of each worker, and of others as long as that
-    takes little time, the first run is flown here again, to the same bits. InputError where anything is otherwise."""
+    """Blocks whose results are found right. Of the first block of each worker, and of others as long as that takes little
+    time, the first run is flown here again and must give the same bits; else InputError."""
     begun, spent, seen = time.monotonic(), 0.0, set[str]()
     columns: dict[str, dict[str, str]] = {}
     with ThreadPool(1) as pool:
@@ -155,7 +155,7 @@ def _kinds(chunk: Chunk) -> dict[str, str]:
 
 
 def _differing(chunk: Chunk, again: Chunk) -> str:
-    """Columns in which the first run of a chunk is another than the one that was flown again."""
+    """Columns whose first value differs from that of the same run flown here."""
     if _kinds(chunk) != _kinds(again):
         return "which has other columns"
     pairs = {name: (chunk.rows[name][:1], values[:1]) for name, values in again.rows.items()}
@@ -164,7 +164,7 @@ def _differing(chunk: Chunk, again: Chunk) -> str:
 
 
 def _bits(values: NDArray[Any]) -> Any:
-    """Tell what must be the same: machines need not agree on the bits of what is no number."""
+    """Bytes that must be equal; NaN counts as one value, for machines need not agree on its bits."""
     if values.dtype.kind == "f":
         values = np.where(np.isnan(values), np.nan, values)
     return values.tolist() if values.dtype.kind in "OU" else values.tobytes()
@@ -245,7 +245,7 @@ class _Cluster:
             raise self._lost("the scheduler does not answer") from None
 
     def _next(self, done: SimpleQueue[Any]) -> Any:
-        """One that has ended; InputError once there is nobody left to end one."""
+        """A task that has ended; InputError once no worker is left to end one."""
         alone = 0.0
         while True:
             try:
@@ -254,14 +254,14 @@ class _Cluster:
                 alone = self._still_alone(alone)
 
     def _still_alone(self, alone: float) -> float:
-        """Seconds without any worker, after so many and one more look; InputError once there were enough."""
+        """Seconds without any worker, counted on by one more look; InputError once there were enough."""
         alone = alone + _LOOK if self._threads() == 0 else 0.0
         if alone >= self.patience:
             raise self._lost(f"no worker for {self.patience:g} s")
         return alone
 
     def _result(self, future: Any, distributed: Any) -> _Told:
-        """The result of one that has ended, which is flown again where its worker was lost before it could be had."""
+        """The result of a task that has ended; it is flown again where its worker was lost before the result was fetched."""
         alone = 0.0
         try:
             while True:
@@ -332,7 +332,7 @@ def _compared(versions: Any) -> dict[str, str]:
 
 @contextmanager
 def _quiet() -> Generator[None]:
-    """Without Dask's log and warnings, for what they tell is told in one line, or is no news."""
+    """Without Dask's log and warnings, which errors of one line replace, or which are no news."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "tornado")]
     handlers = {handler for name in ("distributed", *names) for handler in logging.getLogger(name).handlers}
     levels = [(handler, handler.level) for handler in handlers]

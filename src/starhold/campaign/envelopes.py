@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from starhold.analysis.meter import Array, Window
 
 FINE = 4
-"""Binary digits by which a bin of an octave is told: sixteen bins."""
+"""Binary digits of the mantissa that number the bins of an octave: sixteen bins."""
 LEAST, OCTAVES = -90, 110
-"""The noted numbers are told apart from 2^LEAST on, over so many octaves; what is less or more falls in the end bins."""
+"""Notes are binned from 2^LEAST on, over so many octaves; what is less or more falls in the end bins."""
 BINS = OCTAVES << FINE
 _SHIFT = 52 - FINE
 _FIRST = (1023 + LEAST) << FINE

@@ -1,7 +1,7 @@
 """From drawn values to the numbers that kernels fly: of many runs at once where that gives the bits of each run's own
 scenario, else run by run.
 
-What a value moves among the numbers of a loop is told by no list: scenarios with other values are built, and compared.
+No list says which numbers of a loop a value moves: scenarios with other values are built, and compared.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Lanes:
         others = variants(self._bare, (self.plan.change(one) for one in drawn))
         for run in runs:
             try:
-                # What is warned of a scenario is told of the file, not of each run.
+                # Warnings are about the file, not about each run.
                 with warnings.catch_warnings(action="ignore"):
                     other = next(others)
                     flat = Flat.of(build(other, other.pick(self.law)), self.steps)
@@ -153,8 +153,8 @@ class Lanes:
         return [run for run in range(self.plan.runs)[:TRIES] if any(more[n][run] != self.first[n][0] for n in names)][:2]
 
     def _moved_by(self, dispersion: Dispersion, more: Columns, others: Sequence[int]) -> set[int]:
-        """The places of numbers that differ where the values of one dispersion alone do, as in these other runs; more:
-        columns of the first runs."""
+        """The places of the numbers that change when the values of one dispersion alone change, as in these other runs;
+        more: columns of the first runs."""
         names = dispersion.columns
         moved: set[int] = set()
         for run in others:
@@ -241,8 +241,8 @@ class Lanes:
         return Lot(runs, loop, np.ascontiguousarray(carries), tuple(phases))
 
     def _read_back(self) -> tuple[str, ...]:
-        """The names of numbers that show each dispersion: those that are its values, else all that it moves; of those that
-        are always equal, one, and rather what flies than what the law takes it for."""
+        """The names of numbers that show each dispersion: those that are its values, else all that it moves; where several
+        are always equal, one of them, of the flying craft rather than of the nominal model."""
         kept: list[int] = []
         alike = [flat for flat in self._varied if flat.names == self.base.names]
         for dispersion, places in zip(self.plan.dispersions, self.moved.values(), strict=True):
@@ -257,7 +257,7 @@ class Lanes:
         return tuple(self.base.names[place] for place in sorted(set(kept)))
 
     def _readings(self, lot: Lot) -> dict[str, Array]:
-        """The numbers read back of a lot, from the arrays that fly; NaN where its form has no such number."""
+        """The numbers of a lot that are read back, from the arrays that fly; NaN where its form has no such number."""
         numbers = _numbers(lot)
         missing = np.full(len(lot.runs), np.nan)
         return {f"flown.{shown_name(lot.loop, name)}": numbers.get(name, missing) for name in self.flown}

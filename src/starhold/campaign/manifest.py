@@ -54,7 +54,7 @@ class Manifest:
     allow_unstable: bool = False
 
     def determining(self) -> dict[str, Any]:
-        """Everything that results depend on, by the keys that differences are told with."""
+        """Everything that results depend on, by the keys that differences name."""
         settings = cast(dict[str, Any], plain(self.settings))
         settings.pop("runs", None)
         tables = _tables(self.text)
@@ -75,7 +75,7 @@ class Manifest:
 
     @classmethod
     def from_json(cls, text: str, where: str) -> Manifest:
-        """The manifest in a text; InputError where it is none, or was changed since it was written."""
+        """The manifest in a text; InputError where the text is none, or was changed since it was written."""
         try:
             data = json.loads(text)
             # Whatever bears its seal has the types that were written.
@@ -134,7 +134,7 @@ def difference(new: Any, old: Any, key: str) -> str | None:
 
 
 def _seal(content: Mapping[str, Any]) -> str:
-    """SHA-256, in hexadecimal, of all that a manifest's file says, but for the folder: a scenario may be moved."""
+    """SHA-256, in hexadecimal, of all that a manifest's file says but its folder, for a scenario may be moved."""
     sealed = {key: value for key, value in content.items() if key != "folder"}
     return hashlib.sha256(json.dumps(sealed, sort_keys=True).encode()).hexdigest()
 

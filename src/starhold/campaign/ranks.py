@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ALMOST = 0.9
-"""A bin has at least so much of the share it must have; runs do not divide evenly."""
+"""A bin has at least this part of the share asked for; runs do not divide evenly."""
 
 
 class Column:

@@ -87,7 +87,7 @@ class Plan:
 
     @property
     def factors(self) -> tuple[str, ...]:
-        """The names of the uniforms: of the column that one alone moves, or else of the key and its place from 1."""
+        """The names of the uniforms: that of the column if it moves only one, else the key and its place from 1."""
         names: list[str] = []
         for dispersion in self.dispersions:
             name, dims = dispersion.called, dispersion.dims
@@ -136,7 +136,7 @@ class Plan:
         return columns
 
     def possible(self, unit: Array) -> NDArray[np.bool_]:
-        """For which of the uniforms (dims, n) no key refuses its value by its bounds."""
+        """For which of the uniforms (dims, n) every key takes its value, judged by its bounds."""
         return np.logical_and.reduce([dispersion.possible(numbers) for dispersion, numbers in self._each(unit)])
 
     def _each(self, unit: Array) -> Iterator[tuple[Dispersion, Array]]:

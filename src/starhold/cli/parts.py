@@ -1,4 +1,4 @@
-"""The commands that list what is installed, `laws`, `parts` and `wheels`, and `check-part`."""
+"""The commands that list installed laws, parts and wheels (`laws`, `parts`, `wheels`), and `check-part`."""
 
 from __future__ import annotations
 

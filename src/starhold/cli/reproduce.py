@@ -91,7 +91,7 @@ def _watch(left: set[Future[Any]], queue: Any, show: Callable[[str, int, int], N
 
 
 _queue: Any = None
-"""Where this process says how far it is."""
+"""The queue to which this process reports its progress."""
 
 
 def _begin(queue: Any) -> None:

@@ -44,7 +44,7 @@ def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, i
 
 
 def print_outcome(flights: Sequence[Flight]) -> None:
-    """The table, what went wrong and what is proved."""
+    """The table, warnings and proved claims."""
     from starhold.report.text import lost_text, unknown_text
 
     print_table(flights)
@@ -70,7 +70,7 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
 
 def _step_text(flight: Flight) -> str:
-    """Tell what half the integration step changes."""
+    """Tell how much half the integration step changes the metrics."""
     errors = flight.metrics["step_error"]
     if None in errors.values():
         return f"{flight.name}: with half the integration step the motion is lost at another time"
@@ -123,7 +123,7 @@ def _cell(text: str, best: bool) -> str:
 
 
 def print_blocks(blocks: Iterable[Block]) -> None:
-    """Print what a command shows."""
+    """Print the blocks of a command's result."""
     for block in blocks:
         if isinstance(block, Rows):
             print_rows(block)
@@ -134,7 +134,7 @@ def print_blocks(blocks: Iterable[Block]) -> None:
 
 
 def print_rows(what: Rows, apart: bool = False) -> None:
-    """Print a table, after an empty line if `apart`; what is nothing is a dash."""
+    """Print a table, after an empty line if `apart`; an empty cell is a dash."""
     table = Table(show_edge=False, pad_edge=False, title=what.title or None, title_justify="left")
     for column in what.columns:
         head = f"{column.name}\n[dim]{column.unit}[/dim]" if column.unit else column.name

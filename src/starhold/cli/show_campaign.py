@@ -1,4 +1,4 @@
-"""Prints what a campaign comes to, and shows bars while it is flown."""
+"""Prints the outcome of a campaign, and shows bars while it is flown."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
 
 
 def print_campaign(result: CampaignResult, body: str) -> None:
-    """Print what a campaign on a body of this name comes to: what its laws do, verdicts, metrics, drivers, the worst
+    """Print the outcome of a campaign on a body of this name: how its laws do, verdicts, metrics, drivers, the worst
     runs."""
     words = Wording.of(body, result)
     console.print()
@@ -104,7 +104,7 @@ def print_campaign(result: CampaignResult, body: str) -> None:
 
 
 def _print(section: Section | None, columns: int | None = None, with_note: bool = True) -> None:
-    """Print the first columns of a section's table, and what is told of it."""
+    """Print the first columns of a section's table, and its note."""
     if section is None:
         return
     table = section.table
@@ -117,12 +117,12 @@ def _print(section: Section | None, columns: int | None = None, with_note: bool 
 
 
 def _plain(text: str) -> str:
-    """Text from a file without what steers a terminal."""
+    """Text from a file without characters that steer a terminal."""
     return "".join(c if c.isprintable() or c == "\N{NARROW NO-BREAK SPACE}" else ascii(c)[1:-1] for c in text)
 
 
 def marked(cell: Any) -> str:
-    """Words as they can be printed, without markup of their own and nothing that steers a terminal; outcomes in colour."""
+    """Words as they can be printed, without markup of their own or characters that steer a terminal; outcomes in colour."""
     text = escape(_plain(f"{cell}"))
     colour = COLOURS.get(cell.kind, "") if isinstance(cell, Cell) else ""
     return f"[{colour}]{text}[/{colour}]" if colour else text

@@ -92,7 +92,7 @@ def reasons(claim: Claim) -> list[str]:
 
 
 def assumptions(certificate: Certificate) -> str:
-    """Every assumption once, with the claims that do without it."""
+    """Every assumption once, with the claims that need it where not all do."""
     kinds = {claim.kind: claim.assumptions for claim in certificate.claims}
     texts: list[str] = []
     for assumption in dict.fromkeys(a for assumed in kinds.values() for a in assumed):
@@ -108,7 +108,7 @@ def assumptions(certificate: Certificate) -> str:
 
 
 def print_findings(findings: Sequence[Finding]) -> None:
-    """Print what an independent check found, claim by claim; every obligation that fails."""
+    """Print the findings of an independent check, claim by claim, and every obligation that fails."""
     groups: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         groups.setdefault((finding.certificate, finding.claim), []).append(finding)

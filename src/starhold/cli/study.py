@@ -1,4 +1,4 @@
-"""Makes commands of what stands in `starhold.report.commands`."""
+"""Makes a command of each file in `starhold.report.commands`."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
 
 @contextmanager
 def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar for a command that tells how far it is; yields what it calls."""
+    """A bar for a command that reports its progress; yields the function to be called."""
     if declared.doing is None:
         yield lambda done, total, what: None
         return

@@ -1,4 +1,4 @@
-"""Measures a step of a law: stack and flash, as compilers that are installed tell."""
+"""Measures the stack and flash of a step of a law with the compilers that are installed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Cost(NamedTuple):
 
 
 def measure(code: Code, header: str, source: str) -> list[Cost]:
-    """Return what each compiler that is installed tells; nothing where none is."""
+    """Return the costs by each installed compiler; empty where there is none."""
     return [cost for name in COMPILERS if (cost := _measured(name, code, header, source)) is not None]
 
 

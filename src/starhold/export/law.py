@@ -1,4 +1,4 @@
-"""The part of a closed loop that flies on a computer: from what sensors tell to the command, with all that it remembers."""
+"""The part of a closed loop that flies on a computer: from readings of sensors to the command, with all memories."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class FlightLaw:
 
 
 def flight_law(loop: ClosedLoop) -> FlightLaw:
-    """Return what of a loop flies on a computer. InputError for a part that has no form in C."""
+    """Return the part of a loop that flies on a computer. InputError for a part that has no form in C."""
     parts, setup, carry = loop.composition(), loop.setup(), loop.carry()
     modelled = [place for place, part in enumerate(parts.environments) if part.flag("MODELLED")]
     for place in modelled:

@@ -1,4 +1,4 @@
-"""Headers say what is proved: claims in sentences, assumptions, and a warning where something is missing."""
+"""Headers state the proofs: claims in sentences, assumptions, and a warning where something is missing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved of this
 
 
 def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
-    """Return what certificates of one law say; digest: that of the file which holds them, as hexadecimal."""
+    """Return the summary of the certificates of one law; digest: that of the file which holds them, as hexadecimal."""
     claims: list[str] = []
     wrong: list[str] = []
     assumed: dict[str, None] = {}

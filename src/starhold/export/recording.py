@@ -136,7 +136,7 @@ class Recording(Recorder):
         return self._shaped(out, result, ref)
 
     def _record(self, equation: Any, values: tuple[Any, ...]) -> Any:
-        """Record a function, unless it only hands on arguments or what it gives has no type of C."""
+        """Record a function, unless it only hands on arguments or its result has no type of C."""
         outer, self._called_so, entry = self._called_so, {}, None
         nothing: Any = None, None, ()
         words = equation.__code__.co_varnames[: len(values)]
@@ -299,7 +299,7 @@ def _counts(leaf: Any) -> bool:
 
 
 def _is_recordable(values: tuple[Any, ...]) -> bool:
-    """Tell whether a call is one of a function of C."""
+    """Tell whether a call can become a function of C."""
     parts = list(leaves(values))
     return all(map(_is_part, parts)) and any(isinstance(leaf, (Handle, Buffer)) for leaf in parts)
 

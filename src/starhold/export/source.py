@@ -30,7 +30,7 @@ class Text(NamedTuple):
 
 
 def texts(code: Code, scenario: str, law: str, proof: Proof = UNPROVED) -> Text:
-    """Return header and source. scenario, law: names that the scenario's file gives."""
+    """Return header and source. scenario, law: their names in the scenario's file."""
     types = _spoken_of(code, _interface(code))
     public = {kind.name: f"{code.name}_{kind.name.removeprefix('flight_')}" for kind in types}
     return Text(_header(code, types, public, scenario, law, proof), _source(code, public))

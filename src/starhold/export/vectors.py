@@ -26,8 +26,8 @@ _PRIME, _BASIS = 0x100000001B3, 0xCBF29CE484222325
 
 
 class Vector(NamedTuple):
-    """Before a step: whether the state is set anew, and what is measured (the numbers that are read); after it the numbers
-    of the command, and the digest of those of the state."""
+    """Before a step: whether the state is set anew, and the measured numbers that are read; after it the numbers of the
+    command, and the digest of those of the state."""
 
     first: bool
     inputs: list[float]
@@ -36,7 +36,7 @@ class Vector(NamedTuple):
 
 
 def kept_inputs(code: Code) -> list[int]:
-    """Return the places of those of the inputs' numbers that the law reads."""
+    """Return the places of the inputs' numbers that the law reads."""
 
     def those(kind: Type | None, value: Any) -> list[int]:
         kept = [place for member, part in code.types.members(kind, value) for place in those(member.type, part)]
@@ -50,7 +50,7 @@ def random_columns(
     rng: np.random.Generator, value: Any, count: int, edges: float = 0.0, name: str = ""
 ) -> NDArray[np.float64]:
     """Return (numbers, count) to stand in place of the floats of a value: quaternions of unit length, flags of 0 or 1,
-    others of any size up to twice the largest of their field; of which some, by the share `edges`, are special."""
+    others of any size up to twice the largest of their field; a share `edges` of them is special."""
     if hasattr(value, "_fields"):
         pairs = list(zip(value._fields, value, strict=True))
     elif isinstance(value, tuple) and any(isinstance(part, tuple) for part in value):
@@ -83,7 +83,7 @@ def with_numbers(value: Any, column: NDArray[np.float64]) -> Any:
 
 class Stepper:
     """The step that C must equal, step(state, inputs) -> (command, state): the equations of the simulation, recorded and
-    compiled as the simulation's are, so that it goes on beyond a division by zero as C does."""
+    compiled as there, so that it goes on beyond a division by zero as C does."""
 
     def __init__(self, code: Code) -> None:
         flight, recorder = code.flight, Recorder()

@@ -231,7 +231,7 @@ def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
 
 
 def _limit(flights: Sequence[Flight], scenario: Scenario) -> tuple[tuple[float, ...], str]:
-    """The limit of the torque (N m) that binds first, and what it is."""
+    """The limit of the torque (N m) that binds first, and its name."""
     attrs: dict[Any, Any] = flights[0].recording.attrs
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
     limit = math.inf if kind == "none" else limit

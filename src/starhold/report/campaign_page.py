@@ -93,7 +93,7 @@ def _shown(section: Section | None, level: int = 2, fit: bool = False) -> str:
 
 
 def _headlines(result: CampaignResult, words: Wording) -> Iterator[str]:
-    """Tell of each law what its verdicts come to."""
+    """Sum up the verdicts of each law in a sentence."""
     for number, law in enumerate(result.laws):
         text = escape(headline(law, result.sampling, words).replace(" %", f"{NBSP}%"))
         yield f'<p class="said">{pill(outcome_of(law))}<span><b>{swatch(number)}{escape(law.law)}</b> {text}</span></p>'

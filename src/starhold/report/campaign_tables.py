@@ -1,4 +1,4 @@
-"""The tables that a campaign comes to, as the terminal prints them and the page shows them."""
+"""The tables that sum up a campaign, as the terminal prints them and the page shows them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Section(NamedTuple):
-    """A table under its heading, and what is said of it."""
+    """A table under its heading, and a note on it."""
 
     heading: str
     table: Table
@@ -34,7 +34,7 @@ class Section(NamedTuple):
 
 
 def numbers(*names: str) -> list[Column]:
-    """Columns of what stands at the right: each its heading, and after a stroke what stands below."""
+    """Columns of numbers, aligned right: each its heading, and after a stroke the line below it."""
     return [Column(name, below, ">") for name, _, below in (one.partition("|") for one in names)]
 
 
@@ -107,8 +107,7 @@ def runs(result: CampaignResult) -> Section:
 
 
 def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> Section | None:
-    """The distribution of each metric under each law, or of the first ones; those that something is required of before
-    all."""
+    """The distribution of each metric under each law, the required ones first; `most`: no more metrics than these."""
     headings, required = headings_of(result, words), {item.column for item in words.requirements.values()}
     rows: list[list[Any]] = []
     ends: set[int] = set()

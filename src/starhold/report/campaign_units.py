@@ -1,4 +1,4 @@
-"""How the numbers of a campaign are told: metrics and requirements in the units of the other pages, shares, counts."""
+"""How the numbers of a campaign are shown: metrics and requirements in the units of the other pages, shares, counts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ INDEPENDENT = "random"
 
 @dataclass(frozen=True)
 class Wording:
-    """How a campaign's numbers are told: its body's metrics, the requirements by name, the SI units of metrics by name."""
+    """How a campaign's numbers are shown: its body's metrics, the requirements by name, the SI units of metrics by name."""
 
     metric_set: MetricSet
     requirements: Mapping[str, Requirement]
@@ -32,7 +32,7 @@ class Wording:
 
     @classmethod
     def of(cls, body: str, result: CampaignResult) -> Wording:
-        """Make the wording for a campaign on the body of this name; what its metrics are called is the body's matter."""
+        """Make the wording for a campaign on the body of this name, whose analysis names the metrics."""
         known = getattr(body_module("starhold.analysis", body), "METRICS", None) or MetricSet({}, ())
         units = {spread.metric: spread.unit for law in result.laws for spread in law.spreads}
         return cls(known, {item.name: item for item in result.requirements}, units)
@@ -60,7 +60,7 @@ class Wording:
         return f"{measure.heading} at {'most' if item.at_most else 'least'} {with_unit(item.bound, measure)}"
 
     def called(self, name: str) -> str:
-        """Tell the requirement of this name, and what it asks for."""
+        """Name the requirement of this name, and say what it asks for."""
         asks = self.asks(name)
         return f"{name}: {asks}" if asks and name != self.requirements[name].metric else asks or name
 
@@ -74,7 +74,7 @@ class Wording:
 
 
 def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
-    """Tell how a quantity with a unit (SI) is shown of which no more is known; angles in degrees."""
+    """Tell how a quantity is shown of which only the unit (SI) is known; angles in degrees."""
     heading = name.replace("_", " ")
     if unit == "rad" or unit.startswith("rad/"):
         return Measure(heading, f"deg{pretty_unit(unit[3:])}", meaning, 180.0 / math.pi)
@@ -96,12 +96,12 @@ def figure(value: float, digits: int = 4) -> str:
 
 
 def with_unit(value: float, measure: Measure) -> str:
-    """Show an SI value in a measure's unit, which is told."""
+    """Show an SI value in a measure's unit, which is named."""
     return f"{figure(value * measure.scale)} {measure.unit}".rstrip()
 
 
 def worst_text(bracket: Bracket, measure: Measure) -> str:
-    """Tell a bracket up to what is true of the metric, whose worst is the largest value or the least."""
+    """Show the worst of a metric, the largest value or the least, as the first part of a bracket."""
     if math.isnan(bracket.flown):
         return "lost, or without a value"
     return f"{with_unit(bracket.flown, measure)} {order(bracket)} true"
@@ -133,12 +133,12 @@ def headings_of(result: CampaignResult, words: Wording) -> list[str]:
 
 
 def bounds_text(verdict: Verdict) -> str:
-    """Tell between what the failure probability lies, as far as is known."""
+    """Show the bounds between which the failure probability lies, as far as they are known."""
     if verdict.lower is None or verdict.upper is None:
         return DASH
     return f"{figure(100.0 * verdict.lower, 3)} to {few_percent(verdict.upper)}"
 
 
 def counted(number: int, what: str) -> str:
-    """Tell how many there are of something whose plural ends in s."""
+    """Show a count and its noun, whose plural ends in s."""
     return f"{count_text(number)} {what}{'' if number == 1 else 's'}"

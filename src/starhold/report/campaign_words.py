@@ -1,4 +1,4 @@
-"""The sentences that a campaign comes to, each with the assumption that decides it."""
+"""The sentences that sum up a campaign, each with the assumption that it rests on."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ SAMPLINGS = {
 
 
 def outcome_of(law: LawResult) -> str:
-    """Tell what all verdicts of a law come to; empty where nothing is required."""
+    """Tell the outcome of all verdicts of a law together; empty where nothing is required."""
     outcomes = {verdict.outcome for verdict in law.verdicts}
     return next((outcome for outcome in ("missed", "not decided", "met") if outcome in outcomes), "")
 
 
 def headline(law: LawResult, sampling: str, words: Wording) -> str:
-    """Tell in one or two sentences whether a law keeps what is required, and what that rests on; without its name."""
+    """Tell in one or two sentences whether a law keeps its requirements, and what that rests on; without its name."""
     outcome = outcome_of(law)
     chosen = [verdict for verdict in law.verdicts if verdict.outcome == outcome]
     if outcome == "met":
@@ -92,8 +92,8 @@ def _open(verdicts: list[Verdict], total: int, sampling: str, words: Wording) ->
             seen += f"; about {counted(verdict.more, 'further run')} without a failure would show it"
         questions.append(f"whether {percent(verdict.share)} of all flights {_keep(verdict, words)} ({seen})")
     return (
-        f"leaves {_some(len(verdicts), total)} open: {listed(questions)}. This is to be shown with {_confidences(verdicts)}, "
-        f"{_provided(verdicts)}"
+        f"leaves {_some(len(verdicts), total)} open: {listed(questions)}. This is to be shown with "
+        f"{_confidences(verdicts)}, {_provided(verdicts)}"
     )
 
 

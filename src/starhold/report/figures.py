@@ -1,4 +1,4 @@
-"""Figures as PNG files, every law in every figure, and what they are drawn with."""
+"""Figures as PNG files, every law in every figure, and the helpers that draw them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Picture(Protocol):
     """All that the figures show, without the runs it was taken from: small, and quickly sent to another process."""
 
     def makers(self) -> dict[str, Callable[[], Any]]:
-        """Tell what draws each figure, by the names of their files."""
+        """Return the function that draws each figure, by the name of its file."""
         ...
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:
-    """Flights without what was recorded."""
+    """Flights without their recordings."""
     return [replace(flight, recording=NOTHING) for flight in flights]
 
 

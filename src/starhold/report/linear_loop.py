@@ -1,4 +1,4 @@
-"""The part of the page that tells the linear loop near the target: its margins, and Bode and Nichols plots."""
+"""The section of the page on the linear loop near the target: its margins, and Bode and Nichols plots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Pages fly their scenario again with these data: programs, sliders, the file with open values, what claims stand on."""
+"""The data by which a page flies its scenario again: programs, sliders, the file with open values, the conditions of
+claims."""
 
 from __future__ import annotations
 
@@ -87,13 +88,13 @@ def _declared(scenario: Scenario, key: str) -> Gain:
 
 
 def _written(scenario: Scenario, key: str, value: Any) -> str:
-    """Return what the file has for a key of its own tables, where that is told with units; else ""."""
+    """Return the file's text for a key of its own tables, where that has units; else ""."""
     table, _, name = key.partition(".")
     return with_units(read_toml(scenario.text, scenario.where).get(table, {}).get(name), value)
 
 
 def _law(law: Reflown) -> dict[str, Any]:
-    """The page flies a law with these; numbers are the bytes of 64-bit floats."""
+    """The data by which the page flies a law; numbers are the bytes of 64-bit floats."""
     return {
         "name": law.name,
         "fly": _script(law.program),
@@ -115,7 +116,8 @@ def _law(law: Reflown) -> dict[str, Any]:
 
 
 def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
-    """Give the page the metrics of a law's flights; numbers that a slider or the flight's length changes go by name."""
+    """Give the page the equations of the metrics of a law's flights; numbers that a slider or the flight's length changes go
+    by name."""
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
     meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)
@@ -141,7 +143,7 @@ def _bytes(numbers: Any) -> str:
 
 
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
-    """Tell what every claim of the page stands on."""
+    """Tell under which conditions each claim of the page stands."""
     claims: list[dict[str, Any]] = []
     for number, flight in enumerate(flights):
         if flight.name not in laws:

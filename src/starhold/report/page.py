@@ -1,4 +1,4 @@
-"""The page that tells a comparison, opens offline and loads nothing."""
+"""The page of a comparison; it opens offline and loads nothing."""
 
 from __future__ import annotations
 

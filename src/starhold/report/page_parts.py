@@ -292,7 +292,7 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
 
 
 def with_units(written: Any, value: Any) -> str:
-    """Return what a file has for numbers, where that is told with units; "" where it is not."""
+    """Return the file's text of numbers, where that has units; "" where it has none."""
     texts = cast(list[Any], written) if isinstance(written, list) else [written]
     numbers = isinstance(value, (int, float, tuple, list, np.ndarray)) and not isinstance(value, bool)
     return ", ".join(texts) if numbers and texts and all(isinstance(text, str) for text in texts) else ""
@@ -367,5 +367,5 @@ def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, 
 
 
 def rounded(values: Iterable[float], digits: int = 6) -> list[float | None]:
-    """Numbers of a few digits for JSON, which has none for what is not finite."""
+    """Numbers of a few digits for JSON, which has none that are not finite."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()]

@@ -1,5 +1,5 @@
-"""A pointing error budget: what each source contributes to the error, what all of them together do, and the root sum square
-of the contributions beside it."""
+"""A pointing error budget: the contribution of each source to the error, their root sum square, and the error under all
+sources together."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ MOST = 5_000_000
 
 @dataclass(frozen=True)
 class Settings:
-    """How errors were taken: from when on (s), over windows of what length (s), whose starts are how far apart for drift
-    (s), the share of the errors that their level keeps and what it is a share of, how many runs, the line of sight."""
+    """How errors are taken: from which time on (s), over windows of which length (s), how far apart windows start for drift
+    (s), the share of the errors that a level keeps and how the share is meant, the number of runs, and the line of sight."""
 
     start: float
     window: float
@@ -82,8 +82,8 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Budget:
-    """The pointing errors of a law by source. Levels are told about the line of sight where there is one, else of the angle
-    about whatever axis."""
+    """The pointing errors of a law by source. Levels are about the line of sight where there is one, else of the angle about
+    any axis."""
 
     scenario: str
     law: str
@@ -95,7 +95,7 @@ class Budget:
 
     @property
     def axis(self) -> str:
-        """The axis that levels are told about."""
+        """The axis that levels are about."""
         return ANGLE if self.settings.boresight is None else LINE
 
     @property
@@ -210,8 +210,9 @@ def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
 
 
 def sources(scenario: Scenario) -> tuple[Source, ...]:
-    """Tell what disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and
-    whatever of a sensor may be zero and is not, but for times. Actuators, estimators and sampling belong to the loop."""
+    """Tell what disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and the
+    parameters of a sensor that may be zero and are not, except times. Actuators, estimators and sampling belong to the
+    loop."""
     disturbing = [
         Source(key.replace("_", " "), {f"{name}.{key}": type(value)()})
         for name in ("environment", "sensor")
@@ -240,7 +241,7 @@ def _smooth(scenario: Scenario) -> dict[str, Any]:
 
 
 def _errors_of(fitted: Fitted) -> dict[str, Any]:
-    """The parameters of a sensor that are errors, with zeros in their place."""
+    """The parameters of a sensor that are errors, by name, with the zeros that remove them."""
     zeros: dict[str, Any] = {}
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         # What has to be given may be a direction, unless zero is where its bounds begin.

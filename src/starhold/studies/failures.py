@@ -1,4 +1,4 @@
-"""The failures of wheels: what a spacecraft can still do after the loss of one or two of them."""
+"""The failures of wheels: the control that a spacecraft has after the loss of one or two of them."""
 
 from __future__ import annotations
 
@@ -257,12 +257,9 @@ def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
 
 
 def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
-    """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s).
-
-    Growth is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit; the
-    largest momentum on its side within that time is carried on with it, which is right to within an orbit. Wheels in the
-    answer count from 1.
-    """
+    """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s). Growth
+    is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit, and added to the
+    largest momentum of its sign in that time, which is right to within an orbit. Wheels in the answer count from 1."""
     beyond = np.argwhere(np.abs(filled) > FULL)
     if len(beyond):
         row, wheel = beyond[0].tolist()

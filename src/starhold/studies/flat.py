@@ -1,7 +1,7 @@
 """All numbers that a loop flies with, in one row, each with its name; and the trial whether an equation gives them.
 
-Which keys of a file an equation follows is told by no list: scenarios with other values are built, and their numbers
-compared with what the equation gives, to the last bit.
+No list says which keys of a file an equation follows: scenarios with other values are built, and their numbers compared with
+those of the equation, to the last bit.
 """
 
 from __future__ import annotations
@@ -81,8 +81,7 @@ _OF_ONE = re.compile(r"(memories|setup)\.(estimator|target)\b")
 
 
 def shown_name(loop: ClosedLoop, name: str) -> str:
-    """The name by which tables call a number: after the part that it is of, with its state or its memory apart from its
-    parameters."""
+    """The name by which tables call a number: its part first; its state and memory are set apart from its parameters."""
 
     def called(where: str | None, fitted: Any) -> str:
         return fitted.called + {"setup": "", "memories": ".memory"}.get(where or "", ".state")

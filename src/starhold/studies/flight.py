@@ -1,4 +1,4 @@
-"""One flown law with all that a report says about it."""
+"""One flown law with all that reports need of it."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Begun(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Flight:
-    """One law's run of a scenario: the name the scenario gives the law, the law's type, what was recorded, its metrics, its
-    gains with their units, how metrics are told and ranked, and its certificates."""
+    """One law's run of a scenario: the name the scenario gives the law, the law's type, the recording, its metrics, its
+    gains with their units, how metrics are shown and ranked, and its certificates."""
 
     name: str
     law: str
@@ -67,7 +67,8 @@ class Flight:
 
     @cached_property
     def unknown(self) -> dict[str, float]:
-        """Recorded quantities that are no numbers to the end of a motion that was not lost, and since when (s)."""
+        """Recorded quantities that are NaN from some time on (s) to the end of a motion that was not lost, with that
+        time."""
         run, times = self.recording, dict[str, float]()
         for name in run.columns if self.lost is None else ():
             values = np.asarray(run.arrays.get(name, 0.0))

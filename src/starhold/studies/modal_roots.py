@@ -55,7 +55,7 @@ class Study:
         return np.array([math.nan if item.hard is None else item.hard.root for item in self.results])
 
     def fits(self) -> dict[str, TwoPieceFit]:
-        """The fits there are, by how tables call them."""
+        """The fits by the names that tables give them; empty where there are none."""
         both = {"fit": self.fitted, "published": self.published}
         return {name: pieces for name, pieces in both.items() if pieces is not None}
 

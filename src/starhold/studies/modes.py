@@ -1,4 +1,4 @@
-"""Flights of modes: when they switch, and what is certified of each mode and of the hand-over to it."""
+"""Flights of modes: when they switch, and the certificates of each mode and of each hand-over."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ class _Rates:
 
 
 def _orbit(what: Candidate, start: Any) -> Any:
-    """One turn of the closed motion that the motion from a state comes to backwards in time; None if it comes to none."""
+    """One turn of the closed motion that the motion from a state reaches backwards in time; None where it reaches none."""
     from scipy.integrate import solve_ivp
 
     rates = _Rates(what, 2)

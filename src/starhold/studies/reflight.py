@@ -56,9 +56,9 @@ class Reflown:
 
     program: `fly` as `kernels.one` records it; derive: the numbers at `places` among those of the carry and, after them, of
     the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all as the scenario has them;
-    held: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the recorded
-    quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia" or
-    "torque_limit".
+    unfollowed: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the
+    recorded quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia"
+    or "torque_limit".
     """
 
     name: str
@@ -168,7 +168,7 @@ def _explicit(scenario: Scenario) -> Scenario:
 
 
 def _changes(scenario: Scenario, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The changes of the file that values of dials mean."""
+    """The changes of the file that give dials these values."""
     of_law = {key: value for key, value in values.items() if key.startswith("law.")}
     return scenario.hooks.changes({key: value for key, value in values.items() if key not in of_law}) | of_law
 

@@ -23,7 +23,7 @@ MOST = 3
 
 @dataclass
 class Job:
-    """One thing that was asked for: its number, kind, folder, how far it is, and what came of it."""
+    """One task: its number, kind, folder, progress and result."""
 
     number: int
     kind: str
@@ -35,7 +35,7 @@ class Job:
     ended: bool = False
 
     def status(self) -> dict[str, Any]:
-        """Tell the page of it."""
+        """Describe the task for the page."""
         return {
             "number": self.number,
             "kind": self.kind,
@@ -47,7 +47,7 @@ class Job:
 
 
 class Jobs:
-    """All that was asked for since the studio began."""
+    """All tasks since the studio began."""
 
     def __init__(self) -> None:
         self._place = tempfile.TemporaryDirectory(prefix="starhold-studio-", ignore_cleanup_errors=True)
@@ -76,7 +76,7 @@ class Jobs:
         return self._jobs.get(number)
 
     def all(self) -> list[dict[str, Any]]:
-        """Tell the page of all of them."""
+        """Describe all tasks for the page."""
         return [job.status() for job in self._jobs.values()]
 
     def stop(self, number: int) -> None:
@@ -97,7 +97,7 @@ class Jobs:
 
 
 def _follow(job: Job, reports: Connection) -> None:
-    """Note what a process tells until it ends."""
+    """Note the reports of a process until it ends."""
     with suppress(EOFError):
         while True:
             state = reports.recv()

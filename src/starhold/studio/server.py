@@ -266,7 +266,8 @@ async def _strings(request: Request, *names: str) -> dict[str, str] | None:
 
 
 def serve(path: Path | None, name: str, text: str, port: int, announce: Callable[[str], None], browse: bool) -> None:
-    """Serve a studio until it is interrupted. told: hears the address with its token. InputError where the port is taken."""
+    """Serve a studio until it is interrupted. announce: called with the address and its token. InputError where the port
+    is taken."""
     import uvicorn
 
     token, studio = secrets.token_urlsafe(24), Studio(path, name, text)

@@ -60,19 +60,20 @@ def _table(budget: Budget) -> Table:
 
 
 def _unit_of(budget: Budget, index: str) -> tuple[str, float]:
-    """The unit that the levels of an index are told in, and its size (rad)."""
+    """The unit that the levels of an index are shown in, and its size (rad)."""
     largest = max(budget.level(row.name, index) for row in budget.rows)
     return next((unit for unit in UNITS if largest >= LEAST * unit[1]), UNITS[-1])
 
 
 def _setting_text(budget: Budget) -> str:
-    """How the errors were taken, in a sentence or two."""
+    """Say how the errors were taken, in a sentence or two."""
     settings = budget.settings
-    about = "about whatever axis" if settings.boresight is None else "half the cone of the line of sight"
+    about = "about any axis" if settings.boresight is None else "half the cone of the line of sight"
     runs = "run" if settings.runs == 1 else "runs"
     return (
-        f"Levels that {100.0 * settings.confidence:.6g} % {INTERPRETED[settings.interpretation]} keep, {about}; {settings.runs} {runs}. "
-        f"Errors from {settings.start:g} s on, windows of {settings.window:g} s, for drift {settings.separation:g} s apart."
+        f"Levels that {100.0 * settings.confidence:.6g} % {INTERPRETED[settings.interpretation]} keep, {about}; "
+        f"{settings.runs} {runs}. Errors from {settings.start:g} s on, windows of {settings.window:g} s, "
+        f"for drift {settings.separation:g} s apart."
     )
 
 

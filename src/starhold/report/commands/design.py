@@ -16,7 +16,7 @@ WIDE = 132
 
 
 def present(scenario: Scenario, law: str | None, designs: Sequence[Design]) -> Result:
-    """Show the inputs of each design, its gains, and what it can be judged by."""
+    """Show the inputs of each design, its gains, and the numbers to judge it by."""
     from starhold.report.stability_map import draw_map
     from starhold.scenario.designing import map_inputs
 

@@ -1,4 +1,4 @@
-"""A study of what is left after the loss of any one or two wheels."""
+"""A study of the control that is left after the loss of any one or two wheels."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) -> Result:
-    """One row a loss; of the gains those that were designed anew."""
+    """One row a loss; gains only where they were designed anew."""
     from starhold.report.text import number_text
 
     flown = [failure.gains for failure in failures if failure.gains is not None]

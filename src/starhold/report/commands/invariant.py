@@ -1,4 +1,4 @@
-"""A table and a picture of what is proved of invariant sets of any small system."""
+"""A table and a picture of the proved invariant sets of any small system."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def listed() -> list[Block]:
 
 
 def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
-    """The problem: made in Python, of a file, or the built-in one of a name."""
+    """The problem: made in Python, read from a file, or the built-in one of a name."""
     from starhold.certification import invariant as sets
 
     return (problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem),)
 
 
 def present(problem: InvariantProblem, certificate: Certificate) -> Result:
-    """Each claim with its outcome, how it was shown and what it lacks; the phase portrait with the sets."""
+    """Each claim with its outcome, how it was shown and what is missing; the phase portrait with the sets."""
     from starhold.certification import invariant as sets
     from starhold.studies.phase_portraits import portraits
 

@@ -63,7 +63,7 @@ def _table(result: Study) -> Table:
 
 
 def draw(result: Study, title: str) -> Any:
-    """The figure: roots and what they take, over the angle; errors of the fits where there are any."""
+    """The figure: roots, times and rates over the angle; errors of the fits where there are any."""
     import numpy as np
 
     from starhold.report.colours import COLOURS

@@ -70,7 +70,8 @@ def _number(name: str, text: Any) -> Any:
 
 
 def present(station: Station, mass: float, area: float | None, _same: Station) -> Result:
-    """The design in words, then the sail over rates and reflectivities, and what deficits leave of what the circle asks."""
+    """The design in words, then the sail over rates and reflectivities, and the control left at deficits of what the circle
+    asks."""
     from starhold.parts.bodies.libration_point import nonlinear
     from starhold.synthesis.circle import demand
 

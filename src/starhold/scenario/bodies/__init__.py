@@ -1,5 +1,5 @@
-"""The bodies that scenarios can be about: each module or folder here tells the tables of one, and is named nowhere else;
-`any_body` tells those of all others."""
+"""The bodies that scenarios can be about: each module or folder here defines the tables of one, which is named nowhere else;
+`any_body` defines those of all others."""
 
 from __future__ import annotations
 

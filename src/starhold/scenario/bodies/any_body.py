@@ -132,7 +132,7 @@ class AnyBody(Body):
 
 
 class NamedByTable:
-    """It stands for all these bodies until a file's [body] table tells which."""
+    """Stands for all these bodies until a file's [body] table names one."""
 
     name = ""
     marker = MARKER
@@ -177,8 +177,8 @@ def _read(path: Path, folder: Path) -> AnyBody:
 
 @cache
 def tables_of(part: Part) -> type[ScenarioTable]:
-    """The tables of a file about a body but those of its laws. ValueError, one line, where the part does not declare itself
-    so that a file can give its numbers."""
+    """The tables of a file about a body but those of its laws. ValueError, one line, where the part's declaration leaves
+    numbers that a file cannot give."""
     try:
         state, params = _state(part), _params(part)
         recorded = quantities(part.module.Sample)
@@ -253,7 +253,7 @@ def _state(part: Part) -> list[contract.Field]:
 
 
 def _within(gain: contract.Parameter) -> Any:
-    """A value that a parameter may have: 0.1 for each number, or what lies near that."""
+    """A value that a parameter may have: 0.1 for each number, or one near it within the bounds."""
     least = [0.1, *(x for x in (gain.at_least, None if gain.above is None else gain.above + 0.1) if x is not None)]
     value = min(max(least), math.inf if gain.at_most is None else gain.at_most)
     return [value] * gain.shape[0] if gain.shape else value

@@ -114,7 +114,7 @@ STUDY = RigidBodyStudy()
 
 
 def _differs(event: Event, issued: Issued) -> bool:
-    """Whether from an event on another loop flies, or is known to the law, than a certificate speaks of."""
+    """Whether from an event on a loop flies, or is known to the law, that differs from the one a certificate is about."""
     if event.step != issued.step or issued.step:
         return event.step > issued.step
     # A fault at the very start, of which the law knows or does not.
@@ -141,7 +141,7 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[I
 
 
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
-    """The loop as it starts, and at each control step of a run from which on it is another that the law knows."""
+    """The loop as it starts, and each later loop that the law knows, with the control step from which on it flies."""
     known = [(0, replace(loop, events=()))]
     if loop.remembers:
         return known
@@ -152,7 +152,7 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
             continue
         now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
         if step:
-            # A step more, for what the event changes at once.
+            # One step more, for the changes that come with the event.
             carry = fly(loop, step)[1]
             phase = next(phase for phase in loop.phases(steps) if phase.first == step)
             carry = phase.entered(carry)

@@ -93,9 +93,9 @@ class LibrationPoint(Body):
 
 
 def _limit(scenario: Scenario, law_table: PointLawTable, gains: Any, key: str) -> float:
-    """The largest control (scaled) a law has, by what its own table says or else [control]."""
+    """The largest control (scaled) a law has: from its table, else from [control]."""
     where, table = scenario.where, scenario.table
-    said, key = (law_table.given_limits, key) if law_table.given_limits else (table.control.given_limits, "control")
+    said, key = (law_table.limits, key) if law_table.limits else (table.control.limits, "control")
     if not said:
         return math.inf
     if table.control.limit_kind == "none":

@@ -55,7 +55,7 @@ class LibrationTable(Table):
         return self
 
     def _check_own(self) -> None:
-        """Errors where two bodies of one's own cannot be."""
+        """Raise an error for two given bodies that cannot be."""
         pair = self.pair
         check_gravity("larger", pair.larger)
         check_gravity("smaller", pair.smaller)
@@ -102,19 +102,15 @@ class Resources(Table):
     )
 
     @property
-    def given_limits(self) -> dict[str, float]:
-        """The ways in which the limit is given."""
+    def limits(self) -> dict[str, float]:
+        """The limits given, by key."""
         given = {"limit": self.limit, "margin": self.margin, "deficit": self.deficit}
         return {key: value for key, value in given.items() if value is not None}
 
     @model_validator(mode="after")
     def _one_limit(self) -> Resources:
-        if len(self.given_limits) > 1:
-            raise at_key(
-                list(self.given_limits)[1],
-                f"one of limit, margin and deficit, not also {next(iter(self.given_limits))}",
-                None,
-            )
+        if len(self.limits) > 1:
+            raise at_key(list(self.limits)[1], f"one of limit, margin and deficit, not also {next(iter(self.limits))}", None)
         return self
 
 
@@ -177,6 +173,6 @@ class LibrationPointTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _limit_is_of_something(self) -> LibrationPointTable:
-        if self.control.limit_kind == "none" and self.control.given_limits:
+        if self.control.limit_kind == "none" and self.control.limits:
             raise at_key("control.limit_kind", "norm or axis where there is a limit", "none")
         return self

@@ -79,8 +79,8 @@ def axial_inertia(effectors: tuple[Fitted, ...]) -> Any:
 
 
 def torque_limit(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
-    """The torque that a law may reckon with (N m): the limit of [spacecraft], or what the effectors among these parts surely
-    give in its way where that is less."""
+    """The torque that a law may reckon with (N m): the limit of [spacecraft], or, where that is less, the torque that the
+    effectors among these parts surely give by the same measure."""
     craft, least = table.spacecraft, sure_torque(table, parts)
     return least if craft.limit == "none" and least < math.inf else min(craft.torque_limit, least)
 

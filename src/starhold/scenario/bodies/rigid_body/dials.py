@@ -1,4 +1,5 @@
-"""Inertia, limit and start of a spacecraft can be moved while its loop stays the same program; here are their equations."""
+"""The inertia, limit and start of a spacecraft can be moved while its loop stays the same program; here are their
+equations."""
 
 from __future__ import annotations
 
@@ -55,8 +56,8 @@ class Dials(Body):
         return dials | {ATTITUDE: tuple(map(float, attitude)), RATE: tuple(map(float, table.initial.rate))}
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The changes of a file that values of these keys mean: an inertia that the laws do not know is that of a fault at
-        the start, about which nothing is done."""
+        """The changes of a file that give keys these values: an inertia that the laws do not know is that of a fault at the
+        start, on which nobody acts."""
         changes = {key: value for key, value in values.items() if key != TRUE}
         if ATTITUDE in changes:
             changes[ANGLES] = None

@@ -1,4 +1,4 @@
-"""Where a run starts, and what it is to reach."""
+"""The start of a run, and its target."""
 
 from __future__ import annotations
 
@@ -129,8 +129,8 @@ def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[...
 
 
 def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None) -> State:
-    """The first state of a run with this target; of a unit quaternion or a rate in place of those of [initial] an
-    equation."""
+    """The first state of a run with this target; an equation where a unit quaternion or a rate replaces those of
+    [initial]."""
     table = scenario.table
     orbit = table.orbit
     position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
@@ -148,7 +148,7 @@ def goal_at_start(goal: Fitted, begun: State) -> Goal:
 
 
 def told_to_design(scenario: Scenario, sign: str) -> Start:
-    """The start that the design of a law may reckon with; `sign`: its quaternion sign policy."""
+    """The start that a design form may use; `sign`: the law's quaternion sign policy."""
     table, goal, effectors = scenario.table, target_of(scenario), effectors_of(scenario)
     begun = start_of(scenario, goal)
     aim = goal_at_start(goal, begun)
