@@ -43,7 +43,7 @@ class PageParts(NamedTuple):
 
 
 class BodyReport(Protocol):
-    """What pictures and pages need of a body; `starhold.report.bodies` holds one `REPORT` a module."""
+    """The hooks of a body for pictures and pages; `starhold.report.bodies` holds one `REPORT` a module."""
 
     def picture(self, flights: Sequence[Flight], scenario: Scenario) -> Picture:
         """Gather what the figures show."""
