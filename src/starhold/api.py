@@ -341,7 +341,7 @@ def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None)
 
 @shortly
 def studied(name: str, *about: Any, **options: Any) -> Any:
-    """Study what the command of a name does: a law of a scenario, or what else it is about, with its options."""
+    """Run the command of a name as a study: of a law of a scenario, or of its own subject, with its options."""
     from starhold.report.commands import command
 
     declared = command(name)

@@ -77,6 +77,6 @@ def test_what_is_reached_at_the_very_end_does_not_count(flights):
     assert found["iterations_1e-2"] == 4261
     assert set(found["cut_off"]) >= {"iterations_1e-3", "settling_time", "attitude_settling_time"}
     assert "settling_time" not in measure(run, 2e-3, 1e-3)["cut_off"]
-    assert METRICS.told("settling_time", found) == "— †"
+    assert METRICS.cell("settling_time", found) == "— †"
     assert METRICS.late({"lyapunov": found}) != ""
     assert METRICS.late({"lyapunov": measure(run, 2e-3, 1e-3)}) == ""

@@ -121,7 +121,7 @@ def test_a_slider_flies_the_laws_again(browser: Browser, page: Path, size: tuple
     ranked = METRICS.ranked(results)
     assert [row[1] for row in rows] == ranked
     metrics = METRICS.columns(results)
-    assert [row[2:] for row in rows] == [[METRICS.told(name, results[law]) for name in metrics] for law in ranked]
+    assert [row[2:] for row in rows] == [[METRICS.cell(name, results[law]) for name in metrics] for law in ranked]
     frames = browser.ask("views.map((view) => view.frames.at(-1))")
     assert frames == [flight.recording["attitude_error"][-1].tolist() for flight in again]
     assert browser.complaints == []
@@ -377,9 +377,9 @@ def test_what_a_law_computes_by_other_means_is_held() -> None:
     scenario = shortened("three-laws", "1 s")
     laws = {law.name: law for law in reflight(scenario).laws}
     assert "spacecraft.inertia" in laws["sliding"].follows
-    assert laws["sliding"].held == {}
+    assert laws["sliding"].unfollowed == {}
     weights = ("law.mpc.q_attitude", "law.mpc.q_rate", "law.mpc.r")
-    assert laws["mpc"].held == {"spacecraft.inertia": COMPUTED} | dict.fromkeys(weights, UNASKED)
+    assert laws["mpc"].unfollowed == {"spacecraft.inertia": COMPUTED} | dict.fromkeys(weights, UNASKED)
     assert "initial.rate" in laws["mpc"].follows
     assert "torque_limit" in laws["mpc"].reads
     assert "torque_limit" not in laws["sliding"].reads

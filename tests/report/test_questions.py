@@ -128,9 +128,9 @@ def stretched(made: Reflight, random: np.random.Generator) -> dict[str, Any]:
 @pytest.mark.parametrize("case", CASES)
 def test_a_page_refuses_what_the_program_refuses_in_its_words(case: str) -> None:
     made, random = reflight(parse(CASES[case], case)), np.random.default_rng(len(case))
-    assert made.asked.fixed == {}
-    assert made.asked.ranged == {}
-    answer, refused, taken = asker(made.asked.questions), set[str](), 0
+    assert made.checks.fixed == {}
+    assert made.checks.ranged == {}
+    answer, refused, taken = asker(made.checks.questions), set[str](), 0
     for _ in range(24):
         moves = stretched(made, random)
         linked = {key: moves[leader] for key, leader in made.scenario.hooks.linked.items() if leader in moves}
@@ -174,6 +174,6 @@ def test_a_check_is_recorded_along_every_way() -> None:
 
 def test_what_a_law_checks_by_other_means_is_not_moved() -> None:
     made = reflight(parse(HEAD.format(inertia="[2.0, 3.0, 4.0]") + MPC, "mpc"))
-    assert made.asked.fixed.keys() >= {"law.mpc.q_attitude", "law.mpc.r"}
-    assert set(made.asked.fixed.values()) == {UNASKED}
-    assert made.asked.ranged == {"spacecraft.inertia": 3.0}
+    assert made.checks.fixed.keys() >= {"law.mpc.q_attitude", "law.mpc.r"}
+    assert set(made.checks.fixed.values()) == {UNASKED}
+    assert made.checks.ranged == {"spacecraft.inertia": 3.0}

@@ -12,7 +12,7 @@ from starhold.analysis.transient import Limits
 from starhold.analysis.transient import against_limits as measure_against
 from starhold.report.attitude_plots import collect
 from starhold.report.page import render
-from starhold.report.transients import section, told
+from starhold.report.transients import section, transient_text
 from starhold.scenario.reading import Scenario, parse
 from starhold.simulation.lane import Recording
 from starhold.studies.flight import Flight
@@ -55,8 +55,8 @@ def test_limits_that_are_not_given_are_null_and_kept() -> None:
     found = flights[0].metrics
     assert (found["rate_limit"], found["acceleration_limit"], found["limits_kept"]) == (None, None, True)
     assert found["transient_time"] is None
-    assert told(flights[0]).startswith("transient comes to no end; peak rate")
-    assert " of " not in told(flights[0])
+    assert transient_text(flights[0]).startswith("transient comes to no end; peak rate")
+    assert " of " not in transient_text(flights[0])
 
 
 def test_an_end_that_is_reached_at_the_very_end_does_not_count() -> None:

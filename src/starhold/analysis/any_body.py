@@ -1,4 +1,4 @@
-"""Metrics of a body of which nothing is known but what is recorded of it, in the units of the recording."""
+"""Metrics of a body of which only the recording is known, in the units of the recording."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _note(names: tuple[str, ...]) -> Any:
 
 def _square(value: Any) -> Any:
     numbers: list[Any] = flatten((value,))
-    found = numbers[0] * numbers[0]
+    total = numbers[0] * numbers[0]
     for number in numbers[1:]:
-        found = found + number * number
-    return found
+        total = total + number * number
+    return total

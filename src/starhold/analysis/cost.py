@@ -46,13 +46,13 @@ def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float6
     state)."""
     carry = loop.carry()
     columns = [recording[name][:CALLS] for name in type(carry.state)._fields]
-    own = {name for name, _, _ in recorded(loop)} - {*type(carry.state)._fields}
+    others = {name for name, _, _ in recorded(loop)} - {*type(carry.state)._fields}
     for state in carry.effectors:
         for name, value in zip(state._fields, state, strict=True):
-            found = [run for key, run in recording.arrays.items() if key.endswith(name) and key in own]
+            matches = [run for key, run in recording.arrays.items() if key.endswith(name) and key in others]
             # One that is not recorded stays as it was at the start.
             start = np.tile(flatten((value,)), (len(columns[0]), 1))
-            columns.append(np.reshape(found[0][:CALLS], start.shape) if found else start)
+            columns.append(np.reshape(matches[0][:CALLS], start.shape) if matches else start)
     return np.hstack(columns)
 
 

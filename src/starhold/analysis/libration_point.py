@@ -163,11 +163,11 @@ def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, to
     did not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
     limit, kind = float(run.attrs["control_limit"]), run.attrs["limit"]
     period = run.attrs["control_period"] * run.attrs["record_every"]
-    found = make_meter(len(run["time"]) - 1, period, kind, units, goal, tolerance).of_recording(run, limit)
-    lost, control = found["diverged_at"], run["control"]
+    metrics = make_meter(len(run["time"]) - 1, period, kind, units, goal, tolerance).of_recording(run, limit)
+    lost, control = metrics["diverged_at"], run["control"]
     size = np.abs(control).max(axis=1) if kind == "axis" else np.linalg.norm(control, axis=1)
     ratio = float(size.max()) / limit if math.isfinite(limit) else None
-    return found | {"diverged_at": None if lost is None else lost * units.time, "peak_ratio": ratio}
+    return metrics | {"diverged_at": None if lost is None else lost * units.time, "peak_ratio": ratio}
 
 
 @cache
@@ -201,10 +201,10 @@ def _note(limit: str, circle: bool, late: bool) -> Any:
 def _units() -> dict[str, str]:
     """The metrics with their units, SI."""
     goals = CircleGoal(0.0, 0.0), EquilibriumGoal(ZERO)
-    found = {"diverged_at": "s", "peak_ratio": "1", **COSTS}
+    units = {"diverged_at": "s", "peak_ratio": "1", **COSTS}
     for goal in goals:
-        found |= make_meter(0, 1.0, "none", Units(1.0, 1.0), goal, 0.0).units
-    return found
+        units |= make_meter(0, 1.0, "none", Units(1.0, 1.0), goal, 0.0).units
+    return units
 
 
 METRICS = MetricSet(MEASURES, ("deviation", "settling_time", "effort_per_year"), "days", DAY, _units())

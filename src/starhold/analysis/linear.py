@@ -90,7 +90,7 @@ class Linear:
 
     @cached_property
     def stepped_loop(self) -> System:
-        """The sampled loop, cut at the command, from a command to the negative of what the law answers with."""
+        """The sampled loop, cut at the command, from a command to the negative of the law's answer."""
         return in_series(self.stepped, self.stepped_law)
 
     @cached_property
@@ -101,8 +101,8 @@ class Linear:
     @property
     def poles(self) -> Array:
         """The eigenvalues of a step of the closed loop, the largest first."""
-        found: Any = np.linalg.eigvals(self.stepped_closed.A)
-        return found[np.lexsort((found.imag, -np.round(np.abs(found), 12)))]
+        roots: Any = np.linalg.eigvals(self.stepped_closed.A)
+        return roots[np.lexsort((roots.imag, -np.round(np.abs(roots), 12)))]
 
     @property
     def is_stable(self) -> bool:
@@ -119,7 +119,7 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
         raise LinearityError("the body has no attitude")
     for one in (loop.law, *(f.part for f in loop.used("effector") if f.part.flag("ACTS"))):
         if one.reads:
-            raise LinearityError(f"{one.name} takes the {_told(one.reads)} too, not attitude and rate alone")
+            raise LinearityError(f"{one.name} takes the {_listed(one.reads)} too, not attitude and rate alone")
     left_out: list[str] = []
     still = _at_rest(loop, left_out)
     try:
@@ -137,13 +137,13 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
     return Linear(plant, continuous, sampled(plant, loop.period, delay), law, delay, tuple(left_out))
 
 
-def _told(readings: tuple[str, ...]) -> str:
+def _listed(readings: tuple[str, ...]) -> str:
     return " and the ".join(name.replace("_", " ") for name in readings)
 
 
 def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
     """The loop at rest on target, in inertial axes that are those of the target, so that the error there is exactly zero;
-    names what was taken from it."""
+    appends to `left_out` the names of the parts removed."""
     counted = loop.law.counters(loop.law.remember(loop.gains, loop.known, loop.period))
     if counted is not None or buffers(loop.carry().memory):
         raise LinearityError(f"the law {loop.law.name} iterates, and has no derivative")
@@ -208,8 +208,8 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
     carry = _settled(loop, step, setup)
     lags = any(fitted.part.hook("rates") is not None for fitted in loop.used("actuator"))
     inner = flatten((carry.effectors, carry.actuators))
-    more = [f"{f.called}_{k + 1}" for f, own in zip(loop.used("effector"), carry.effectors, strict=True)
-            for k in range(len(flatten((own,))))]  # fmt: skip
+    more = [f"{f.called}_{k + 1}" for f, each in zip(loop.used("effector"), carry.effectors, strict=True)
+            for k in range(len(flatten((each,))))]  # fmt: skip
     more += [f"actuator_{k + 1}_{axis}" for k in range(len(carry.actuators)) for axis in AXES]
     more += [f"torque_{axis}" for axis in AXES] * lags
     states = (*ERROR, *more)
@@ -220,9 +220,9 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
     u, d = variables(ZERO, size, count), variables(ZERO, size + 3, count)
     numbers = iter(x[6:])
     effectors, outputs = (mapped(part, lambda _: next(numbers)) for part in (carry.effectors, carry.actuators))
-    told: Any = [*NO_TURN[:1], *(0.5 * turn for turn in x[:3])]
+    turn_parts: Any = [*NO_TURN[:1], *(0.5 * turn for turn in x[:3])]
     # The scalar part of the quaternion has no slope at rest.
-    attitude = (Dual(1.0, np.zeros(count)), *told[1:])
+    attitude = (Dual(1.0, np.zeros(count)), *turn_parts[1:])
     torque = tuple(x[-3:]) if lags else tuple(u)
     state = carry.state._replace(attitude=attitude, rate=tuple(x[3:6]), torque=torque)
     pushed = setup.environments[-1]._replace(torque=tuple(d))
@@ -231,10 +231,10 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
     now = _with_memory(now, variables(memory, size + 6, count))
 
     def moving() -> list[Any]:
-        rates, own, driven = step.slope(now, loop.craft, setup)
+        rates, of_effectors, driven = step.slope(now, loop.craft, setup)
         turning = relative(NO_TURN, rates[0])[1:]
-        found = [*(2.0 * part for part in turning), *rates[1], *_filled(own, carry.effectors)]
-        return found + _filled(driven, carry.actuators) + (list(rates[4]) if lags else [])
+        rates_of_error = [*(2.0 * part for part in turning), *rates[1], *_filled(of_effectors, carry.effectors)]
+        return rates_of_error + _filled(driven, carry.actuators) + (list(rates[4]) if lags else [])
 
     def decided() -> list[Any]:
         after = step.update(now, 0, loop.seed, loop.gains, loop.known, setup)
@@ -253,13 +253,13 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
 
 
 def _filled(rates: Any, states: Any) -> list[Any]:
-    """The rates of states, 0 where a part says that there are none."""
-    found: list[Any] = []
+    """The rates of states, 0 where a part has none."""
+    numbers: list[Any] = []
     for rate, state in zip(rates or (None,) * len(states), states, strict=True):
-        numbers = flatten((state,))
-        own = [0.0] * len(numbers) if rate is None else _flat(rate, state)
-        found += own
-    return found
+        values = flatten((state,))
+        more = [0.0] * len(values) if rate is None else _flat(rate, state)
+        numbers += more
+    return numbers
 
 
 def _flat(rate: Any, state: Any) -> list[Any]:
@@ -271,8 +271,8 @@ def _flat(rate: Any, state: Any) -> list[Any]:
 
 
 def _needed(plant: System, law: System) -> tuple[System, System]:
-    """Both without states of the plant that nothing depends on, as the momenta of wheels whose friction is none, without
-    what the law remembers and its command does not depend on, and without what never changes, as a flag."""
+    """Plant and law without states that nothing needs: states of the plant that nothing depends on, such as the momenta of
+    wheels without friction; memory that the command does not depend on; and states that never change, such as flags."""
     law = _remembered(law)
     feeds = plant.A != 0.0
     heard = (law.D != 0.0).any(axis=0) | (law.B != 0.0).any(axis=0)
@@ -291,7 +291,7 @@ def _needed(plant: System, law: System) -> tuple[System, System]:
 
 
 def _remembered(law: System) -> System:
-    """The law without states that are none."""
+    """The law without memory that its command does not depend on, or that never changes."""
     size = len(law.states)
     constant = (np.eye(size) == law.A).all(axis=1) & (law.B == 0.0).all(axis=1)
     needed = (law.C != 0.0).any(axis=0)
@@ -307,17 +307,17 @@ def sampled(plant: System, period: float, delay: float = 0.0) -> System:
     and a disturbance that is held. Commands that are still to act are states (Astrom and Wittenmark, Computer-Controlled
     Systems, 1997)."""
     size = len(plant.states)
-    held = int(np.floor(delay / period * (1.0 + 1e-12)))
-    rest = max(0.0, delay - held * period)
+    whole = int(np.floor(delay / period * (1.0 + 1e-12)))
+    rest = max(0.0, delay - whole * period)
     split = rest > 1e-12 * period
-    over, pushed = _held(plant, period)
+    over, pushed = _under_hold(plant, period)
     command, others = slice(0, 3), slice(3, None)
     # Until `rest` the command before acts, and then the new one.
-    late, new = _held(plant, period - rest)[1][:, command], np.zeros((size, 3))
+    late, new = _under_hold(plant, period - rest)[1][:, command], np.zeros((size, 3))
     if split:
         to_end = expm(plant.A * (period - rest))
-        new, late = late, to_end @ _held(plant, rest)[1][:, command]
-    waiting = held + split
+        new, late = late, to_end @ _under_hold(plant, rest)[1][:, command]
+    waiting = whole + split
     names = tuple(f"{name}_{-k}_steps" for k in range(-waiting, 0) for name in COMMAND)
     total = size + 3 * waiting
     A, B = np.zeros((total, total)), np.zeros((total, len(plant.inputs)))
@@ -337,13 +337,13 @@ def sampled(plant: System, period: float, delay: float = 0.0) -> System:
     return System(A, B, C, plant.D, (*plant.states, *names), plant.inputs, plant.outputs, period)
 
 
-def _held(plant: System, time: float) -> tuple[Array, Array]:
-    """Return what the states, and inputs that are held, make of the states in a time (s)."""
+def _under_hold(plant: System, time: float) -> tuple[Array, Array]:
+    """Return the matrices by which the states and held inputs give the states after a time (s)."""
     size, inputs = plant.B.shape
     whole = np.zeros((size + inputs, size + inputs))
     whole[:size] = np.hstack([plant.A, plant.B])
-    found: Any = expm(whole * time)
-    return found[:size, :size], found[:size, size:]
+    exponential: Any = expm(whole * time)
+    return exponential[:size, :size], exponential[:size, size:]
 
 
 def in_series(plant: System, law: System) -> System:

@@ -22,12 +22,11 @@ UNITS = {"gain": "1", "less": "1", "phase": "rad", "delay": "s", "crossover": "r
 
 
 class Margins(NamedTuple):
-    """These are what the loop about one axis bears before it loses its stability, those about the others being closed.
-
-    gain: the least factor above 1 of the command that does (inf for none); less: the greatest factor below 1 that does (0
-    for none); phase (rad) and delay (s): the least further lag that does (inf for none); crossover: the highest frequency
-    (rad/s) at which the loop's gain is 1, its bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse
-    is the least distance of L from -1. NaN, but for the crossover, where the loop is not stable in the first place."""
+    """The margins of the loop about one axis, those about the others closed. gain: the least factor above 1 of the command
+    that loses stability (inf for none); less: the greatest factor below 1 that does (0 for none); phase (rad) and delay (s):
+    the least further lag that does (inf for none); crossover: the highest frequency (rad/s) at which the loop's gain is 1,
+    its bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse is the least distance of L from -1. All
+    but the crossover are NaN where the loop is not stable."""
 
     axis: str
     gain: float
@@ -63,25 +62,25 @@ def response(linear: Linear) -> Response:
 def _cut(linear: Linear, frequencies: Any, axes: Iterable[int]) -> NDArray[np.complex128]:
     """L (axes, n) about some of the axes."""
     whole = linear.stepped_loop.at(np.exp(1j * np.asarray(frequencies) * linear.period))
-    found: list[Any] = []
+    cut: list[Any] = []
     for i in axes:
         others = [k for k in range(3) if k != i]
         across = whole[:, others, i]
         if across.any() and whole[:, i, others].any():
             inner = np.eye(2) + whole[:, others][:, :, others]
             across = np.linalg.solve(inner, across[:, :, None])[:, :, 0]
-        found.append(whole[:, i, i] - np.sum(whole[:, i, others] * across, axis=1))
-    return np.array(found)
+        cut.append(whole[:, i, i] - np.sum(whole[:, i, others] * across, axis=1))
+    return np.array(cut)
 
 
 def margins(linear: Linear, shown: Response | None = None) -> list[Margins]:
     """Return the margins about the three body axes; shown: the response, where it is known already."""
-    found = response(linear) if shown is None else shown
-    return [_about(linear, k, found) for k in range(3)]
+    measured = response(linear) if shown is None else shown
+    return [_about(linear, k, measured) for k in range(3)]
 
 
-def _about(linear: Linear, k: int, found: Response) -> Margins:
-    w, L = found.frequencies, found.loops[k]
+def _about(linear: Linear, k: int, measured: Response) -> Margins:
+    w, L = measured.frequencies, measured.loops[k]
 
     def at(frequency: float) -> complex:
         return complex(_cut(linear, [frequency], [k])[0, 0])
@@ -113,9 +112,9 @@ def _log_size(values: Any) -> Any:
 def _roots(w: Any, values: Any, function: Callable[[float], float]) -> list[float]:
     """The frequencies at which a function changes its sign between two of w; not those at which it jumps, as it does across
     a resonance without damping."""
-    found: list[float] = []
+    roots: list[float] = []
     for p in np.flatnonzero((values[:-1] < 0.0) != (values[1:] < 0.0)):
         root = float(brentq(function, w[p], w[p + 1], xtol=1e-9 * w[p], rtol=1e-9))  # pyright: ignore
         if abs(function(root)) <= max(abs(values[p]), abs(values[p + 1])):
-            found.append(root)
-    return found
+            roots.append(root)
+    return roots

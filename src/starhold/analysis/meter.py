@@ -1,7 +1,7 @@
-"""Metrics of flights: notes that an equation takes at each control instant, and what is made of them at the end.
+"""Metrics of flights: notes that an equation takes at each control instant, and the numbers made of them at the end.
 
-The same notes are taken inside a kernel, of many flights at once of which no samples are kept, and of a recording, whose
-samples are the instants. What makes a metric of the notes is a row of a table, which the report's page reads too.
+The same notes are taken inside a kernel, of many flights at once without keeping samples, and of a recording, whose samples
+are the instants. A row of a table says how a metric is made of the notes; the report's page reads that table too.
 """
 
 from __future__ import annotations
@@ -126,36 +126,36 @@ class Meter:
         return window_ends(self.steps, self.marks)
 
     def metrics(self, noted: Array, windows: Array, lost: Array) -> Metrics:
-        """Metrics of lanes from what is noted of them, (numbers, lanes), of windows (windows, quantities, lanes), and the
-        control step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other
-        metrics of a motion that diverged are NaN."""
+        """Metrics of lanes from their notes (numbers, lanes), those of windows (windows, quantities, lanes), and the control
+        step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other metrics of a
+        motion that diverged are NaN."""
         kept = lost < 0.0
-        found = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
+        metrics = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
         for name, metric in self.table.items():
             values = self._values(metric, noted, windows, self.cuts())
             if metric.kind == INSTANT:
                 values = np.where((values <= self.steps) & ~self._late(metric, values), values, np.nan)
-            found[name] = np.where(kept, self._scaled(metric, values), np.nan)
-        return found
+            metrics[name] = np.where(kept, self._scaled(metric, values), np.nan)
+        return metrics
 
     def of_recording(self, run: Recording, limit: float) -> dict[str, Any]:
         """Metrics of a recording whose samples are the instants. Those without a value are None; `cut_off` names the times
         that come too late to count, `diverged_at` is the time at which the motion diverged."""
         lost, ends = run.attrs.get("diverged_at"), [*self.marks, self.steps + 1]
         noted, windows = self._replayed(run, limit, ends)
-        found: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
+        metrics: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
         for name, metric in self.table.items():
             values = self._values(metric, noted, windows, ends)
             there = lost is None or not (metric.final or metric.kind == INSTANT)
             if there and metric.kind == INSTANT:
                 there = bool(values[0] <= self.steps)
                 if there and self._late(metric, values)[0]:
-                    found["cut_off"].append(name)
+                    metrics["cut_off"].append(name)
                     there = False
             value = float(self._scaled(metric, values)[0])
             value = int(value) if there and metric.kind == INSTANT and metric.unit == "1" else value
-            found[name] = value if there and not math.isnan(value) else None
-        return found
+            metrics[name] = value if there and not math.isnan(value) else None
+        return metrics
 
     def program(self, columns: Columns, limit: float) -> Program:
         """The notes from the last of `marks` on, of samples with these columns, recorded; see `over_samples`."""
@@ -190,7 +190,7 @@ class Meter:
         kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
         shared = Arguments(self.numbers, limit).shared
         rows = [window.row for window in self.windows.values()]
-        noted, found, done = self.begun(1), np.empty((len(ends), len(rows), 1)), 0
+        noted, by_window, done = self.begun(1), np.empty((len(ends), len(rows), 1)), 0
         for window, end in enumerate(ends):
             while done < end:
                 last = min(end, done + PIECE)
@@ -200,13 +200,13 @@ class Meter:
                 memories = {"record": record, "noted": noted, "shared": shared, "own": shared, "tables": shared}
                 kernels[done >= self.marks[-1]](memories, done, last - done)
                 done = last
-            found[window] = noted[rows]
+            by_window[window] = noted[rows]
             noted[rows] = 0.0
-        return noted, found
+        return noted, by_window
 
 
 def _is_sampled(values: Any, run: Recording) -> bool:
-    """Tell whether values are numbers of each sample: a Dataset may hold whatever a user puts there."""
+    """Tell whether values are numbers of each sample: users may add anything to a Dataset."""
     return values.dtype.kind in "fiu" and values.ndim in (1, 2) and len(values) == len(run["time"])
 
 
@@ -232,7 +232,7 @@ def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
-    """Return what gives the recorded quantities of a control instant, of the body and of effectors, by name:
+    """Return the function that reads the recorded quantities of a control instant, of the body and of effectors, by name:
     read(decided, step, setup)."""
 
     def read(decided: Any, step: Any, setup: Any) -> dict[str, Any]:
@@ -248,20 +248,20 @@ def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterator[Any]:
-    """Return what is recorded of effectors, from the last to the first, and of the body, whose names count most."""
-    own, records, _, _ = make_step(parts).sample(decided, step, setup)
-    return reversed((own, *records))
+    """Return the recorded quantities of effectors, from the last to the first, and of the body, whose names win."""
+    body, records, _, _ = make_step(parts).sample(decided, step, setup)
+    return reversed((body, *records))
 
 
 def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
     """The control steps at which windows of a flight end, every mark among them. The last window holds the last instant too;
     where that is a mark, it has a window of its own."""
     edges = [0, *marks, steps]
-    found: set[int] = set()
+    ends: set[int] = set()
     for first, last in itertools.pairwise(edges):
         count = max(1, round(WINDOWS * (last - first) / steps))
-        found |= {round(cut) for cut in np.linspace(first, last, count + 1)[1:].tolist()}
-    return sorted(found - {0}) + [steps + 1] * (steps in marks)
+        ends |= {round(cut) for cut in np.linspace(first, last, count + 1)[1:].tolist()}
+    return sorted(ends - {0}) + [steps + 1] * (steps in marks)
 
 
 def tail_start(steps: int) -> int:
@@ -275,7 +275,7 @@ def middle(steps: int) -> int:
 
 
 def outside(then: Any, square: Any, bound: Any, now: Any) -> Any:
-    """The last instant at which a square was beyond its bound; what is no number is beyond it."""
+    """The last instant at which a square was beyond its bound; NaN is beyond it."""
     return where(less_equal(square, bound), then, now)
 
 

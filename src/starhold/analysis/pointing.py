@@ -77,13 +77,13 @@ def shortfall(apart: int, length: int) -> float:
 
 
 def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:
-    """Errors (runs, number) about each body axis, with their signs, and the angle about whatever axis; with a boresight (any
-    length, body axes) by how much that is tilted: half the cone that it sweeps."""
-    found = {axis: vectors[..., place] for place, axis in enumerate("xyz")}
-    found[ANGLE] = np.linalg.norm(vectors, axis=-1)
+    """Errors (runs, number) about each body axis, with their signs, and the size of the rotation; with a boresight (any
+    length, body axes) also its tilt: half the cone that it sweeps."""
+    components = {axis: vectors[..., place] for place, axis in enumerate("xyz")}
+    components[ANGLE] = np.linalg.norm(vectors, axis=-1)
     if boresight is not None:
-        found[LINE] = np.linalg.norm(np.cross(vectors, np.asarray(boresight) / math.hypot(*boresight)), axis=-1)
-    return found
+        components[LINE] = np.linalg.norm(np.cross(vectors, np.asarray(boresight) / math.hypot(*boresight)), axis=-1)
+    return components
 
 
 def level(values: Array, confidence: float, interpretation: Interpretation) -> float:
@@ -102,6 +102,6 @@ def figures(values: Array, confidence: float, interpretation: Interpretation) ->
     return Figures(level(values, confidence, interpretation), float(values.mean()), float(values.std()))
 
 
-def root_sum_square(found: list[Figures]) -> Figures:
+def root_sum_square(sources: list[Figures]) -> Figures:
     """The figures of the sum of independent errors: levels and deviations as the root of their sums of squares."""
-    return Figures(math.hypot(*(one.level for one in found)), None, math.hypot(*(one.deviation for one in found)))
+    return Figures(math.hypot(*(one.level for one in sources)), None, math.hypot(*(one.deviation for one in sources)))

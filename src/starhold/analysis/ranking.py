@@ -35,8 +35,8 @@ class Metrics(dict[str, Any]):
 
 @dataclass(frozen=True)
 class MetricSet:
-    """How results of laws on a body are told: the metrics that are shown, less being better in each; those that laws are
-    ranked by in turn; and the unit of time, with its seconds."""
+    """How results of laws on a body are shown: the metrics shown, less being better in each; those that laws are ranked by
+    in turn; and the unit of time, with its seconds."""
 
     measures: Mapping[str, Measure]
     order: tuple[str, ...]
@@ -87,7 +87,7 @@ class MetricSet:
         """A time (s) with its unit."""
         return f"{time / self.tick:.{digits}g} {self.clock}"
 
-    def told(self, metric: str, row: Mapping[str, Any]) -> str:
+    def cell(self, metric: str, row: Mapping[str, Any]) -> str:
         """Show the results of a law as `shown` does, with a mark where a time is reached too late to be counted."""
         return self.shown(metric, row.get(metric)) + (LATE if metric in row.get("cut_off", ()) else "")
 

@@ -167,8 +167,8 @@ def _table(rows: Any, period: float, every: int, wheels: bool) -> dict[str, Metr
         "attitude_settling_time": Metric("s", INSTANT, last[:1], (period,)),
         "rate_settling_time": Metric("s", INSTANT, last[1:], (period,)),
     }
-    for k, *own in zip(DECADES, rows.attitude_levels, rows.rate_levels, strict=False):
-        for prefix, row in zip(("", "rate_"), own, strict=True):
+    for k, *levels in zip(DECADES, rows.attitude_levels, rows.rate_levels, strict=False):
+        for prefix, row in zip(("", "rate_"), levels, strict=True):
             table[f"{prefix}iterations_1e-{k}"] = Metric("1", INSTANT, (row,), (float(every),))
     if rows.turning:
         table["overshoot"] = Metric("1", "overshoot", (*rows.turning.first, rows.turning.beyond))

@@ -134,17 +134,17 @@ def search(
     Every root is flown: until it leaves the eased limits, or until it has taken longer than the best so far, or to the end.
     `notice` hears how many angles are done, and how many there are.
     """
-    found: list[Found] = []
+    answers: list[Found] = []
     work = partial(_best, problem, problem.watcher(), np.sort(np.asarray(roots, dtype=float)), limits, eased)
     with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
         try:
             for answer in pool.map(work, angles):
-                found.append(answer)
-                notice(len(found), len(angles))
+                answers.append(answer)
+                notice(len(answers), len(angles))
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return found
+    return answers
 
 
 def _best(problem: SlewProblem, watcher: Watcher, roots: Any, limits: Limits, eased: Limits, angle: float) -> Found:
@@ -209,8 +209,8 @@ def _piece(x: Any, y: Any) -> tuple[tuple[float, float, float], float]:
     def solve(d: float) -> tuple[Any, float]:
         # Weighed by 1/y, so that relative errors count.
         basis = np.column_stack([np.exp(d * (x - x[0])), np.ones_like(x)]) / y[:, None]
-        found = np.linalg.lstsq(basis, np.ones_like(y), rcond=None)[0]
-        return found, float(np.sum((basis @ found - 1.0) ** 2))
+        factors = np.linalg.lstsq(basis, np.ones_like(y), rcond=None)[0]
+        return factors, float(np.sum((basis @ factors - 1.0) ** 2))
 
     tried = np.concatenate([-DECAYS[::-1], DECAYS])
     place = int(np.argmin([solve(d)[1] for d in tried]))

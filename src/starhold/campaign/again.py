@@ -20,12 +20,12 @@ from starhold.studies.compare import fly_law
 from starhold.studies.flight import Flight
 
 WORDS = ("name", "description", "type", "campaign")
-"""Keys of what names no file."""
+"""Keys whose texts name no file."""
 
 
 class FlownAgain(NamedTuple):
-    """A run of a campaign, flown again: its scenario, its flight, and the columns in which the campaign holds other bits
-    than come out now, which are none unless the machine computes otherwise."""
+    """A run of a campaign, flown again: its scenario, its flight, and the columns whose bits differ from those that the
+    campaign holds, as another machine may compute them."""
 
     scenario: Scenario
     flight: Flight
@@ -49,14 +49,14 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
     with ThreadPool(1) as pool:
         now = job(name, run, 1, pool)().rows
     differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
-    own = scenario_of(job, job.plan.columns(run, 1), run)
-    entry = own.pick(name)
-    return FlownAgain(own, fly_law(own, entry, build(own, entry)), differs)
+    drawn = scenario_of(job, job.plan.columns(run, 1), run)
+    entry = drawn.pick(name)
+    return FlownAgain(drawn, fly_law(drawn, entry, build(drawn, entry)), differs)
 
 
 @lru_cache(maxsize=1)
 def _job_of(source: Source) -> Job:
-    """The job that flew a campaign, kept from one of its runs to the next."""
+    """The job that flew a campaign, kept so that several of its runs share it."""
     return Job(source, source.read().table.campaign)
 
 
@@ -66,13 +66,13 @@ def _equal(a: Any, b: Any) -> bool:
 
 def hashes(text: str, where: str, folder: Path) -> dict[str, str]:
     """SHA-256 of the files that a scenario's text names, as modules or as tables of numbers."""
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
 
     def look(value: Any) -> None:
-        if isinstance(value, str) and value not in found:
+        if isinstance(value, str) and value not in digests:
             # Many strings are words, and some cannot name a file.
             with suppress(OSError, ValueError):
-                found[value] = hashlib.sha256(read_bytes(folder / value)).hexdigest()
+                digests[value] = hashlib.sha256(read_bytes(folder / value)).hexdigest()
         elif isinstance(value, dict):
             for key, item in value.items():
                 if key not in WORDS:
@@ -82,4 +82,4 @@ def hashes(text: str, where: str, folder: Path) -> dict[str, str]:
                 look(item)
 
     look(read_toml(text, where))
-    return found
+    return digests

@@ -40,7 +40,7 @@ Notice = Callable[[str, int], None]
 
 @dataclass(frozen=True)
 class Options:
-    """How a campaign is flown; nothing of it changes results. engine: None for all cores of this process."""
+    """How a campaign is flown; no option changes results. engine: None for all cores of this process."""
 
     engine: Engine | None = None
     resume: bool = False
@@ -51,8 +51,8 @@ class Options:
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with other entries of its [campaign] table, or with one; None leaves an entry as it is. InputError where
-    there is none, and nothing is said of what is drawn or how many runs there are."""
+    """The scenario with other entries of its [campaign] table, or with such a table; None leaves an entry as it is.
+    InputError where there is no such table and the entries lack distributions or the number of runs."""
     given = {key: value for key, value in changes.items() if value is not None}
     if scenario.table.campaign is None and not given.keys() & {"runs", "over"}:
         raise InputError(scenario.where, "campaign", "no [campaign] table", NO_TABLE)
@@ -60,7 +60,7 @@ def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
 
 def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
-    """The job of a campaign. InputError for whatever is wrong with it, before anything is flown."""
+    """The job of a campaign. InputError for any mistake in it, before anything is flown."""
     table = scenario.table.campaign
     job = Job(Source.of(scenario), table)
     reached: set[str] = set()
@@ -71,11 +71,11 @@ def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
         job.requirements(law)
         reached |= {key for key, places in job.lanes(law).moved.items() if places}
     for dispersion in job.dispersions:
-        told = dispersion.called
-        if told not in reached:
+        name = dispersion.called
+        if name not in reached:
             flown = f"law {laws[0]}" if len(laws) == 1 else "any law"
             raise InputError(
-                scenario.where, f'campaign.over."{told}"', f"changes nothing of what {flown} flies", "a key that reaches it"
+                scenario.where, f'campaign.over."{name}"', f"changes nothing of what {flown} flies", "a key that reaches it"
             )
     return job
 
@@ -140,7 +140,7 @@ def fly_campaign(
         threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
         taken = set[str]()
         results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken)) for result in results)
-    told = digest(store, runs)
+    sealed = digest(store, runs)
     totals = {
         "verdicts": {
             result.law: {verdict.name: verdict.outcome for verdict in result.verdicts}
@@ -150,10 +150,10 @@ def fly_campaign(
         "failed": {result.law: result.failed for result in results},
         "lost": {result.law: result.lost for result in results},
     }
-    store.finish(told, totals)
+    store.finish(sealed, totals)
     over = {one.called: in_words(one, table) for one in job.dispersions}
-    asked = job.requirements(laws[0])
-    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, told, seconds, flown, asked)
+    required = job.requirements(laws[0])
+    return CampaignResult(scenario.name, folder, runs, table.sampling, over, results, sealed, seconds, flown, required)
 
 
 def _fly_until_decided(store: Store, job: Job, take: Callable[[Sequence[Block]], None]) -> int:
@@ -175,23 +175,23 @@ def _check_decidable(job: Job) -> None:
     if not job.table.requirement:
         raise InputError(where, "campaign.requirement", "none", "at least one, to fly until it is decided")
     if job.table.sampling != "random":
-        found = show(job.table.sampling)
+        given = show(job.table.sampling)
         raise InputError(
-            where, "campaign.sampling", found, '"random", for only independent runs can be stopped by what they show'
+            where, "campaign.sampling", given, '"random", for only independent runs can be stopped by what they show'
         )
 
 
 def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int]]:
     for name in store.manifest.laws:
         missing = store.missing(name)
-        held = store.manifest.runs - sum(count for _, count in missing)
-        if notice is not None and held:
-            notice(name, held)
+        kept = store.manifest.runs - sum(count for _, count in missing)
+        if notice is not None and kept:
+            notice(name, kept)
         yield from ((name, first, count) for first, count in missing)
 
 
 def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
-    """Runs of a block: enough for each worker to have a few, and no more than memory has room for."""
+    """Runs of a block: enough blocks that each worker has a few, and no more runs than memory has room for."""
     most = CHUNK if at_once else SMALL
     if isinstance(engine, Workers):
         most = min(most, -(-runs // (4 * engine.count)))
@@ -203,10 +203,10 @@ def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
     given = table.over[dispersion.places[0].table]
     options = {"judged_apart": "known before flight", "known_to_law": "known to the law"}
     numbers = given.model_dump(exclude_defaults=True, exclude={"distribution", *options})
-    told = [
+    clauses = [
         name if value is True else f"{name} {value if isinstance(value, str) else show(value)}"
         for name, value in numbers.items()
     ]
-    told += [words for name, words in options.items() if getattr(given, name)]
-    told += ["not known to the law"] if dispersion.nominal_tables and not given.known_to_law else []
-    return ", ".join([given.distribution, *told])
+    clauses += [words for name, words in options.items() if getattr(given, name)]
+    clauses += ["not known to the law"] if dispersion.nominal_tables and not given.known_to_law else []
+    return ", ".join([given.distribution, *clauses])

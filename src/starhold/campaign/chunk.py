@@ -73,6 +73,6 @@ def _plain(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.isnan(values), np.nan, values + 0.0)
 
 
-def _check_shapes(held: dict[str, NDArray[Any]], more: dict[str, NDArray[Any]]) -> None:
-    if {name: values.shape for name, values in held.items()} != {name: values.shape for name, values in more.items()}:
-        raise ValueError(f"chunks of other names or shapes: {sorted(held)} and {sorted(more)}")
+def _check_shapes(ours: dict[str, NDArray[Any]], others: dict[str, NDArray[Any]]) -> None:
+    if {name: values.shape for name, values in ours.items()} != {name: values.shape for name, values in others.items()}:
+        raise ValueError(f"chunks of other names or shapes: {sorted(ours)} and {sorted(others)}")

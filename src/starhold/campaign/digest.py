@@ -16,10 +16,8 @@ from starhold.errors import InputError
 
 def digest(store: Store, runs: int | None = None) -> str:
     """SHA-256, in hexadecimal, of the results: law by law in the manifest's order, column by column in the order of names,
-    run by run; numbers as little-endian bytes, text as lengths and UTF-8; then counts and extremes.
-
-    runs: how many of each law are flown, where fewer than planned. InputError where they are not stored, or others are.
-    """
+    run by run; numbers as little-endian bytes, text as lengths and UTF-8; then counts and extremes. runs: the number of runs
+    of each law, where fewer than planned are flown. InputError where a chunk is missing or one too many is stored."""
     wanted = store.manifest.runs if runs is None else runs
     whole = hashlib.sha256(b"starhold campaign 1\n")
     for law in store.manifest.laws:

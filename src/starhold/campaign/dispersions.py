@@ -55,26 +55,26 @@ class Dispersion:
     def draw(self, u: Array) -> NDArray[Any]:
         """Values (columns, n), numbers or words, for uniforms u (dims, n) strictly between 0 and 1. InputError where a key
         refuses a number."""
-        found = self._drawn(u)
-        if self.wordy or not found.size:
-            return found
+        drawn = self._drawn(u)
+        if self.wordy or not drawn.size:
+            return drawn
         # Numbers beyond the bounds of a key are no craft's: a distribution that has them is no model of it.
-        for place, numbers in zip(self.places, np.split(found, len(self.places)), strict=True):
+        for place, numbers in zip(self.places, np.split(drawn, len(self.places)), strict=True):
             for extreme in (float(numbers.min()), float(numbers.max())):
                 try:
                     place.bounds.check(extreme)
                 except ValueError as error:
                     allowed = f"{str(error).removeprefix('must be ')}; a truncated-normal or uniform one keeps bounds"
                     raise place.refuse("", f"a draw of {extreme:g}", allowed) from None
-        return found
+        return drawn
 
     def _drawn(self, u: Array) -> NDArray[Any]:
         # Contiguous, so that the same machine code computes every cut of the same numbers.
-        found = self.distribution.draw(np.ascontiguousarray(u, dtype=np.float64))
-        return found if self.scale is None else np.array(self.scale)[:, None] * found
+        values = self.distribution.draw(np.ascontiguousarray(u, dtype=np.float64))
+        return values if self.scale is None else np.array(self.scale)[:, None] * values
 
     def possible(self, u: Array) -> NDArray[np.bool_]:
-        """Which of the draws (n,) for uniforms u (dims, n) their keys take, as far as bounds of each number tell."""
+        """Which of the draws (n,) for uniforms u (dims, n) the keys take, judged by the bounds of each number alone."""
         kept = np.ones(u.shape[1], dtype=bool)
         if self.wordy:
             return kept
@@ -89,11 +89,11 @@ class Dispersion:
         """The values by key, each (n, *shape), of columns (n,): the whole of symmetric matrices."""
         if not self.shape:
             return {key: np.asarray(columns[key]) for key in self.keys}
-        found = np.empty((len(columns[self.columns[0]]), *self.shape))
+        array = np.empty((len(columns[self.columns[0]]), *self.shape))
         for name, index in zip(self.columns, components(self.shape, self._symmetric), strict=True):
             for place in {index, index[::-1]} if self._symmetric else {index}:
-                found[(slice(None), *place)] = columns[name]
-        return {self.keys[0]: found}
+                array[(slice(None), *place)] = columns[name]
+        return {self.keys[0]: array}
 
     @property
     def _symmetric(self) -> bool:
@@ -102,11 +102,11 @@ class Dispersion:
     def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The change that gives the keys the values of one run, by column, for `Scenario.with_`."""
         arrays = self.arrays({name: np.asarray([values[name]]) for name in self.columns})
-        found: dict[str, Any] = {}
+        changes: dict[str, Any] = {}
         for place in self.places:
             (value,) = arrays[place.key].tolist()
-            found |= place.change(_plain(place, value))
-        return found
+            changes |= place.change(_plain(place, value))
+        return changes
 
 
 def _plain(place: Place, value: Any) -> Any:
@@ -117,18 +117,18 @@ def _plain(place: Place, value: Any) -> Any:
 
 
 def read_dispersions(scenario: Scenario, over: Mapping[str, Distribution]) -> tuple[Dispersion, ...]:
-    """The dispersions of a scenario's keys, from the tables of [campaign.over]. InputError where one of them cannot be."""
-    found: list[Dispersion] = []
+    """The dispersions of a scenario's keys, from the tables of [campaign.over]. InputError for a table that makes none."""
+    dispersions: list[Dispersion] = []
     taken: list[Place] = []
-    for told, table in over.items():
-        places = [replace(locate(scenario, key.strip()), table=told) for key in told.split(",")]
+    for keys, table in over.items():
+        places = [replace(locate(scenario, key.strip()), table=keys) for key in keys.split(",")]
         for place in places:
             same = next((other for other in taken if _overlap(place, other)), None)
             if same is not None:
                 raise place.refuse("", f"a second dispersion of {place.key}", f"one; there is that of {same.table}")
             taken.append(place)
-        found.append(_read(scenario, places, table))
-    return tuple(found)
+        dispersions.append(_read(scenario, places, table))
+    return tuple(dispersions)
 
 
 def _overlap(one: Place, other: Place) -> bool:
@@ -140,9 +140,9 @@ def _overlap(one: Place, other: Place) -> bool:
 def _read(scenario: Scenario, places: list[Place], table: Any) -> Dispersion:
     keys = [KeyReading.of(scenario, place, table) for place in places]
     if len(keys) > 1 and not table.SEVERAL:
-        found = f"{len(keys)} keys with the distribution {table.distribution}"
+        given = f"{len(keys)} keys with the distribution {table.distribution}"
         allowed = f"a table for each key; several together have the distribution {table.named('SEVERAL')}"
-        raise places[0].refuse("", found, allowed)
+        raise places[0].refuse("", given, allowed)
     return Dispersion(
         keys=tuple(place.key for place in places),
         columns=tuple(name for key in keys for name in key.columns),
@@ -155,11 +155,11 @@ def _read(scenario: Scenario, places: list[Place], table: Any) -> Dispersion:
 
 
 def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
-    """The raw tables for [nominal]: of what laws take the craft for or are designed with, and are not told. InputError for
-    `known_to_law` of what they cannot know, or not otherwise."""
+    """The raw tables for [nominal]: those that laws take the craft's numbers from, or are designed with, whose drawn values
+    laws are not told. InputError where `known_to_law` claims what laws cannot know, or denies what they always do."""
     scenario, table = readings[0].scenario, readings[0].table
     tables, body = read_toml(scenario.text, scenario.where), scenario.hooks
-    found: dict[str, Any] = {}
+    nominal: dict[str, Any] = {}
     for reading in readings:
         key, name = reading.place.key, str(reading.place.path[0])
         modelled = name in body.modelled or (name in body.designed and _designs(tables) and key not in scenario.table.shared)
@@ -169,8 +169,8 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
             raise reading.place.refuse("known_to_law", "true", "false, for no law is told it or designed with it")
         given = scenario.table.nominal
         if modelled and (name in given or not table.known_to_law):
-            found[name] = given.get(name, tables.get(name, {}))
-    return found
+            nominal[name] = given.get(name, tables.get(name, {}))
+    return nominal
 
 
 def _designs(tables: Mapping[str, Any]) -> bool:

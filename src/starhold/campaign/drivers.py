@@ -55,14 +55,14 @@ better by little."""
 
 @dataclass(frozen=True)
 class _Driver:
-    """A dependence that was looked at: `p` is its p-value by itself, `corrected` that among all that was looked at."""
+    """A dependence that was tested: `p` is its p-value by itself, `corrected` that among all tests."""
 
     p: float
     corrected: float
 
     @property
     def significant(self) -> bool:
-        """Tell whether chance is ruled out as an explanation, all that was looked at considered."""
+        """Tell whether chance is ruled out as an explanation, given the number of tests."""
         return self.corrected <= RISK
 
 
@@ -219,8 +219,8 @@ def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[Pai
 
 
 def _misfit(counts: NDArray, expected: Array, axes: tuple[int, ...]) -> Array:
-    """Return how far counts are from what is expected, chi-square by chance: the lesser of the likelihood ratio and
-    Pearson's statistic. They agree for many runs; for few the one or the other exaggerates."""
+    """Return how far counts are from those expected, chi-square by chance: the lesser of the likelihood ratio and Pearson's
+    statistic. They agree for many runs; for few, one or the other exaggerates."""
     ratio = 2.0 * special.rel_entr(counts, expected).sum(axes)
     deviation = np.divide((counts - expected) ** 2, expected, out=np.zeros_like(expected), where=expected > 0.0)
     return np.minimum(ratio, deviation.sum(axes))
@@ -282,12 +282,12 @@ Correlate: TypeAlias = Callable[[Array], tuple[float, float]]
 """From a metric's ranks (n,), less their mean, to the strength of a dependence and its p-value."""
 
 
-def _rank_correlation(own: Array) -> Correlate | None:
+def _rank_correlation(values: Array) -> Correlate | None:
     """Return Spearman's correlation with an input's ranks (n,); None where they are all equal."""
-    n, norm = len(own), _product(own, own)
+    n, norm = len(values), _product(values, values)
 
     def correlate(ranks: Array) -> tuple[float, float]:
-        strength = max(-1.0, min(1.0, _product(own, ranks) / math.sqrt(norm * _product(ranks, ranks))))
+        strength = max(-1.0, min(1.0, _product(values, ranks) / math.sqrt(norm * _product(ranks, ranks))))
         return strength, float(special.betainc(0.5 * n - 1.0, 0.5, 1.0 - strength**2))
 
     return correlate if norm > 0.0 else None
@@ -319,7 +319,7 @@ def _holm(chances: Array) -> Array:
 
 
 def _remark(failures: int, passed: int, bins: int) -> str:
-    """Tell what is not looked at, for too few runs."""
+    """Tell which tests are left out, for too few runs."""
     if failures < LEAST:
         return f"too few failures to say what drives them: {failures}, where {LEAST} are the least"
     if passed < LEAST:

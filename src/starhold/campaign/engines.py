@@ -116,8 +116,8 @@ def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool) -> Iterator[Chunk
 
 
 def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> Iterator[Chunk]:
-    """Blocks of workers that return what they should. Of the first block of each worker, and of others as long as that
-    takes little time, the first run is flown here again, to the same bits. InputError where anything is otherwise."""
+    """Blocks whose results are found right. Of the first block of each worker, and of others as long as that takes little
+    time, the first run is flown here again and must give the same bits; else InputError."""
     begun, spent, seen = time.monotonic(), 0.0, set[str]()
     columns: dict[str, dict[str, str]] = {}
     with ThreadPool(1) as pool:
@@ -132,9 +132,9 @@ def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> It
                 started = time.monotonic()
                 again = job(law, first, 1, pool)()
                 spent += time.monotonic() - started
-                if told := _differing(result, again):
+                if names := _differing(result, again):
                     raise InputError(
-                        name, who, f"other numbers in run {first} of {law} ({told})", f"those of this machine; {_KEPT}"
+                        name, who, f"other numbers in run {first} of {law} ({names})", f"those of this machine; {_KEPT}"
                     )
             yield result
 
@@ -155,16 +155,16 @@ def _kinds(chunk: Chunk) -> dict[str, str]:
 
 
 def _differing(chunk: Chunk, again: Chunk) -> str:
-    """Columns in which the first run of a chunk is another than the one that was flown again."""
+    """Columns whose first value differs from that of the same run flown here."""
     if _kinds(chunk) != _kinds(again):
         return "which has other columns"
     pairs = {name: (chunk.rows[name][:1], values[:1]) for name, values in again.rows.items()}
-    found = [name for name, (one, other) in pairs.items() if _bits(one) != _bits(other)]
-    return ", ".join(found[:4])
+    names = [name for name, (one, other) in pairs.items() if _bits(one) != _bits(other)]
+    return ", ".join(names[:4])
 
 
 def _bits(values: NDArray[Any]) -> Any:
-    """Tell what must be the same: machines need not agree on the bits of what is no number."""
+    """Bytes that must be equal; NaN counts as one value, for machines need not agree on its bits."""
     if values.dtype.kind == "f":
         values = np.where(np.isnan(values), np.nan, values)
     return values.tolist() if values.dtype.kind in "OU" else values.tobytes()
@@ -188,16 +188,16 @@ def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> _Told
     try:
         job = _unpacked(packed)
     except ImportError as error:
-        told = f"cannot read the campaign: {error}; it needs the packages that are here"
-        return who, InputError("a worker", "", "", told)
+        message = f"cannot read the campaign: {error}; it needs the packages that are here"
+        return who, InputError("a worker", "", "", message)
     try:
         with ThreadPool(1) as pool:
             return who, job(law, first, count, pool)()
     except InputError as error:
         return who, error.with_traceback(None)
     except Exception as error:
-        told = f"failed in runs {first} to {first + count - 1} of {law}: {_in_a_line(error)}; {_KEPT}"
-        return who, InputError("a worker", who, "", told)
+        message = f"failed in runs {first} to {first + count - 1} of {law}: {_in_a_line(error)}; {_KEPT}"
+        return who, InputError("a worker", who, "", message)
 
 
 def _in_a_line(error: BaseException) -> str:
@@ -245,7 +245,7 @@ class _Cluster:
             raise self._lost("the scheduler does not answer") from None
 
     def _next(self, done: SimpleQueue[Any]) -> Any:
-        """One that has ended; InputError once there is nobody left to end one."""
+        """A task that has ended; InputError once no worker is left to end one."""
         alone = 0.0
         while True:
             try:
@@ -254,14 +254,14 @@ class _Cluster:
                 alone = self._still_alone(alone)
 
     def _still_alone(self, alone: float) -> float:
-        """Seconds without any worker, after so many and one more look; InputError once there were enough."""
+        """Seconds without any worker, counted on by one more look; InputError once there were enough."""
         alone = alone + _LOOK if self._threads() == 0 else 0.0
         if alone >= self.patience:
             raise self._lost(f"no worker for {self.patience:g} s")
         return alone
 
     def _result(self, future: Any, distributed: Any) -> _Told:
-        """The result of one that has ended, which is flown again where its worker was lost before it could be had."""
+        """The result of a task that has ended; it is flown again where its worker was lost before the result was fetched."""
         alone = 0.0
         try:
             while True:
@@ -310,14 +310,14 @@ def _check_versions(cluster: _Cluster) -> None:
         if time.monotonic() > end:
             raise InputError(cluster.name, "", "", f"no worker for {cluster.patience:g} s")
         time.sleep(0.1)
-    told = cluster.client.get_versions()
-    here = _compared(told["client"])
-    for machine, versions in [("the scheduler", told["scheduler"]), *told["workers"].items()]:
+    known = cluster.client.get_versions()
+    here = _compared(known["client"])
+    for machine, versions in [("the scheduler", known["scheduler"]), *known["workers"].items()]:
         for package, version in _compared(versions).items():
             if version != here[package]:
                 raise InputError(cluster.name, machine, f"{package} {version}", f"{here[package]}, as here")
-    found = cluster.client.run(pkgutil.resolve_name, "starhold.version:__version__", on_error="return")
-    for machine, version in found.items():
+    versions_there = cluster.client.run(pkgutil.resolve_name, "starhold.version:__version__", on_error="return")
+    for machine, version in versions_there.items():
         if version != __version__:
             shown = f"starhold {version}" if isinstance(version, str) else "no starhold"
             raise InputError(cluster.name, machine, shown, f"{__version__}, as here")
@@ -332,7 +332,7 @@ def _compared(versions: Any) -> dict[str, str]:
 
 @contextmanager
 def _quiet() -> Generator[None]:
-    """Without Dask's log and warnings, for what they tell is told in one line, or is no news."""
+    """Without Dask's log and warnings, which errors of one line replace, or which are no news."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "tornado")]
     handlers = {handler for name in ("distributed", *names) for handler in logging.getLogger(name).handlers}
     levels = [(handler, handler.level) for handler in handlers]
@@ -350,12 +350,12 @@ def _quiet() -> Generator[None]:
 def engine_of(threads: int | None, workers: int | None, scheduler: str | None) -> Engine | None:
     """The engine that is asked for; None where none is. InputError for more than one, and for less than one thread or
     process."""
-    asked = {"threads": threads, "workers": workers, "scheduler": scheduler}
-    given = [name for name, value in asked.items() if value is not None]
+    options = {"threads": threads, "workers": workers, "scheduler": scheduler}
+    given = [name for name, value in options.items() if value is not None]
     if len(given) > 1:
         raise InputError("campaign", given[1], f"beside {given[0]}", "one of threads, workers and scheduler")
     for name in ("threads", "workers"):
-        count = asked[name]
+        count = options[name]
         if count is not None and int(count) < 1:
             raise InputError("campaign", name, str(count), "at least 1")
     if scheduler is not None:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from starhold.analysis.meter import Array, Window
 
 FINE = 4
-"""Binary digits by which a bin of an octave is told: sixteen bins."""
+"""Binary digits of the mantissa that number the bins of an octave: sixteen bins."""
 LEAST, OCTAVES = -90, 110
-"""The noted numbers are told apart from 2^LEAST on, over so many octaves; what is less or more falls in the end bins."""
+"""Notes are binned from 2^LEAST on, over so many octaves; what is less or more falls in the end bins."""
 BINS = OCTAVES << FINE
 _SHIFT = 52 - FINE
 _FIRST = (1023 + LEAST) << FINE
@@ -42,15 +42,15 @@ def count(windows: Array) -> tuple[NDArray[np.int64], Array, Array]:
     """The histogram (windows, quantities, BINS) and the extremes (windows, quantities) of noted numbers, none below zero,
     (windows, quantities, lanes)."""
     shape = windows.shape[:2]
-    found = np.zeros((*shape, BINS), dtype=np.int64)
+    counts = np.zeros((*shape, BINS), dtype=np.int64)
     if not windows.shape[2]:
-        return found, np.full(shape, np.nan), np.full(shape, np.nan)
+        return counts, np.full(shape, np.nan), np.full(shape, np.nan)
     # The leading bits of a double, exponent and all, number the bins.
     bins = (np.ascontiguousarray(windows).view(np.int64) >> _SHIFT) - _FIRST
     np.clip(bins, 0, BINS - 1, out=bins)
     for row in np.ndindex(shape):
-        found[row] = np.bincount(bins[row], minlength=BINS)
-    return found, windows.min(axis=2), windows.max(axis=2)
+        counts[row] = np.bincount(bins[row], minlength=BINS)
+    return counts, windows.min(axis=2), windows.max(axis=2)
 
 
 def edges() -> Array:
@@ -71,8 +71,8 @@ def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array)
     low, high = np.maximum(sides[place], least), np.minimum(sides[place + 1], most)
     part = ((wanted - before + 0.5) / np.maximum(inside, 1)).clip(0.0, 1.0)
     # Not from the low end alone, for a bin that holds the infinite has no width.
-    found = np.where(low == high, low, low * (1.0 - part) + high * part)
-    return np.where(total > 0, np.clip(found, least, most), np.nan)
+    values = np.where(low == high, low, low * (1.0 - part) + high * part)
+    return np.where(total > 0, np.clip(values, least, most), np.nan)
 
 
 def read(
@@ -81,8 +81,8 @@ def read(
     """The envelopes of quantities by name: histograms (windows, quantities, BINS) and extremes (windows, quantities) of
     what was noted, and the times (s) at which windows end."""
     low, median, high = (quantile(counts, share, least, most) for share in (0.05, 0.5, 0.95))
-    found: list[Envelope] = []
+    envelopes: list[Envelope] = []
     for place, (name, window) in enumerate(windows.items()):
         noted = (values[:, place] for values in (least, low, median, high, most))
-        found.append(Envelope(name, window.unit, window.meaning, times, *map(window.value, noted)))
-    return tuple(found)
+        envelopes.append(Envelope(name, window.unit, window.meaning, times, *map(window.value, noted)))
+    return tuple(envelopes)

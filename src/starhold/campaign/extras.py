@@ -1,4 +1,4 @@
-"""Packages that campaigns alone need, imported when they are used."""
+"""Packages that only campaigns need, imported when they are used."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class Source:
 
 @dataclass
 class Job:
-    """Flies the runs of a campaign; small when pickled, whoever flies reads the scenario once."""
+    """Flies the runs of a campaign; small when pickled: each process reads the scenario anew, once."""
 
     source: Source
     table: CampaignTable
@@ -88,15 +88,15 @@ class Job:
         return self._lanes[law]
 
     def meter(self, law: str) -> Meter:
-        """The meter of a law as the scenario has it, made when it is first asked for. InputError where it cannot be measured
-        what is asked."""
+        """The meter of a law as the scenario has it, made when it is first asked for. InputError where a metric asked for
+        cannot be measured."""
         if law not in self._meters:
             loop = build(self.scenario, self.scenario.pick(law))
             self._meters[law] = self._meter_of(loop, loop.gains)
         return self._meters[law]
 
     def _meter_of(self, loop: ClosedLoop, gains: Any) -> Meter:
-        """The meter of lanes of a loop; gains: with an array (lanes,) in place of a number that differs."""
+        """The meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
         required = self.table.requirement
         extras, cones = extras_of(required, self.table.metrics), cones_of(required)
         try:
@@ -110,7 +110,7 @@ class Job:
         return read_requirements(self.table.requirement, self.meter(law).units, self.source.where)
 
     def __call__(self, law: str, first: int, count: int, pool: ThreadPool) -> Callable[[], Chunk]:
-        """Begin to fly runs first .. first+count-1 of a law; what is returned waits for their results."""
+        """Begin to fly runs first .. first+count-1 of a law; the function returned waits for their results."""
         runs = np.arange(first, first + count)
         columns = self.plan.columns(first, count)
         histogram: Any = 0
@@ -140,15 +140,15 @@ class Job:
         return finish
 
     def _telling(self, law: str) -> Progress | None:
-        """Return what tells of the runs of a block as they are flown, lot after lot."""
+        """Return the function that reports how many runs of a block are flown, lot after lot."""
         if self.progress is None:
             return None
-        tell, told, whole = self.progress, [0], [0]
+        tell, reported, whole = self.progress, [0], [0]
 
         def progress(done: int, lanes: int) -> None:
             now = whole[0] + done
-            tell(law, now - told[0])
-            told[0] = now
+            tell(law, now - reported[0])
+            reported[0] = now
             if done == lanes:
                 whole[0] += lanes
 
@@ -164,25 +164,27 @@ class Job:
         progress: Progress | None = None,
         refused: NDArray[np.bool_] | None = None,
     ) -> Callable[[], Metrics]:
-        """Begin to fly runs of a law. What is returned waits for their metrics and the numbers read back, (lanes,), by name.
-        columns: what was drawn; runs: their numbers, which number their random ones; take: called with metrics and windows
-        of each lot; refused: as `Lanes.lots` takes it, without numbers for lanes marked there."""
-        under_way = [(at, told, self._begin(lot, pool)) for lot, at, told in self.lanes(law).lots(columns, runs, refused)]
+        """Begin to fly runs of a law; the function returned waits for their metrics and the numbers read back, (lanes,), by
+        name. columns: the drawn values; runs: the runs' numbers, which also number their random draws; take: called with
+        metrics and windows of each lot; refused: as `Lanes.lots` takes it, lanes marked there having no numbers."""
+        under_way = [
+            (at, numbers, self._begin(lot, pool)) for lot, at, numbers in self.lanes(law).lots(columns, runs, refused)
+        ]
 
         def finish() -> Metrics:
-            found: Metrics = {}
-            for at, told, flown in under_way:
+            gathered: Metrics = {}
+            for at, numbers, flown in under_way:
                 metrics, windows = flown(progress)
                 take(metrics, windows)
-                for name, values in (told | metrics).items():
-                    found.setdefault(name, np.full(len(runs), np.nan))[at] = values
-            return found
+                for name, values in (numbers | metrics).items():
+                    gathered.setdefault(name, np.full(len(runs), np.nan))[at] = values
+            return gathered
 
         return finish
 
     def _begin(self, lot: Lot, pool: ThreadPool) -> Callable[[Progress | None], tuple[Metrics, Any]]:
-        """Begin to fly a lot; what is returned waits for its metrics (lanes,), and for what was noted in windows (windows,
-        quantities, lanes)."""
+        """Begin to fly a lot; the function returned waits for its metrics (lanes,), and for the notes of its windows
+        (windows, quantities, lanes)."""
         meter = self._meter_of(lot.loop, lot.phases[0].gains)
         lanes, runs = len(lot.runs), lot.runs
         along = bool((np.diff(runs) == 1).all())
@@ -208,7 +210,7 @@ class Job:
 
 
 def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scenario:
-    """The scenario of one run as a file of its own: what was drawn, in columns (1,), in the places of what was to be, the
+    """The scenario of one run as a file of its own: the drawn values, in columns (1,), in place of the distributions, the
     number of the run, and no campaign."""
     change = {**job.plan.change({name: values[0] for name, values in columns.items()}), "campaign": None}
     if hasattr(job.scenario.table.simulation, "run"):

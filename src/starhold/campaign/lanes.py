@@ -1,7 +1,7 @@
 """From drawn values to the numbers that kernels fly: of many runs at once where that gives the bits of each run's own
 scenario, else run by run.
 
-What a value moves among the numbers of a loop is told by no list: scenarios with other values are built, and compared.
+No list says which numbers of a loop a value moves: scenarios with other values are built, and compared.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Lanes:
         others = variants(self._bare, (self.plan.change(one) for one in drawn))
         for run in runs:
             try:
-                # What is warned of a scenario is told of the file, not of each run.
+                # Warnings are about the file, not about each run.
                 with warnings.catch_warnings(action="ignore"):
                     other = next(others)
                     flat = Flat.of(build(other, other.pick(self.law)), self.steps)
@@ -126,7 +126,7 @@ class Lanes:
         looked = left[sorted({0, len(left) // 2})]
         if self.at_once and self._agrees(_some(columns, looked), runs[looked], refused is None):
             lot = self._together(_some(columns, left), runs[left])
-            yield lot, left, self._told(lot)
+            yield lot, left, self._readings(lot)
             return
         if refused is None:
             flats = dict(enumerate(self._each(columns, runs.tolist())))
@@ -139,7 +139,7 @@ class Lanes:
             groups.setdefault(flat.form, []).append(place)
         for places in groups.values():
             lot = self._apart([flats[place] for place in places], runs[places])
-            yield lot, np.array(places), self._told(lot)
+            yield lot, np.array(places), self._readings(lot)
 
     def moves(self, name: str) -> bool:
         """Whether a dispersion moves a number of this name, or more than numbers."""
@@ -153,31 +153,31 @@ class Lanes:
         return [run for run in range(self.plan.runs)[:TRIES] if any(more[n][run] != self.first[n][0] for n in names)][:2]
 
     def _moved_by(self, dispersion: Dispersion, more: Columns, others: Sequence[int]) -> set[int]:
-        """The places of numbers that differ where the values of one dispersion alone do, as in these other runs; more:
-        columns of the first runs."""
+        """The places of the numbers that change when the values of one dispersion alone change, as in these other runs;
+        more: columns of the first runs."""
         names = dispersion.columns
-        found: set[int] = set()
+        moved: set[int] = set()
         for run in others:
             flat = self.exact({**self.first, **{name: more[name][run : run + 1] for name in names}})
             self._varied.append(flat)
             if flat.form != self.base.form:
-                found.add(_FORM)
+                moved.add(_FORM)
             if flat.names == self.base.names:
                 apart = flat.numbers.view(np.int64) != self.base.numbers.view(np.int64)
-                found |= set(np.flatnonzero(apart).tolist())
+                moved |= set(np.flatnonzero(apart).tolist())
         # What differs in none of them may differ in another.
-        return found if others else {_FORM}
+        return moved if others else {_FORM}
 
     def _agrees(self, columns: Columns, runs: NDArray[np.int64], strict: bool = True) -> bool:
         """Whether the numbers of these runs, made at once, are those of each one's own scenario. InputError where one is
         refused; where that is not strict, they do not agree."""
         try:
-            found = np.array([*_numbers(self._together(columns, runs)).values()])
+            numbers = np.array([*_numbers(self._together(columns, runs)).values()])
         except (ValueError, TypeError):
             return False
         pairs = enumerate(runs.tolist())
         flats = self._each(columns, runs.tolist()) if strict else (self._tried(columns, *pair) for pair in pairs)
-        return all(self.base.gives(flat, found[:, lane]) for lane, flat in enumerate(flats))
+        return all(self.base.gives(flat, numbers[:, lane]) for lane, flat in enumerate(flats))
 
     def _by_key(self, columns: Columns) -> dict[str, Array]:
         """The values that are numbers, (components..., lanes), by key."""
@@ -191,14 +191,14 @@ class Lanes:
     @cached_property
     def _follows(self) -> dict[int, str]:
         """The columns that numbers are equal to, by the numbers' places, as far as the first run tells."""
-        found: dict[int, str] = {}
+        followed: dict[int, str] = {}
         for dispersion in self.plan.dispersions:
             for place in self.moved[dispersion.called] - {_FORM}:
                 number = self.base.numbers[place]
                 equal = [n for n in dispersion.columns if not dispersion.wordy and self.first[n][0] == number]
                 if equal:
-                    found[place] = equal[0]
-        return found
+                    followed[place] = equal[0]
+        return followed
 
     @cached_property
     def _equation(self) -> tuple[Compiled, list[str]]:
@@ -241,31 +241,31 @@ class Lanes:
         return Lot(runs, loop, np.ascontiguousarray(carries), tuple(phases))
 
     def _read_back(self) -> tuple[str, ...]:
-        """The names of numbers that show each dispersion: those that are its values, else all that it moves; of those that
-        are always equal, one, and rather what flies than what the law takes it for."""
+        """The names of numbers that show each dispersion: those that are its values, else all that it moves; where several
+        are always equal, one of them, of the flying craft rather than of the nominal model."""
         kept: list[int] = []
         alike = [flat for flat in self._varied if flat.names == self.base.names]
         for dispersion, places in zip(self.plan.dispersions, self.moved.values(), strict=True):
             moved = sorted(places - {_FORM}, key=lambda place: (self.base.names[place].startswith("nominal."), place))
             follow = {place: self._follows[place] for place in moved if place in self._follows}
-            told: set[bytes] = set()
+            seen: set[bytes] = set()
             for place in follow if {*dispersion.columns} <= {*follow.values()} else moved:
                 values = np.array([self.base.numbers[place], *(flat.numbers[place] for flat in alike)]).tobytes()
-                if values not in told:
-                    told.add(values)
+                if values not in seen:
+                    seen.add(values)
                     kept.append(place)
         return tuple(self.base.names[place] for place in sorted(set(kept)))
 
-    def _told(self, lot: Lot) -> dict[str, Array]:
-        """The numbers read back of a lot, from the arrays that fly; NaN where its form has no such number."""
-        found = _numbers(lot)
+    def _readings(self, lot: Lot) -> dict[str, Array]:
+        """The numbers of a lot that are read back, from the arrays that fly; NaN where its form has no such number."""
+        numbers = _numbers(lot)
         missing = np.full(len(lot.runs), np.nan)
-        return {f"flown.{shown_name(lot.loop, name)}": found.get(name, missing) for name in self.flown}
+        return {f"flown.{shown_name(lot.loop, name)}": numbers.get(name, missing) for name in self.flown}
 
 
 def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> tuple[Phase, ...]:
     """Phases with these rows (lanes,) by the places of the numbers that they replace; the first has the place `begin`."""
-    found: list[Phase] = []
+    changed: list[Phase] = []
     place = begin - 1
     before: Any = None
 
@@ -277,16 +277,16 @@ def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> t
         return rows.get(place, number)
 
     for phase in phases:
-        own = mapped(Numbers.of(phase), leaf)
-        found.append(phase._replace(**own._asdict(), before=own.craft if before is None else before))
-        before = own.craft
-    return tuple(found)
+        numbers = mapped(Numbers.of(phase), leaf)
+        changed.append(phase._replace(**numbers._asdict(), before=numbers.craft if before is None else before))
+        before = numbers.craft
+    return tuple(changed)
 
 
 def _numbers(lot: Lot) -> dict[str, Array]:
     """The numbers of a lot, each (lanes,), by their names as `Flat` has them."""
-    found = named_numbers(lot.loop, [*lot.carries], lot.phases)
-    return {name: np.broadcast_to(np.asarray(value, dtype=float), (len(lot.runs),)) for name, value in found.items()}
+    numbers = named_numbers(lot.loop, [*lot.carries], lot.phases)
+    return {name: np.broadcast_to(np.asarray(value, dtype=float), (len(lot.runs),)) for name, value in numbers.items()}
 
 
 def _some(columns: Columns, places: Sequence[int] | NDArray[np.int64]) -> dict[str, NDArray[Any]]:

@@ -54,7 +54,7 @@ class Manifest:
     allow_unstable: bool = False
 
     def determining(self) -> dict[str, Any]:
-        """Everything that results depend on, by the keys that differences are told with."""
+        """Everything that results depend on, by the keys that differences name."""
         settings = cast(dict[str, Any], plain(self.settings))
         settings.pop("runs", None)
         tables = _tables(self.text)
@@ -75,7 +75,7 @@ class Manifest:
 
     @classmethod
     def from_json(cls, text: str, where: str) -> Manifest:
-        """The manifest in a text; InputError where it is none, or was changed since it was written."""
+        """The manifest in a text; InputError where the text is none, or was changed since it was written."""
         try:
             data = json.loads(text)
             # Whatever bears its seal has the types that were written.
@@ -89,10 +89,10 @@ class Manifest:
 
     def difference(self, old: Manifest) -> str | None:
         """The first difference from an older manifest that changes results, such as `campaign.seed: 2, was 1`; else None."""
-        new, held = self.determining(), old.determining()
-        for key in dict.fromkeys((*new, *held)):
-            if found := difference(new.get(key, _MISSING), held.get(key, _MISSING), key):
-                return found
+        new, kept = self.determining(), old.determining()
+        for key in dict.fromkeys((*new, *kept)):
+            if sentence := difference(new.get(key, _MISSING), kept.get(key, _MISSING), key):
+                return sentence
         return None
 
 
@@ -115,13 +115,13 @@ def difference(new: Any, old: Any, key: str) -> str | None:
         mine, theirs = cast(dict[str, Any], new), cast(dict[str, Any], old)
         for name in dict.fromkeys((*mine, *theirs)):
             below = f"{key}.{_quoted(name)}" if key else _quoted(name)
-            if found := difference(mine.get(name, _MISSING), theirs.get(name, _MISSING), below):
-                return found
+            if sentence := difference(mine.get(name, _MISSING), theirs.get(name, _MISSING), below):
+                return sentence
         return None
     if isinstance(new, list) and isinstance(old, list) and len(cast(list[Any], new)) == len(cast(list[Any], old)):
         pairs = zip(cast(list[Any], new), cast(list[Any], old), strict=True)
-        told = (difference(mine, theirs, f"{key}[{number}]") for number, (mine, theirs) in enumerate(pairs, 1))
-        return next((found for found in told if found), None)
+        sentences = (difference(mine, theirs, f"{key}[{number}]") for number, (mine, theirs) in enumerate(pairs, 1))
+        return next((sentence for sentence in sentences if sentence), None)
     mine, theirs = _written(new), _written(old)
     if mine == theirs:
         return None
@@ -134,9 +134,9 @@ def difference(new: Any, old: Any, key: str) -> str | None:
 
 
 def _seal(content: Mapping[str, Any]) -> str:
-    """SHA-256, in hexadecimal, of all that a manifest's file says, but for the folder: a scenario may be moved."""
-    told = {key: value for key, value in content.items() if key != "folder"}
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+    """SHA-256, in hexadecimal, of all that a manifest's file says but its folder, for a scenario may be moved."""
+    sealed = {key: value for key, value in content.items() if key != "folder"}
+    return hashlib.sha256(json.dumps(sealed, sort_keys=True).encode()).hexdigest()
 
 
 def _tables(text: str) -> dict[str, Any]:

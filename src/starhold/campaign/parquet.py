@@ -40,8 +40,8 @@ def encode(chunk: Chunk, fingerprint: str) -> bytes:
 
 def belongs(path: Path, law: str, first: int, count: int, fingerprint: str) -> bool:
     """Whether a file holds just these runs of this law in the campaign of this fingerprint."""
-    held, told = extra("pyarrow.parquet").read_metadata(path).num_rows, _metadata(path)
-    return (held, told.get(LAW), told.get(FIRST), told.get(FINGERPRINT)) == (count, law, str(first), fingerprint)
+    rows, metadata = extra("pyarrow.parquet").read_metadata(path).num_rows, _metadata(path)
+    return (rows, metadata.get(LAW), metadata.get(FIRST), metadata.get(FINGERPRINT)) == (count, law, str(first), fingerprint)
 
 
 def names(path: Path) -> tuple[str, ...]:
@@ -58,13 +58,13 @@ def read(path: Path, columns: list[str]) -> dict[str, NDArray[Any]]:
 
 def added_up(path: Path) -> tuple[Counts, Extremes]:
     """The counts and the extremes of the file's chunk."""
-    told = _metadata(path)
-    return cast(Counts, _unpack(told[COUNTS])), cast(Extremes, _unpack(told[EXTREMES]))
+    metadata = _metadata(path)
+    return cast(Counts, _unpack(metadata[COUNTS])), cast(Extremes, _unpack(metadata[EXTREMES]))
 
 
 def _metadata(path: Path) -> dict[str, str]:
-    found = extra("pyarrow.parquet").read_metadata(path).metadata or {}
-    return {key.decode(): value.decode() for key, value in found.items()}
+    metadata = extra("pyarrow.parquet").read_metadata(path).metadata or {}
+    return {key.decode(): value.decode() for key, value in metadata.items()}
 
 
 def _is_text(values: NDArray[Any]) -> bool:

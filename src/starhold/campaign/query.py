@@ -35,14 +35,14 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
         if tell is None:
             raise InputError("query", "", "", line)
         tell(line)
-    held = [law for law in files if files[law]]
-    if not held:
+    flown = [law for law in files if files[law]]
+    if not flown:
         raise InputError(str(folder), "", "no runs", "a folder with flown runs")
     with duckdb.connect(":memory:", config=_CLOSED) as connection:
         # Through Arrow, so that DuckDB itself needs no access to files, not even to these, which it could write as well.
-        for number, law in enumerate(held):
+        for number, law in enumerate(flown):
             connection.register(f"chunks {number}", dataset.dataset(files[law], format="parquet"))
-        parts = [f'SELECT {_quoted(law)} AS law, * FROM "chunks {number}"' for number, law in enumerate(held)]
+        parts = [f'SELECT {_quoted(law)} AS law, * FROM "chunks {number}"' for number, law in enumerate(flown)]
         connection.execute(f"CREATE VIEW runs AS {' UNION ALL BY NAME '.join(parts)}")
         connection.execute("SET lock_configuration = true")
         try:
@@ -67,5 +67,5 @@ def _check(connection: Any, sql: str, duckdb: Any) -> None:
 
 def _short(message: str) -> str:
     """DuckDB's message without the repetition of the question, as one line."""
-    told = message.partition("\n\nLINE ")[0]
-    return "; ".join(line.strip() for line in told.splitlines() if line.strip())
+    reason = message.partition("\n\nLINE ")[0]
+    return "; ".join(line.strip() for line in reason.splitlines() if line.strip())

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ALMOST = 0.9
-"""A bin has at least so much of the share it must have; runs do not divide evenly."""
+"""A bin has at least this part of the share asked for; runs do not divide evenly."""
 
 
 class Column:
@@ -42,12 +42,12 @@ class Column:
         ranks = self.ranks(np.ones(len(self.values), bool))
         codes = np.minimum((ranks / len(ranks) + 0.5) * bins, bins - 1).astype(np.int32)
         # Many equal values leave bins uneven: neighbours are joined until each has its share.
-        joined, held, shares = [], 0.0, np.bincount(codes, minlength=bins) / len(codes)
+        joined, filled, shares = [], 0.0, np.bincount(codes, minlength=bins) / len(codes)
         for share in shares:
-            joined.append(joined[-1] + (held >= ALMOST * least) if joined else 0)
-            held = share if held >= ALMOST * least else held + share
+            joined.append(joined[-1] + (filled >= ALMOST * least) if joined else 0)
+            filled = share if filled >= ALMOST * least else filled + share
         codes = np.array(joined, dtype=np.int32)[codes]
-        if held < ALMOST * least:
+        if filled < ALMOST * least:
             codes = np.minimum(codes, max(0, joined[-1] - 1))
         last = int(codes.max())
         ends = [(self.values[codes == code].min(), self.values[codes == code].max()) for code in range(last + 1)]

@@ -52,8 +52,8 @@ class Requirement:
 
 def cones_of(tables: Sequence[RequirementTable]) -> dict[str, Cone]:
     """The cones that requirements ask for, by the names of their metrics; axes and directions of unit length."""
-    asked = [table for table in tables if table.metric == CONE]
-    return {_cone_column(table): Cone(_unit(table.axis), _unit(table.direction)) for table in asked}
+    cones = [table for table in tables if table.metric == CONE]
+    return {_cone_column(table): Cone(_unit(table.axis), _unit(table.direction)) for table in cones}
 
 
 def _cone_column(table: RequirementTable) -> str:
@@ -63,14 +63,14 @@ def _cone_column(table: RequirementTable) -> str:
 
 def extras_of(tables: Sequence[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
     """The metrics, or kinds of them, beyond the usual that are to be measured: those asked for, and those required."""
-    asked = {*more, *(extra for table in tables for extra in EXTRAS if extra in table.metric)}
-    return tuple(extra for extra in (*EXTRAS, *sorted(asked - {*EXTRAS})) if extra in asked)
+    wanted = {*more, *(extra for table in tables for extra in EXTRAS if extra in table.metric)}
+    return tuple(extra for extra in (*EXTRAS, *sorted(wanted - {*EXTRAS})) if extra in wanted)
 
 
 def read_requirements(tables: Sequence[RequirementTable], units: Mapping[str, str], where: str) -> tuple[Requirement, ...]:
     """The requirements of tables; units: those of the metrics that are measured. InputError where one asks for what is not
     measured, or for no bound."""
-    found: list[Requirement] = []
+    requirements: list[Requirement] = []
     for number, table in enumerate(tables, 1):
         key = f"campaign.requirement[{number}]"
         column = table.metric
@@ -80,32 +80,32 @@ def read_requirements(tables: Sequence[RequirementTable], units: Mapping[str, st
             raise InputError(where, f"{key}.metric", show(table.metric), nearest(table.metric, [*units, LOST, CONE]))
         bound = _bound(table, units.get(column, "1"), where, key)
         at_most = table.at_least is None
-        found.append(
+        requirements.append(
             Requirement(
                 table.called, table.metric, column, units.get(column, "1"), bound, at_most, table.share, table.confidence
             )
         )
-    return tuple(found)
+    return tuple(requirements)
 
 
 def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
-    told = "at_least" if table.at_most is None else "at_most"
-    value = getattr(table, told)
+    side = "at_least" if table.at_most is None else "at_most"
+    value = getattr(table, side)
     if table.metric == LOST:
         if value is not None:
-            raise InputError(where, f"{key}.{told}", show(value), "no bound, for a motion is lost or not")
+            raise InputError(where, f"{key}.{side}", show(value), "no bound, for a motion is lost or not")
         return math.nan
-    if table.metric == CONE and (told == "at_most" or value is None):
+    if table.metric == CONE and (side == "at_most" or value is None):
         raise InputError(where, f"{key}.at_least", show(table.at_least), "the least angle between axis and direction")
     if value is None:
         raise InputError(where, key, "no bound", "at_most or at_least")
     if not isinstance(value, str | Real):
         allowed = f"one number, in {shown(unit)} or with its unit"
-        raise InputError(where, f"{key}.{told}", show(value), allowed)
+        raise InputError(where, f"{key}.{side}", show(value), allowed)
     try:
         return to_number(value, unit) if isinstance(value, str) else float(value)
     except ValueError as error:
-        raise InputError(where, f"{key}.{told}", show(value), str(error)) from None
+        raise InputError(where, f"{key}.{side}", show(value), str(error)) from None
 
 
 def _unit(vector: Any) -> Any:

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 Array: TypeAlias = NDArray[np.float64]
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""Of a metric's distribution: least, 5 %, quarter, median, three quarters, 95 %, largest."""
+"""Quantiles of a metric's distribution: least, 5 %, quarter, median, three quarters, 95 %, largest."""
 
 ROUNDING = 1e-12
-"""Share of a bound that the rounding of a flight may be beyond it."""
+"""Share of a bound by which rounding may carry a flight beyond it."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class LawResult:
 @dataclass(frozen=True)
 class CampaignResult:
     """A whole campaign, in its folder: the number of runs of each law, how they were sampled, the digest of its results
-    (SHA-256), the seconds that flying took this time, and how many runs were flown in them."""
+    (SHA-256), the seconds that flying took this time, and the number of runs flown in them."""
 
     name: str
     folder: Path
@@ -150,5 +150,5 @@ class CampaignResult:
         return fly_again(self.folder, run, law)
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{law.law}: {law.failed} of {law.runs} failed" for law in self.laws)
-        return f"<campaign {self.name}: {told}>"
+        failures = ", ".join(f"{law.law}: {law.failed} of {law.runs} failed" for law in self.laws)
+        return f"<campaign {self.name}: {failures}>"

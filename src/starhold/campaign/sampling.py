@@ -60,8 +60,8 @@ class Plan:
             raise self._refuse("sampling", show(self.sampling), "random, for nothing is dispersed")
         self._check_design()
 
-    def _refuse(self, key: str, found: str, allowed: str) -> InputError:
-        return InputError(self.where, f"campaign.{key}", found, allowed)
+    def _refuse(self, key: str, given: str, allowed: str) -> InputError:
+        return InputError(self.where, f"campaign.{key}", given, allowed)
 
     def _check_design(self) -> None:
         block, count = self.block, self.runs // self.block
@@ -87,15 +87,15 @@ class Plan:
 
     @property
     def factors(self) -> tuple[str, ...]:
-        """The names of the uniforms: of the column that one alone moves, or else of the key and its place from 1."""
-        found: list[str] = []
+        """The names of the uniforms: that of the column if it moves only one, else the key and its place from 1."""
+        names: list[str] = []
         for dispersion in self.dispersions:
-            told, dims = dispersion.called, dispersion.dims
+            name, dims = dispersion.called, dispersion.dims
             if dims > 1 and dispersion.distribution.independent:
-                found += dispersion.columns
+                names += dispersion.columns
             else:
-                found += [told] if dims == 1 else [f"{told} ({number} of {dims})" for number in range(1, dims + 1)]
-        return tuple(found)
+                names += [name] if dims == 1 else [f"{name} ({number} of {dims})" for number in range(1, dims + 1)]
+        return tuple(names)
 
     def unit(self, first: int, count: int) -> Array:
         """Uniforms (dims, count), strictly between 0 and 1, of the runs from `first` on."""
@@ -106,13 +106,13 @@ class Plan:
         if self.sampling == "random":
             return np.vstack([_random(self._key(one), one.dims, first, count) for one in self.dispersions])
         if self.sampling == "sobol":
-            found = _sobol(self.dims, self.seed, first, count)
+            points = _sobol(self.dims, self.seed, first, count)
         elif self.sampling == "latin-hypercube":
             keys = tuple((self._key(one), one.dims) for one in self.dispersions)
-            found = _latin_hypercube(keys, self.runs)[first : first + count]
+            points = _latin_hypercube(keys, self.runs)[first : first + count]
         else:
-            found = _design(self.sampling, self.dims, self.seed, self.runs // self.block)[first : first + count]
-        return np.clip(np.ascontiguousarray(found.T), INNERMOST, 1.0 - INNERMOST)
+            points = _design(self.sampling, self.dims, self.seed, self.runs // self.block)[first : first + count]
+        return np.clip(np.ascontiguousarray(points.T), INNERMOST, 1.0 - INNERMOST)
 
     def points(self) -> Array:
         """The points (runs, dims) of the whole design as its analysis takes them: of Morris's, its grid from 0 to 1."""
@@ -121,8 +121,8 @@ class Plan:
 
     def _key(self, dispersion: Dispersion) -> int:
         """128 bits that no other seed or dispersion has."""
-        told = f"starhold campaign {self.seed} {dispersion.called}"
-        return int.from_bytes(hashlib.sha256(told.encode()).digest()[:16], "little")
+        label = f"starhold campaign {self.seed} {dispersion.called}"
+        return int.from_bytes(hashlib.sha256(label.encode()).digest()[:16], "little")
 
     def columns(self, first: int, count: int) -> dict[str, NDArray[Any]]:
         """The drawn values, by column, each (count,), of the runs from `first` on. InputError where a key refuses one."""
@@ -130,14 +130,14 @@ class Plan:
 
     def values(self, unit: Array) -> dict[str, NDArray[Any]]:
         """The values by column, each (n,), for uniforms (dims, n). InputError where a key refuses one."""
-        found: dict[str, NDArray[Any]] = {}
-        for dispersion, own in self._each(unit):
-            found |= dict(zip(dispersion.columns, dispersion.draw(own), strict=True))
-        return found
+        columns: dict[str, NDArray[Any]] = {}
+        for dispersion, numbers in self._each(unit):
+            columns |= dict(zip(dispersion.columns, dispersion.draw(numbers), strict=True))
+        return columns
 
     def possible(self, unit: Array) -> NDArray[np.bool_]:
-        """For which of the uniforms (dims, n) no key refuses its value by its bounds."""
-        return np.logical_and.reduce([dispersion.possible(own) for dispersion, own in self._each(unit)])
+        """For which of the uniforms (dims, n) every key takes its value, judged by its bounds."""
+        return np.logical_and.reduce([dispersion.possible(numbers) for dispersion, numbers in self._each(unit)])
 
     def _each(self, unit: Array) -> Iterator[tuple[Dispersion, Array]]:
         begun = 0
@@ -148,13 +148,13 @@ class Plan:
     def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The change by which `Scenario.with_` gives the scenario of one run, from its values by column."""
         nominal = {name: table for one in self.dispersions for name, table in one.nominal_tables.items()}
-        found: dict[str, Any] = {f"nominal.{name}": table for name, table in nominal.items()}
+        changes: dict[str, Any] = {f"nominal.{name}": table for name, table in nominal.items()}
         for dispersion in self.dispersions:
-            own = dispersion.change(values)
-            found |= own
+            changed = dispersion.change(values)
+            changes |= changed
             if dispersion.distribution.known_to_law or not dispersion.nominal_tables:
-                found |= {f"nominal.{key}": value for key, value in own.items() if path_of(key, {}, "")[0] in nominal}
-        return found
+                changes |= {f"nominal.{key}": value for key, value in changed.items() if path_of(key, {}, "")[0] in nominal}
+        return changes
 
 
 def _random(key: int, dims: int, first: int, count: int) -> Array:

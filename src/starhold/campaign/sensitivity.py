@@ -128,8 +128,8 @@ def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 
         return Refused(f"{size} pair of points, two are the least")
     blocks = values.reshape(size, -1)
     first, total = _estimates(blocks)
-    own = np.arange(size) // (size // groups)
-    less = np.array([_estimates(blocks[own != left]) for left in range(groups)])
+    group_of = np.arange(size) // (size // groups)
+    less = np.array([_estimates(blocks[group_of != left]) for left in range(groups)])
     if not np.isfinite(less).all():
         return Refused("too few runs have another value than the rest")
     spread = np.sqrt((groups - 1) * less.var(0))

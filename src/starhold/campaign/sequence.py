@@ -120,7 +120,7 @@ def failures_to_meet(share: float, confidence: float, runs: int) -> int | None:
 
 
 def least(holds: Callable[[int], bool], start: int) -> int:
-    """Return the least whole number from `start` on for which something holds that holds for all greater ones as well."""
+    """Return the least whole number, from `start` on, from which on something holds for all numbers."""
     low, step = start - 1, 1
     while not holds(low + step):
         low, step = low + step, 2 * step
@@ -132,9 +132,10 @@ def least(holds: Callable[[int], bool], start: int) -> int:
 
 
 def greatest(holds: Callable[[int], bool], end: int) -> int | None:
-    """Return the greatest whole number from 0 to `end` for which something holds that holds for all smaller ones as well."""
-    found = least(lambda number: number > end or not holds(number), 0) - 1
-    return None if found < 0 else found
+    """Return the greatest whole number from 0 to `end` up to which something holds for all numbers; None where it does not
+    hold for 0."""
+    last = least(lambda number: number > end or not holds(number), 0) - 1
+    return None if last < 0 else last
 
 
 def _edge(ruled_out: Callable[[float], bool], inside: float, outside: float) -> float:

@@ -67,15 +67,15 @@ class Store:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             _claim(folder)
-            held = [mark for mark in MARKS if (folder / mark).exists()]
-            if held and not force:
+            marks = [mark for mark in MARKS if (folder / mark).exists()]
+            if marks and not force:
                 allowed = "another folder with -o, --force, or --resume"
-                raise InputError(str(folder), "", f"a campaign already there ({held[0]})", allowed)
+                raise InputError(str(folder), "", f"a campaign already there ({marks[0]})", allowed)
             # They may be of another command, or of the user.
             beside = [path for pattern in BESIDE for path in folder.glob(pattern)]
             if beside and not force:
-                found = f"results already there ({beside[0].relative_to(folder)})"
-                raise InputError(str(folder), "", found, "another folder with -o, or --force")
+                given = f"results already there ({beside[0].relative_to(folder)})"
+                raise InputError(str(folder), "", given, "another folder with -o, or --force")
             _clear(folder)
         except OSError as error:
             raise InputError(str(folder), "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
@@ -106,8 +106,10 @@ class Store:
             raise InputError(str(self.folder), "", "", f"cannot be written: {error.strerror}") from None
         # Read again: until the claim, another process may have written.
         old = Store.open(self.folder).manifest
-        if told := manifest.difference(old):
-            raise InputError(str(self.folder), "", "", f"{told}; resume what was begun, or begin again with another -o")
+        if difference := manifest.difference(old):
+            raise InputError(
+                str(self.folder), "", "", f"{difference}; resume what was begun, or begin again with another -o"
+            )
         if manifest.runs < old.runs:
             raise InputError(str(self.folder), "", "", f"campaign.runs: {manifest.runs}, was {old.runs}; as many, or more")
         self.manifest = replace(manifest, columns=old.columns)
@@ -171,7 +173,7 @@ class Store:
         except InputError as error:
             raise InputError(error.where, error.key, error.given, error.allowed + _KEPT) from None
         kept = self.files(chunk.law)
-        if all(held.path != path for held in kept):
+        if all(other.path != path for other in kept):
             kept.append(replace(file, path=path))
             kept.sort(key=lambda file: file.first)
 
@@ -226,8 +228,8 @@ class Store:
     def _listed(self, law: str) -> list[ChunkFile]:
         """Files that are named as chunks are."""
         place = self.folder / RUNS / law
-        found = [(path, _NAME.fullmatch(path.name)) for path in (place.iterdir() if place.is_dir() else ())]
-        return [ChunkFile(path, int(match[1]), int(match[2])) for path, match in found if match]
+        matches = [(path, _NAME.fullmatch(path.name)) for path in (place.iterdir() if place.is_dir() else ())]
+        return [ChunkFile(path, int(match[1]), int(match[2])) for path, match in matches if match]
 
     def _fault(self, file: ChunkFile, law: str, kept: list[ChunkFile]) -> str:
         """Why a chunk is unusable, or nothing."""
@@ -261,7 +263,7 @@ class Store:
         known = self.manifest.columns.get(chunk.law, tuple(chunk.rows))
         if set(known) != set(chunk.rows):
             raise ValueError(f"columns of {chunk.law} that not all chunks have: {sorted(set(known) ^ set(chunk.rows))}")
-        if any(held.first <= last and chunk.first <= held.last for held in self.files(chunk.law)):
+        if any(other.first <= last and chunk.first <= other.last for other in self.files(chunk.law)):
             raise ValueError(f"stored already: {chunk.law}, some of the runs {chunk.first} to {last}")
         return ChunkFile(self.folder, chunk.first, last)
 

@@ -40,16 +40,16 @@ def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool =
     columns = {law: store.each_column([name for name in units if name in job.meter(law).units], law) for law in laws}
     for name, unit in units.items():
         # All laws at once, for histograms that stand side by side.
-        found = {law: next(columns[law]) for law in laws if name in job.meter(law).units}
-        for law, spread in zip(found, spreads_of(name, unit, list(found.values())), strict=True):
+        by_law = {law: next(columns[law]) for law in laws if name in job.meter(law).units}
+        for law, spread in zip(by_law, spreads_of(name, unit, list(by_law.values())), strict=True):
             spreads[law][name] = spread
     return tuple(_summary(store, job, law, spreads[law], until_decided) for law in laws)
 
 
 def _summary(store: Store, job: Job, law: str, spreads: Mapping[str, Spread], until_decided: bool) -> LawResult:
     meter, requirements = job.meter(law), job.requirements(law)
-    own = store.columns(["failed", "diverged_at"], law)
-    failed, lost = own["failed"].astype(bool), ~np.isnan(own["diverged_at"])
+    flags = store.columns(["failed", "diverged_at"], law)
+    failed, lost = flags["failed"].astype(bool), ~np.isnan(flags["diverged_at"])
     verdicts = verdicts_of(store, job, law, until_decided)
     return LawResult(
         law,
@@ -70,7 +70,7 @@ def spreads_of(name: str, unit: str, values: Sequence[NDArray[np.float64]]) -> l
     there = [column[~np.isnan(column)] for column in values]
     # About as many bars as runs in each.
     edges = _edges(np.concatenate(there), min(BARS, math.isqrt(max(map(len, there)) or 1)))
-    return [_spread(name, unit, own, len(column), edges) for own, column in zip(there, values, strict=True)]
+    return [_spread(name, unit, finite, len(column), edges) for finite, column in zip(there, values, strict=True)]
 
 
 def _spread(name: str, unit: str, there: NDArray[np.float64], runs: int, edges: NDArray[np.float64]) -> Spread:
@@ -126,12 +126,12 @@ def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_d
 
 def _knowledge(dispersions: Sequence[Dispersion]) -> str:
     """A sentence on which drawn values the law is told; none where it is told no number of its craft in any case."""
-    found: list[str] = []
-    for told, words in ((False, "supposes the file's own"), (True, "is told each drawn")):
-        among = [one for one in dispersions if one.distribution.known_to_law == told and (told or one.nominal_tables)]
+    clauses: list[str] = []
+    for known, words in ((False, "supposes the file's own"), (True, "is told each drawn")):
+        among = [one for one in dispersions if one.distribution.known_to_law == known and (known or one.nominal_tables)]
         keys = [key for one in among for key in one.keys]
-        found += [f"{words} {' and '.join(keys)}"] if keys else []
-    return f"The law {', and '.join(found)}." if found else ""
+        clauses += [f"{words} {' and '.join(keys)}"] if keys else []
+    return f"The law {', and '.join(clauses)}." if clauses else ""
 
 
 def _drivers(
@@ -144,17 +144,17 @@ def _drivers(
     inputs = {name: values[:MOST_DRIVEN] for name, values in store.columns(names, law).items()}
     inputs |= _sizes(job, inputs)
     metrics = _of_interest(job, law, requirements)
-    told = {name: values[:MOST_DRIVEN] for name, values in store.columns(metrics, law).items()} if metrics else {}
-    return find_drivers(inputs, failed[:MOST_DRIVEN], told)
+    outputs = {name: values[:MOST_DRIVEN] for name, values in store.columns(metrics, law).items()} if metrics else {}
+    return find_drivers(inputs, failed[:MOST_DRIVEN], outputs)
 
 
 def _sizes(job: Job, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
     """The angle of an attitude and the norm of a vector in any direction, which may matter more than their components."""
-    found: dict[str, NDArray[np.float64]] = {}
+    sizes: dict[str, NDArray[np.float64]] = {}
     for dispersion in job.dispersions:
         if size := dispersion.distribution.size([inputs[name] for name in dispersion.columns]):
-            found[f"{size[0]} of {dispersion.called}"] = size[1]
-    return found
+            sizes[f"{size[0]} of {dispersion.called}"] = size[1]
+    return sizes
 
 
 USUAL = (
@@ -171,8 +171,8 @@ USUAL = (
 
 def _of_interest(job: Job, law: str, requirements: tuple[Requirement, ...]) -> list[str]:
     """The metrics whose causes are looked for: those that are bounded, else the usual ones."""
-    asked = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
-    return list(dict.fromkeys(asked or [name for name in job.meter(law).units if name in USUAL]))
+    bounded = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
+    return list(dict.fromkeys(bounded or [name for name in job.meter(law).units if name in USUAL]))
 
 
 def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, ...]) -> Mapping[str, Any]:
@@ -193,8 +193,8 @@ def _again(folder: Path, law: str, verdicts: tuple[Verdict, ...], failed: NDArra
         why.setdefault(run, []).append("failed")
     other = int(np.random.default_rng(seed).integers(len(failed)))
     why.setdefault(other, []).append("picked at random")
-    told = shlex.quote(str(folder))
+    quoted = shlex.quote(str(folder))
     return tuple(
-        Again(run, ", ".join(reasons), f"starhold rerun {told} {run} --law {shlex.quote(law)}")
+        Again(run, ", ".join(reasons), f"starhold rerun {quoted} {run} --law {shlex.quote(law)}")
         for run, reasons in why.items()
     )

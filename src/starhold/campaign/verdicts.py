@@ -132,23 +132,23 @@ class Verdict(Part):
         """Tell the verdict and what it rests on."""
         flown = f"{self.failures} of {self.runs} runs miss it ({percent(self.observed)} keep it, {percent(self.share)} must)"
         if self.lower is None or self.upper is None:
-            told = f"{self.name}: {flown}. The draws are not independent of each other, so no confidence can be given"
-            return f"{told}; random sampling gives one. {self.knowledge}".rstrip()
+            text = f"{self.name}: {flown}. The draws are not independent of each other, so no confidence can be given"
+            return f"{text}; random sampling gives one. {self.knowledge}".rstrip()
         least, most = f"at least {percent(self.lower)}", f"at most {percent(self.upper)}"
         both = self.lower <= 1.0 - self.share < self.upper
         bound = f"{least} and {most}" if both else least if self.lower > 1.0 - self.share else most
-        told = f"{self.name}: {self.outcome}. {flown}; {bound} of all flights do, with {percent(self.confidence)} confidence"
-        told += " each" if both else ""
+        text = f"{self.name}: {self.outcome}. {flown}; {bound} of all flights do, with {percent(self.confidence)} confidence"
+        text += " each" if both else ""
         if self.worst_part is not None:
             part = self.worst_part
-            told += (
+            text += (
                 f". Worst is {part.name}, known before flight: {part.outcome}, {part.failures} of {part.runs} runs miss it"
             )
         if self.outcome == "not decided" and self.more:
             about = "about " if self.parts else ""
-            told += f". It would be met after {about}{self.more} more runs without a failure"
+            text += f". It would be met after {about}{self.more} more runs without a failure"
         stopped = ", whenever the campaign was stopped" if self.until_decided else ""
-        return f"{told}. This holds for independent draws from the stated dispersions{stopped}. {self.knowledge}".rstrip()
+        return f"{text}. This holds for independent draws from the stated dispersions{stopped}. {self.knowledge}".rstrip()
 
 
 def judge(

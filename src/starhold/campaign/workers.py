@@ -159,8 +159,10 @@ def _undisturbed() -> Generator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    asked: list[tuple[int, FrameType | None]] = []
-    held = {number: signal.signal(number, lambda *call: asked.append(call)) for number in (signal.SIGINT, signal.SIGTERM)}
+    signals: list[tuple[int, FrameType | None]] = []
+    handlers = {
+        number: signal.signal(number, lambda *call: signals.append(call)) for number in (signal.SIGINT, signal.SIGTERM)
+    }
     # Threads and processes begin with what the thread blocks that starts them; the start of Python's tracker unblocks all.
     resource_tracker.ensure_running()
     masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
@@ -169,7 +171,7 @@ def _undisturbed() -> Generator[None]:
     finally:
         if masked is not None:
             signal.pthread_sigmask(signal.SIG_SETMASK, masked)
-        for number, handler in held.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
-    for number, _ in asked[:1]:
+    for number, _ in signals[:1]:
         signal.raise_signal(number)

@@ -67,11 +67,11 @@ class Found(NamedTuple):
 
 def box(job: Job) -> list[tuple[float, float]]:
     """The bounds of each uniform: all of a distribution that has bounds, else all but its tails."""
-    found: list[tuple[float, float]] = []
+    bounds: list[tuple[float, float]] = []
     for dispersion in job.dispersions:
         tail = EDGE if dispersion.distribution.bounded else TAIL
-        found += [(tail, 1.0 - tail)] * dispersion.dims
-    return found
+        bounds += [(tail, 1.0 - tail)] * dispersion.dims
+    return bounds
 
 
 def search(
@@ -93,16 +93,16 @@ def search(
         """The badness of points (n, dims): infinite where a run has no value, minus infinity where no such craft is."""
         nonlocal evaluations
         unit = np.ascontiguousarray(points.T)
-        found = np.full(len(points), -np.inf)
+        result = np.full(len(points), -np.inf)
         there = np.flatnonzero(job.plan.possible(unit))
         refused, runs = np.zeros(len(there), dtype=bool), np.zeros(len(there), dtype=np.int64)
         measured = job.measure(law, job.plan.values(unit[:, there]), runs, pool, refused=refused)()
         if refused.all():
-            return found
+            return result
         values = side * measured[requirement.column]
         evaluations += int((~refused).sum())
-        found[there] = np.where(refused, -np.inf, np.where(np.isnan(values), np.inf, values))
-        return found
+        result[there] = np.where(refused, -np.inf, np.where(np.isnan(values), np.inf, values))
+        return result
 
     with ThreadPool(threads) as pool:
         points = sought.uniform(low, high, (effort.spread, len(low)))
@@ -121,11 +121,11 @@ def search(
                 kept = np.argsort(-values, kind="stable")[: -(-len(points) // 2)]
                 points, values, sizes = points[kept], values[kept], sizes[kept]
             tried = _stepped(points, sizes, effort.lanes // len(points), low, high, sought)
-            found = badness(tried.reshape(-1, len(low))).reshape(tried.shape[:2])
-            best, rows = found.argmax(axis=1), np.arange(len(points))
-            better = found[rows, best] > values
+            tries = badness(tried.reshape(-1, len(low))).reshape(tried.shape[:2])
+            best, rows = tries.argmax(axis=1), np.arange(len(points))
+            better = tries[rows, best] > values
             points = np.where(better[:, None], tried[rows, best], points)
-            values = np.maximum(values, found[rows, best])
+            values = np.maximum(values, tries[rows, best])
             sizes = np.minimum(np.where(better, WIDER, CLOSER) * sizes, LONGEST)
     worst = int(values.argmax())
     if values[worst] == -np.inf:
@@ -136,13 +136,13 @@ def search(
 
 def _apart(points: Array, values: Array, least: Array, most: int) -> list[int]:
     """The places of the worst points (n, dims) that differ from each other by the least along some side."""
-    found: list[int] = []
+    apart: list[int] = []
     for place in np.argsort(-values, kind="stable").tolist():
-        if all((np.abs(points[place] - points[other]) > least).any() for other in found):
-            found.append(place)
-        if len(found) == most:
+        if all((np.abs(points[place] - points[other]) > least).any() for other in apart):
+            apart.append(place)
+        if len(apart) == most:
             break
-    return found
+    return apart
 
 
 def _stepped(points: Array, sizes: Array, count: int, low: Array, high: Array, sought: np.random.Generator) -> Array:
@@ -156,7 +156,7 @@ def _stepped(points: Array, sizes: Array, count: int, low: Array, high: Array, s
 def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set[str]) -> tuple[Bracket, ...]:
     """How bad what is required of a law gets: by its campaign, by a search, and at most by proof. The worst run of each is
     kept as a scenario file in the campaign's folder; taken: the names of such files so far."""
-    found: list[Bracket] = []
+    gathered: list[Bracket] = []
     law, worst_runs = result.law, {verdict.name: verdict.worst_run for verdict in result.verdicts}
     for requirement in job.requirements(law):
         if requirement.metric == LOST:
@@ -170,9 +170,9 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set
         with atomic_write(path) as hidden:
             hidden.write_text(scenario_of(job, columns, run).text, encoding="utf-8")
         flights = 0 if looked is None else looked.evaluations
-        told = (requirement.column, requirement.unit, value, path.name, flights, *proved_of(job, law, requirement))
-        found.append(Bracket(*told, requirement.at_most))
-    return tuple(found)
+        fields = (requirement.column, requirement.unit, value, path.name, flights, *proved_of(job, law, requirement))
+        gathered.append(Bracket(*fields, requirement.at_most))
+    return tuple(gathered)
 
 
 def _file_name(law: str, requirement: str, taken: set[str]) -> str:

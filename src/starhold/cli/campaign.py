@@ -122,8 +122,8 @@ def rerun(
     from starhold.report.figures import paint
     from starhold.report.results import open_folder, write_results, write_run
 
-    found = fly_again(folder, run, law)
-    flight, scenario = found.flight, found.scenario
+    again = fly_again(folder, run, law)
+    flight, scenario = again.flight, again.scenario
     place = open_folder(output or Path("results") / f"{scenario.name}-{flight.name}-{run}", force)
     write_run(flight.recording, place / "run.nc")
     with atomic_write(place / "scenario.toml") as hidden:
@@ -131,9 +131,9 @@ def rerun(
     paint(report_of(scenario.body).picture([flight], scenario), place)
     print_outcome([flight])
     page = write_results(scenario, [flight], place)
-    if found.differs:
-        told = ", ".join(found.differs[:4])
-        console.print(f"[red]Other bits than in the campaign, as another machine may compute: {told}[/red]", soft_wrap=True)
+    if again.differs:
+        names = ", ".join(again.differs[:4])
+        console.print(f"[red]Other bits than in the campaign, as another machine may compute: {names}[/red]", soft_wrap=True)
     else:
         console.print("The same bits as in the campaign.")
     console.print(f"Report: {page}", soft_wrap=True)

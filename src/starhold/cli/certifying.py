@@ -31,9 +31,9 @@ def certify(
     scenario = load(file, allow_unstable)
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
     tried = certify_scenario(scenario, law)
-    for found in tried:
-        print_certificate(found)
-    certificates = [found.certificate for found in tried]
+    for one in tried:
+        print_certificate(one)
+    certificates = [one.certificate for one in tried]
     path = write_proofs(certificates, scenario.name, folder)
     console.print(f"Certificate: {path}. Re-check it: {recheck(certificates, path)}", soft_wrap=True)
     outcomes = {certificate.outcome for certificate in certificates}

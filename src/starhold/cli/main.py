@@ -183,9 +183,9 @@ def new(
     from starhold.scenario.template import template_text
 
     given = {"--wheels": wheels, "--libration": libration, "--from": start is not None}
-    asked = [option for option, there in given.items() if there]
-    if len(asked) > 1:
-        raise InputError("new", asked[0], asked[1], "one of the two")
+    options = [option for option, there in given.items() if there]
+    if len(options) > 1:
+        raise InputError("new", options[0], options[1], "one of the two")
     start = "wheels-orbital" if wheels else start
     if start is not None and start not in builtin_names():
         raise InputError("new", "--from", start, nearest(start, builtin_names()))

@@ -21,7 +21,7 @@ class Outlet:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write what can be written."""
+        """Write the text as far as the stream takes it."""
         try:
             return self._stream.write(text)
         except OSError as error:
@@ -29,7 +29,7 @@ class Outlet:
             return len(text)
 
     def flush(self) -> None:
-        """Send on what can be sent."""
+        """Send on as much as the stream takes."""
         try:
             self._stream.flush()
         except OSError as error:

@@ -1,4 +1,4 @@
-"""The commands that list what is installed, `laws`, `parts` and `wheels`, and `check-part`."""
+"""The commands that list installed laws, parts and wheels (`laws`, `parts`, `wheels`), and `check-part`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     from starhold.scenario.checking import nearest
 
     groups = _laws()
-    known = {law: found for group in groups.values() for law, found in group.items()}
+    known = {law: law_named for group in groups.values() for law, law_named in group.items()}
     if name is None:
         for body, group in groups.items():
             rows = [(law.name, law.card.claims, law.card.summary) for law in group.values()]
@@ -36,8 +36,8 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     elif name.endswith(".py"):
         print_blocks(_law_blocks(find_law(name)))
     elif name == MODES:
-        told = "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one begins."
-        print_blocks([f"{told} {NEW_MODES}"])
+        text = "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one begins."
+        print_blocks([f"{text} {NEW_MODES}"])
     elif name not in known:
         raise InputError("laws", "", name, nearest(name, [*known, MODES]))
     else:
@@ -56,18 +56,18 @@ def parts(
     from starhold.parts.roles import ROLES
     from starhold.scenario.checking import nearest
 
-    of_laws = {law: found for group in _laws().values() for law, found in group.items()}
+    of_laws = {law: part_named for group in _laws().values() for law, part_named in group.items()}
     known = {role: dict[str, Any](of_laws if role == "law" else installed.parts(role)) for role in ROLES}
     if name is None or name in ROLES:
         for role in ROLES if name is None else (name,):
             rows = [_row(part) for part in known[role].values()]
             print_blocks([_table((role, "body", "given by", "summary"), rows), ""])
         return
-    every = {part: found for group in known.values() for part, found in group.items()}
+    every = {part: part_named for group in known.values() for part, part_named in group.items()}
     if not Path(name).is_file() and not name.endswith(".py") and name not in every:
         raise InputError("parts", "", name, nearest(name, [*ROLES, *every]))
-    found = every[name] if name in every else _find(name)
-    print_blocks(_law_blocks(found) if isinstance(found, Law) else _part_blocks(found))
+    part_named = every[name] if name in every else _find(name)
+    print_blocks(_law_blocks(part_named) if isinstance(part_named, Law) else _part_blocks(part_named))
 
 
 def wheels() -> None:
@@ -93,8 +93,8 @@ def check_part(
     from starhold.conformance.suite import examine
     from starhold.laws.catalogue import Law
 
-    found, failed = _find(part), 0
-    for verdict in examine(found) if isinstance(found, Law) else examine_part(found):
+    examined, failed = _find(part), 0
+    for verdict in examine(examined) if isinstance(examined, Law) else examine_part(examined):
         failed += verdict.outcome == "failed"
         colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
         console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {escape(verdict.name)}", highlight=False)
@@ -165,7 +165,7 @@ def _part_blocks(part: Part) -> list[Block]:
         blocks += _field_blocks("Parameters", part.fields())
     kinds = [getattr(part.module, kind) for kind in ("Reading", "Estimate", "Sample") if hasattr(part.module, kind)]
     if kinds and getattr(part.module, "RECORDED", True):
-        rows = [(name, told.unit, told.text) for kind in kinds for name, told in quantities(kind).items()]
+        rows = [(name, quantity.unit, quantity.text) for kind in kinds for name, quantity in quantities(kind).items()]
         blocks += ["", _table(("recorded", "unit", "meaning"), rows)]
     return blocks
 

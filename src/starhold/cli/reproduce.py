@@ -56,17 +56,17 @@ def _make(letters: list[str], folder: Path, processes: int | None) -> list[Repro
     context = get_context("spawn")
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     count = min(processes or os.cpu_count() or 1, len(letters))
-    told: Any = context.Queue()
+    queue: Any = context.Queue()
     with (
         Progress(*columns, console=console) as bars,
-        ProcessPoolExecutor(count, context, initializer=_begin, initargs=(told,)) as pool,
+        ProcessPoolExecutor(count, context, initializer=_begin, initargs=(queue,)) as pool,
     ):
         tasks = {letter: bars.add_task(letter, total=None) for letter in letters}
         futures = {letter: pool.submit(_work, letter, folder) for letter in sorted(letters, key=LONGEST_FIRST.index)}
         try:
             _watch(
                 set(futures.values()),
-                told,
+                queue,
                 lambda letter, done, whole: bars.update(tasks[letter], completed=done, total=whole),
             )
         except BaseException:
@@ -76,7 +76,7 @@ def _make(letters: list[str], folder: Path, processes: int | None) -> list[Repro
         return [futures[letter].result() for letter in letters]
 
 
-def _watch(left: set[Future[Any]], told: Any, show: Callable[[str, int, int], None]) -> None:
+def _watch(left: set[Future[Any]], queue: Any, show: Callable[[str, int, int], None]) -> None:
     """Show how far they are until all are done, or one has failed."""
     from concurrent.futures import FIRST_COMPLETED, wait
     from queue import Empty
@@ -85,18 +85,18 @@ def _watch(left: set[Future[Any]], told: Any, show: Callable[[str, int, int], No
         done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
         with suppress(Empty):
             while True:
-                show(*told.get_nowait())
+                show(*queue.get_nowait())
         for future in done:
             future.result()
 
 
-_told: Any = None
-"""Where this process says how far it is."""
+_queue: Any = None
+"""The queue to which this process reports its progress."""
 
 
-def _begin(told: Any) -> None:
-    global _told
-    _told = told
+def _begin(queue: Any) -> None:
+    global _queue
+    _queue = queue
     # Ctrl-C goes to the parent alone, which ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -106,7 +106,7 @@ def _work(letter: str, folder: Path) -> Reproduction:
 
     from starhold.publications.writing import write_paper
 
-    made = write_paper(letter, folder, lambda done, whole: _told.put((letter, done, whole)))
+    made = write_paper(letter, folder, lambda done, whole: _queue.put((letter, done, whole)))
     # What is drawn by now need not travel.
     return replace(made, figures=dict.fromkeys(made.figures))
 

@@ -44,7 +44,7 @@ def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, i
 
 
 def print_outcome(flights: Sequence[Flight]) -> None:
-    """The table, what went wrong and what is proved."""
+    """The table, warnings and proved claims."""
     from starhold.report.text import lost_text, unknown_text
 
     print_table(flights)
@@ -59,9 +59,9 @@ def print_outcome(flights: Sequence[Flight]) -> None:
         if "step_error" in flight.metrics:
             console.print(_step_text(flight), highlight=False, markup=False)
         if "limits_kept" in flight.metrics:
-            from starhold.report.transients import told
+            from starhold.report.transients import transient_text
 
-            said, kept = told(flight), flight.metrics["limits_kept"]
+            said, kept = transient_text(flight), flight.metrics["limits_kept"]
             console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False, highlight=False)
     if any(flight.certificates for flight in flights):
         from starhold.cli.show_certificates import print_proved
@@ -70,16 +70,16 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
 
 def _step_text(flight: Flight) -> str:
-    """Tell what half the integration step changes."""
+    """Tell how much half the integration step changes the metrics."""
     errors = flight.metrics["step_error"]
     if None in errors.values():
         return f"{flight.name}: with half the integration step the motion is lost at another time"
-    told: list[str] = []
+    changes: list[str] = []
     for name, error in errors.items():
         told_of = flight.recording.columns[name]
         unit = "rad" if told_of.dimension == "quaternion" else told_of.unit
-        told.append(f"{name.replace('_', ' ')} by {error:.1e} {unit}")
-    return f"{flight.name}: half the integration step changes at most the {', '.join(told)}"
+        changes.append(f"{name.replace('_', ' ')} by {error:.1e} {unit}")
+    return f"{flight.name}: half the integration step changes at most the {', '.join(changes)}"
 
 
 def print_table(flights: Sequence[Flight]) -> None:
@@ -90,7 +90,7 @@ def print_table(flights: Sequence[Flight]) -> None:
     metrics = metric_set.columns(results)
     measures = [metric_set.measures[metric] for metric in metrics]
     heads = [f"{measure.heading}\n[dim]{measure.unit}[/dim]" for measure in measures]
-    cells = [[_cell(metric_set.told(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
+    cells = [[_cell(metric_set.cell(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
     table = Table(title_justify="left", show_edge=False, pad_edge=False)
     if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):
@@ -114,8 +114,8 @@ def print_table(flights: Sequence[Flight]) -> None:
     for flight in flights:
         if flight.modes:
             first, *later = flight.modes
-            told = "".join(f", {one.mode} from {metric_set.moment(one.time, 6)}" for one in later)
-            console.print(escape(f"Modes of {flight.name}: {first.mode}{told}."), highlight=False)
+            stretches = "".join(f", {one.mode} from {metric_set.moment(one.time, 6)}" for one in later)
+            console.print(escape(f"Modes of {flight.name}: {first.mode}{stretches}."), highlight=False)
 
 
 def _cell(text: str, best: bool) -> str:
@@ -123,7 +123,7 @@ def _cell(text: str, best: bool) -> str:
 
 
 def print_blocks(blocks: Iterable[Block]) -> None:
-    """Print what a command shows."""
+    """Print the blocks of a command's result."""
     for block in blocks:
         if isinstance(block, Rows):
             print_rows(block)
@@ -134,7 +134,7 @@ def print_blocks(blocks: Iterable[Block]) -> None:
 
 
 def print_rows(what: Rows, apart: bool = False) -> None:
-    """Print a table, after an empty line if `apart`; what is nothing is a dash."""
+    """Print a table, after an empty line if `apart`; an empty cell is a dash."""
     table = Table(show_edge=False, pad_edge=False, title=what.title or None, title_justify="left")
     for column in what.columns:
         head = f"{column.name}\n[dim]{column.unit}[/dim]" if column.unit else column.name

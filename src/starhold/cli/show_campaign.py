@@ -1,4 +1,4 @@
-"""Prints what a campaign comes to, and shows bars while it is flown."""
+"""Prints the outcome of a campaign, and shows bars while it is flown."""
 
 from __future__ import annotations
 
@@ -77,25 +77,25 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
 
 
 def print_campaign(result: CampaignResult, body: str) -> None:
-    """Print what a campaign on a body of this name comes to: what its laws do, verdicts, metrics, drivers, the worst
+    """Print the outcome of a campaign on a body of this name: how its laws do, verdicts, metrics, drivers, the worst
     runs."""
     words = Wording.of(body, result)
     console.print()
     for law in result.laws:
         outcome = outcome_of(law)
         shown = f"{marked(Cell(outcome, outcome))}  " if outcome else ""
-        told = escape(_plain(headline(law, result.sampling, words)))
-        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {told}", highlight=False)
+        text = escape(_plain(headline(law, result.sampling, words)))
+        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {text}", highlight=False)
     _print(verdicts(result, words), columns=7)
-    _print(metrics(result, words, METRICS), told=False)
-    _print(brackets(result, words), told=result.contradicted)
+    _print(metrics(result, words, METRICS), with_note=False)
+    _print(brackets(result, words), with_note=result.contradicted)
     for section in indices(result, words):
         _print(section)
     for law in result.laws:
         if law.drivers is not None:
-            found = drivers(law.drivers, words, DRIVERS)
-            _print(found._replace(heading=law.law, note=f"{law.law}: {found.note}"))
-    _print(again(result, AGAIN), told=False)
+            causes = drivers(law.drivers, words, DRIVERS)
+            _print(causes._replace(heading=law.law, note=f"{law.law}: {causes.note}"))
+    _print(again(result, AGAIN), with_note=False)
     console.print(f"\ndigest {result.digest}", highlight=False)
     if result.flown and result.seconds > 0.0:
         rate = figure(result.flown / result.seconds, 3)
@@ -103,8 +103,8 @@ def print_campaign(result: CampaignResult, body: str) -> None:
         console.print(flown, highlight=False)
 
 
-def _print(section: Section | None, columns: int | None = None, told: bool = True) -> None:
-    """Print the first columns of a section's table, and what is told of it."""
+def _print(section: Section | None, columns: int | None = None, with_note: bool = True) -> None:
+    """Print the first columns of a section's table, and its note."""
     if section is None:
         return
     table = section.table
@@ -112,17 +112,17 @@ def _print(section: Section | None, columns: int | None = None, told: bool = Tru
         rows = [[*map(marked, row[:columns])] for row in table.rows]
         title = "" if section.heading == "Verdicts" else marked(section.heading)
         print_rows(table._replace(columns=table.columns[:columns], rows=rows, title=title), apart=True)
-    if told and section.note:
+    if with_note and section.note:
         console.print(marked(section.note), highlight=False)
 
 
 def _plain(text: str) -> str:
-    """Text from a file without what steers a terminal."""
+    """Text from a file without characters that steer a terminal."""
     return "".join(c if c.isprintable() or c == "\N{NARROW NO-BREAK SPACE}" else ascii(c)[1:-1] for c in text)
 
 
 def marked(cell: Any) -> str:
-    """Words as they can be printed, without markup of their own and nothing that steers a terminal; outcomes in colour."""
+    """Words as they can be printed, without markup of their own or characters that steer a terminal; outcomes in colour."""
     text = escape(_plain(f"{cell}"))
     colour = COLOURS.get(cell.kind, "") if isinstance(cell, Cell) else ""
     return f"[{colour}]{text}[/{colour}]" if colour else text

@@ -44,8 +44,8 @@ def print_certificate(tried: Tried) -> None:
     for _ in range(3):
         table.add_column(overflow="fold")
     for claim in certificate.claims:
-        told = _safe(sentence(claim, certificate.subject))
-        table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], f"{told} [dim]({methods(claim)})[/dim]")
+        statement = _safe(sentence(claim, certificate.subject))
+        table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], f"{statement} [dim]({methods(claim)})[/dim]")
         if "eigenvalues" in claim.numbers:
             table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
         for line in reasons(claim):
@@ -53,7 +53,7 @@ def print_certificate(tried: Tried) -> None:
     if certificate.claims:
         console.print(table, highlight=False)
         console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]", highlight=False)
-    outside = [HEADINGS[kind] for kind, held in inside.items() if not held]
+    outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
     if outside:
         console.print(f"  this scenario starts outside the sets of: {', '.join(outside)}", highlight=False)
     if trial is not None:
@@ -92,23 +92,23 @@ def reasons(claim: Claim) -> list[str]:
 
 
 def assumptions(certificate: Certificate) -> str:
-    """Every assumption once, with the claims that do without it."""
+    """Every assumption once, with the claims that need it where not all do."""
     kinds = {claim.kind: claim.assumptions for claim in certificate.claims}
-    told: list[str] = []
-    for assumption in dict.fromkeys(a for own in kinds.values() for a in own):
-        holders = [HEADINGS[kind] for kind, own in kinds.items() if assumption in own]
-        others = [HEADINGS[kind] for kind, own in kinds.items() if assumption not in own]
+    texts: list[str] = []
+    for assumption in dict.fromkeys(a for assumed in kinds.values() for a in assumed):
+        holders = [HEADINGS[kind] for kind, assumed in kinds.items() if assumption in assumed]
+        others = [HEADINGS[kind] for kind, assumed in kinds.items() if assumption not in assumed]
         if not others:
-            told.append(assumption)
+            texts.append(assumption)
         elif len(others) < len(holders):
-            told.append(f"{assumption} (not for: {', '.join(others)})")
+            texts.append(f"{assumption} (not for: {', '.join(others)})")
         else:
-            told.append(f"{assumption} (for: {', '.join(holders)})")
-    return "; ".join(told)
+            texts.append(f"{assumption} (for: {', '.join(holders)})")
+    return "; ".join(texts)
 
 
 def print_findings(findings: Sequence[Finding]) -> None:
-    """Print what an independent check found, claim by claim; every obligation that fails."""
+    """Print the findings of an independent check, claim by claim, and every obligation that fails."""
     groups: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         groups.setdefault((finding.certificate, finding.claim), []).append(finding)

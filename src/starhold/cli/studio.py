@@ -45,8 +45,8 @@ def studio(
 
     from starhold.studio.server import serve
 
-    def told(address: str) -> None:
+    def announce(address: str) -> None:
         console.print(f"Studio: {address}", soft_wrap=True, highlight=False, markup=False)
         console.print("Nothing leaves this machine. Ctrl-C ends it.", highlight=False)
 
-    serve(path, name, text, port, told, browser)
+    serve(path, name, text, port, announce, browser)

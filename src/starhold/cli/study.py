@@ -1,4 +1,4 @@
-"""Makes commands of what stands in `starhold.report.commands`."""
+"""Makes a command of each file in `starhold.report.commands`."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def command_of(name: str) -> Any:
         from starhold.report.results import open_folder, write_part, write_result
         from starhold.scenario.reading import load
 
-        asked = {
+        file_options = {
             key: output if key == "output" else given.pop(key) for key, option in declared.options.items() if option.file
         }
-        paths = {key: path for key, path in asked.items() if path is not None}
+        paths = {key: path for key, path in file_options.items() if path is not None}
         for key, path in paths.items():
             if declared.options[key].file == "png" and path.suffix.lower() != ".png":
                 raise InputError(name, f"--{key}", str(path), f"the name of a PNG file, such as {key}.png")
@@ -95,7 +95,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
 
 @contextmanager
 def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar for a command that tells how far it is; yields what it calls."""
+    """A bar for a command that reports its progress; yields the function to be called."""
     if declared.doing is None:
         yield lambda done, total, what: None
         return

@@ -73,9 +73,9 @@ def write_aem(
     """Write attitudes as a message. times: (n,) s since the epoch, increasing; attitudes: (n, 4), scalar first, from the
     frame to the body's axes. ValueError where a word does not fit, InputError where the file cannot be written."""
     begun = _instant(epoch)
-    for told in (object_name, object_id, frame, time_system):
-        if not NAME.fullmatch(told):
-            raise ValueError(f"{told!r}, which is no line of printable ASCII")
+    for text in (object_name, object_id, frame, time_system):
+        if not NAME.fullmatch(text):
+            raise ValueError(f"{text!r}, which is no line of printable ASCII")
     if version not in ("1.0", "2.0"):
         raise ValueError(f"version {version}, which is neither 1.0 nor 2.0")
     stamps = [_stamp(begun + round(float(time) * _SECOND)) for time in times]
@@ -115,9 +115,9 @@ def read_aem(path: Path) -> Aem:
     if version not in ("1.0", "2.0"):
         raise ValueError(f"line {lines.number}: CCSDS_AEM_VERS = {version}, of which 1.0 and 2.0 are read")
     list(lines.before("META_START"))
-    told = dict(lines.pair(line) for line in lines.before("META_STOP"))
+    metadata = dict(lines.pair(line) for line in lines.before("META_STOP"))
     list(lines.before("DATA_START"))
-    count = _numbers(told)
+    count = _numbers(metadata)
     rows = [lines.row(line, count) for line in lines.before("DATA_STOP")]
     if lines.following() is not None:
         raise ValueError(f"line {lines.number}: a second segment, of which one alone is read")
@@ -128,29 +128,29 @@ def read_aem(path: Path) -> Aem:
         if later <= earlier:
             raise ValueError(f"the epoch {_stamp(later)} after {_stamp(earlier)}")
     # In version 1.0 the scalar may come first.
-    first = told.get("QUATERNION_TYPE") == "FIRST"
+    first = metadata.get("QUATERNION_TYPE") == "FIRST"
     attitudes = table if first else np.roll(table, 1, axis=1)
-    frame = told["REF_FRAME_A"]
-    if (told.get("ATTITUDE_DIR") == "B2A") != frame.startswith(BODY):
+    frame = metadata["REF_FRAME_A"]
+    if (metadata.get("ATTITUDE_DIR") == "B2A") != frame.startswith(BODY):
         attitudes = attitudes * np.array([1.0, -1.0, -1.0, -1.0])
     times = np.array([(instant - instants[0]) / _SECOND for instant in instants])
-    name = told["REF_FRAME_B"] if frame.startswith(BODY) else frame
-    return Aem(times, attitudes, _stamp(instants[0]), told["OBJECT_NAME"], name, told["TIME_SYSTEM"])
+    name = metadata["REF_FRAME_B"] if frame.startswith(BODY) else frame
+    return Aem(times, attitudes, _stamp(instants[0]), metadata["OBJECT_NAME"], name, metadata["TIME_SYSTEM"])
 
 
-def _numbers(told: dict[str, str]) -> int:
+def _numbers(metadata: dict[str, str]) -> int:
     """How many numbers a line of data has. ValueError for what is not read."""
     for key in ("OBJECT_NAME", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "ATTITUDE_TYPE"):
-        if key not in told:
+        if key not in metadata:
             raise ValueError(f"no {key}")
     allowed = {"ATTITUDE_DIR": ("A2B", "B2A"), "QUATERNION_TYPE": ("FIRST", "LAST"), "ATTITUDE_TYPE": tuple(VALUES)}
     for key, words in allowed.items():
-        if key in told and told[key] not in words:
-            raise ValueError(f"{key} = {told[key]}, of which {', '.join(words)} are read")
-    frames = told["REF_FRAME_A"], told["REF_FRAME_B"]
+        if key in metadata and metadata[key] not in words:
+            raise ValueError(f"{key} = {metadata[key]}, of which {', '.join(words)} are read")
+    frames = metadata["REF_FRAME_A"], metadata["REF_FRAME_B"]
     if sum(frame.startswith(BODY) for frame in frames) != 1:
         raise ValueError(f"frames {' and '.join(frames)}, of which one is to be {BODY}_…")
-    return VALUES[told["ATTITUDE_TYPE"]]
+    return VALUES[metadata["ATTITUDE_TYPE"]]
 
 
 class _Lines:
@@ -207,10 +207,10 @@ class _Lines:
 
 def _instant(epoch: str) -> int:
     """Nanoseconds since the year 1 of an epoch, by days of 86400 s. ValueError for none."""
-    found = _EPOCH.fullmatch(epoch)
-    if found is None:
+    match = _EPOCH.fullmatch(epoch)
+    if match is None:
         raise ValueError(f"{epoch!r} in place of an epoch such as 2026-03-01T12:00:00")
-    year, month, day, of_year, hour, minute, second, part = found.groups()
+    year, month, day, of_year, hour, minute, second, part = match.groups()
     when = date(int(year), int(month or 1), int(day or 1)) + timedelta(days=int(of_year or 1) - 1)
     if not (int(hour) < 24 and int(minute) < 60 and int(second) <= 60) or when.year != int(year):
         raise ValueError(f"{epoch!r}, which is no time of a day")

@@ -33,7 +33,7 @@ def check_name(name: str) -> str:
 
 @dataclass(frozen=True)
 class Code:
-    """A law in C: what was recorded of it, and the texts. name: what its functions begin with; given: the types of the
+    """A law in C: its recorded program, and the texts. name: the beginning of its functions' names; given: the types of the
     parameters, the state and the input (None for none), by their names."""
 
     flight: FlightLaw
@@ -47,7 +47,7 @@ class Code:
 
     @cached_property
     def work(self) -> bounds.Work:
-        """Return what a step does at the most."""
+        """Return the largest number of operations of a step."""
         return bounds.check(self.program, {}, {}).work
 
     @cached_property

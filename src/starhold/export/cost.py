@@ -1,4 +1,4 @@
-"""Measures a step of a law: stack and flash, as compilers that are installed tell."""
+"""Measures the stack and flash of a step of a law with the compilers that are installed."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Cost(NamedTuple):
 
 
 def measure(code: Code, header: str, source: str) -> list[Cost]:
-    """Return what each compiler that is installed tells; nothing where none is."""
-    return [found for name in COMPILERS if (found := _measured(name, code, header, source)) is not None]
+    """Return the costs by each installed compiler; empty where there is none."""
+    return [cost for name in COMPILERS if (cost := _measured(name, code, header, source)) is not None]
 
 
 def _measured(compiler: str, code: Code, header: str, source: str) -> Cost | None:
@@ -62,15 +62,15 @@ def _run(folder: str, *command: str) -> str | None:
 
 def _stack(code: Code, usage: str) -> int:
     """Return the most stack of a path of calls; what is inlined has its bytes where it is."""
-    own: dict[str, int] = {}
+    frames: dict[str, int] = {}
     for line in usage.splitlines():
         name, size, *_ = line.split("\t")
         # Copies that the compiler made are called after the function, with a dot.
         title = re.sub(r"\..*", "", name.rpartition(":")[2])
-        own[title] = max(own.get(title, 0), int(size))
+        frames[title] = max(frames.get(title, 0), int(size))
     printed, deepest = code.printed, dict[str, int]()
     for name, function in printed.functions.items():
         called = {s.function.name for s in statements(function.body) if isinstance(s, Call)}
         title = f"{code.name}_step" if printed.is_main(function) else printed.titles[name]
-        deepest[name] = own.get(title, 0) + max([deepest[one] for one in called], default=0)
+        deepest[name] = frames.get(title, 0) + max([deepest[one] for one in called], default=0)
     return deepest[code.program.main.name]

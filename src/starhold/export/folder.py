@@ -37,7 +37,7 @@ class Exported:
 def make_files(
     code: Code, scenario: str, law: str, proof: Proof = UNPROVED, more: Mapping[str, str | bytes] = MappingProxyType({})
 ) -> Exported:
-    """Return the files of a law in C, `more` among them, and what compilers that are installed tell of them."""
+    """Return the files of a law in C, `more` among them, and its costs by the installed compilers."""
     header, source = texts(code, scenario, law, proof)
     cases = vectors(code)
     files: dict[str, str | bytes] = {

@@ -1,4 +1,4 @@
-"""The part of a closed loop that flies on a computer: from what sensors tell to the command, with all that it remembers."""
+"""The part of a closed loop that flies on a computer: from readings of sensors to the command, with all memories."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class FlightLaw:
 
 
 def flight_law(loop: ClosedLoop) -> FlightLaw:
-    """Return what of a loop flies on a computer. InputError for a part that has no form in C."""
+    """Return the part of a loop that flies on a computer. InputError for a part that has no form in C."""
     parts, setup, carry = loop.composition(), loop.setup(), loop.carry()
     modelled = [place for place, part in enumerate(parts.environments) if part.flag("MODELLED")]
     for place in modelled:
@@ -149,8 +149,8 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
     kept |= {"estimator": carry.memories.estimator, "followed": carry.memories.followed}
     start = _named("FlightState", [(name, value) for name, value in kept.items() if any(True for _ in leaves(value))])
     inputs = _noted("FlightInput", fields, notes)
-    told = quantities(module.Sample).get("command", Quantity("", ""))._replace(dimension="")
-    command = NamedTuple("FlightCommand", [(module.COMMAND, Annotated[Any, told])])
+    quantity = quantities(module.Sample).get("command", Quantity("", ""))._replace(dimension="")
+    command = NamedTuple("FlightCommand", [(module.COMMAND, Annotated[Any, quantity])])
     return FlightLaw(loop, composition, Parameters(loop.gains, loop.known, named), start, inputs, given, command)
 
 
@@ -220,5 +220,5 @@ def _no_form(name: str, allowed: str) -> InputError:
 
 def numbers(value: Any) -> list[float]:
     """Return the numbers of a value as C has them: its floats, then those of its buffers."""
-    found = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
-    return found + [leaf[k] for leaf in leaves(value) if isinstance(leaf, Buffer) for k in range(leaf.size)]
+    floats = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
+    return floats + [leaf[k] for leaf in leaves(value) if isinstance(leaf, Buffer) for k in range(leaf.size)]

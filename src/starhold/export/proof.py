@@ -1,4 +1,4 @@
-"""Headers say what is proved: claims in sentences, assumptions, and a warning where something is missing."""
+"""Headers state the proofs: claims in sentences, assumptions, and a warning where something is missing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved of this
 
 
 def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
-    """Return what certificates of one law say; digest: that of the file which holds them, as hexadecimal."""
+    """Return the summary of the certificates of one law; digest: that of the file which holds them, as hexadecimal."""
     claims: list[str] = []
     wrong: list[str] = []
     assumed: dict[str, None] = {}
@@ -39,8 +39,8 @@ def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
             claims.append(f"{claim.outcome}: {text}")
             assumed |= dict.fromkeys(claim.assumptions)
             if claim.outcome != "proved":
-                found = claim.refutation()
-                why = f" ({evidence(found)})" if found is not None else ""
+                refutation = claim.refutation()
+                why = f" ({evidence(refutation)})" if refutation is not None else ""
                 wrong.append(f"{'REFUTED' if claim.outcome == 'refuted' else 'NOT DECIDED'}: {text}{why}.")
     outcomes = {certificate.outcome for certificate in certificates}
     outcome = next((one for one in ("refuted", "undecided") if one in outcomes), "proved")

@@ -109,7 +109,7 @@ class Recording(Recorder):
         names = {ref: {"state": "body_state", "command": "wanted"}.get(name, name) for ref, name in self._called_so.items()}
         shape = Signature(frozenset({name for name, _ in given} - {"parameters"}), names, "", tuple(outs))
         main = Function("step", "", given, body, tuple(outs.values()), shape)
-        return Program((*(found[0] for found in self._functions.values() if found), main), tuple(self.memories))
+        return Program((*(entry[0] for entry in self._functions.values() if entry), main), tuple(self.memories))
 
     # Calls.
 
@@ -136,8 +136,8 @@ class Recording(Recorder):
         return self._shaped(out, result, ref)
 
     def _record(self, equation: Any, values: tuple[Any, ...]) -> Any:
-        """Record a function, unless it only hands on arguments or what it gives has no type of C."""
-        outer, self._called_so, found = self._called_so, {}, None
+        """Record a function, unless it only hands on arguments or its result has no type of C."""
+        outer, self._called_so, entry = self._called_so, {}, None
         nothing: Any = None, None, ()
         words = equation.__code__.co_varnames[: len(values)]
         says = [str(equation.__annotations__.get(word, "")) for word in words]
@@ -166,9 +166,9 @@ class Recording(Recorder):
             doc = "\n".join(wrapped(sentence(equation.__doc__ or "")))
             params = tuple((names[k], kinds[k].kind) for k in kept)
             function = Function(self._titles.new(_title(equation)), doc, params, block, outs, shape)
-            found = function, kept, (out, result, kinds)
+            entry = function, kept, (out, result, kinds)
         self._called_so = outer
-        return found
+        return entry
 
     def _result(self, equation: Any, out: Any) -> Type | None:
         """Return the type of what a function gives; of several values a struct whose members are called as they are."""
@@ -254,17 +254,17 @@ def _here() -> _Here:
 @cache
 def _names_in(file: str) -> dict[Any, _Here]:
     """Return the names at each expression of a file, by where that begins and ends."""
-    found: dict[Any, _Here] = {}
+    names_at: dict[Any, _Here] = {}
     for node in ast.walk(ast.parse("".join(linecache.getlines(file)))):
         if isinstance(node, ast.Call):
             given = tuple(free(arg.id) if isinstance(arg, ast.Name) else "" for arg in node.args)
-            found[_span(node)] = found.get(_span(node), _Here())._replace(given=given)
+            names_at[_span(node)] = names_at.get(_span(node), _Here())._replace(given=given)
         elif isinstance(node, ast.Assign):
             targets, values = [x.elts if isinstance(x, ast.Tuple) else [x] for x in (node.targets[0], node.value)]
             for target, value in zip(targets, values, strict=False) if len(targets) == len(values) else ():
                 if isinstance(target, ast.Name):
-                    found[_span(value)] = found.get(_span(value), _Here())._replace(name=free(target.id))
-    return found
+                    names_at[_span(value)] = names_at.get(_span(value), _Here())._replace(name=free(target.id))
+    return names_at
 
 
 def _span(node: ast.expr) -> tuple[int, int | None, int, int | None]:
@@ -299,9 +299,9 @@ def _counts(leaf: Any) -> bool:
 
 
 def _is_recordable(values: tuple[Any, ...]) -> bool:
-    """Tell whether a call is one of a function of C."""
-    found = list(leaves(values))
-    return all(map(_is_part, found)) and any(isinstance(leaf, (Handle, Buffer)) for leaf in found)
+    """Tell whether a call can become a function of C."""
+    parts = list(leaves(values))
+    return all(map(_is_part, parts)) and any(isinstance(leaf, (Handle, Buffer)) for leaf in parts)
 
 
 def _is_part(leaf: Any) -> bool:

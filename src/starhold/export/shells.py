@@ -1,4 +1,4 @@
-"""Shells over the same C, and what builds it: files of templates, filled with the names and numbers of a law."""
+"""Shells over the same C, and their build files: templates filled with the names and numbers of a law."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def variables(code: Code) -> tuple[list[str], list[str]]:
 
 
 def _basilisk(code: Code) -> dict[str, str]:
-    """Return a law as a module of Basilisk. InputError for inputs that no message of Basilisk tells of."""
+    """Return a law as a module of Basilisk. InputError for inputs that no message of Basilisk holds."""
     wanted = [member.name for member in code.inputs]
     for name in wanted:
         if name not in SOURCES:
@@ -67,9 +67,9 @@ def _basilisk(code: Code) -> dict[str, str]:
             )
     reads: list[str] = []
     for message in ("attitude", "translation"):
-        own = [name for name in wanted if SOURCES[name][0] == message]
-        if own:
-            reads += [f"        read = self.{message}InMsg()", *(f"        {name} = {SOURCES[name][1]}" for name in own)]
+        fields = [name for name in wanted if SOURCES[name][0] == message]
+        if fields:
+            reads += [f"        read = self.{message}InMsg()", *(f"        {name} = {SOURCES[name][1]}" for name in fields)]
     return filled("basilisk", code, READS="\n".join(reads), GIVEN=", ".join(f"*{name}" for name in wanted))
 
 

@@ -30,7 +30,7 @@ class Text(NamedTuple):
 
 
 def texts(code: Code, scenario: str, law: str, proof: Proof = UNPROVED) -> Text:
-    """Return header and source. scenario, law: names that the scenario's file gives."""
+    """Return header and source. scenario, law: their names in the scenario's file."""
     types = _spoken_of(code, _interface(code))
     public = {kind.name: f"{code.name}_{kind.name.removeprefix('flight_')}" for kind in types}
     return Text(_header(code, types, public, scenario, law, proof), _source(code, public))
@@ -99,30 +99,30 @@ def _state(code: Code, public: dict[str, str]) -> Iterator[str]:
 def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
     loop = code.flight.loop
     card, work = loop.law.card, code.work
-    found = [
+    lines = [
         f"{code.name}: {card.title}",
         "",
         f"{card.summary}",
         "",
         f"Made by starhold {__version__} from the scenario {scenario}, law {law}.",
     ]
-    found += [f"Source: {source}" for source in card.sources]
-    found += [f"Assumes: {'; '.join(card.assumptions)}.", ""]
-    found += [f"Command limit: {_limit(loop)}. Quaternion sign: {loop.sign_policy.replace('_', ' ')}."]
-    found += _choices(loop)
+    lines += [f"Source: {source}" for source in card.sources]
+    lines += [f"Assumes: {'; '.join(card.assumptions)}.", ""]
+    lines += [f"Command limit: {_limit(loop)}. Quaternion sign: {loop.sign_policy.replace('_', ' ')}."]
+    lines += _choices(loop)
     done = f"{work.arithmetic} additions, multiplications, divisions and roots, and {work.comparisons} comparisons"
-    found += ["", f"A step does at most {done}.",
+    lines += ["", f"A step does at most {done}.",
               "Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:",
               "compile with -std=c99 -ffp-contract=off, never with -ffast-math."]  # fmt: skip
-    found += [""]
+    lines += [""]
     if proof.warning:
-        found += ["*" * 100, *(f"WARNING  {line}" for line in proof.warning.splitlines()), "*" * 100]
+        lines += ["*" * 100, *(f"WARNING  {line}" for line in proof.warning.splitlines()), "*" * 100]
     if proof.file:
-        found += ["", f"Certificate: {proof.file}, sha256 {proof.digest}: {proof.outcome}", "Claims:"]
-        found += [f"  {line}" for line in proof.claims]
-        found += [f"These claims assume: {'; '.join(proof.assumptions)}."] if proof.assumptions else []
-        found += [f"Check it independently: {proof.recheck}"]
-    return comment("\n".join(found))
+        lines += ["", f"Certificate: {proof.file}, sha256 {proof.digest}: {proof.outcome}", "Claims:"]
+        lines += [f"  {line}" for line in proof.claims]
+        lines += [f"These claims assume: {'; '.join(proof.assumptions)}."] if proof.assumptions else []
+        lines += [f"Check it independently: {proof.recheck}"]
+    return comment("\n".join(lines))
 
 
 def _limit(loop: Any) -> str:
@@ -138,14 +138,14 @@ def _limit(loop: Any) -> str:
 
 def _choices(loop: Any) -> list[str]:
     """Return the gains that are constants of this code."""
-    found: list[str] = []
+    choices: list[str] = []
     for field in fields(type(loop.gains)):
         value = getattr(loop.gains, field.name)
         if field.gain.choices:
-            found.append(f"{field.name} = {field.gain.choices[value]}")
+            choices.append(f"{field.name} = {field.gain.choices[value]}")
         elif field.gain.whole:
-            found.append(f"{field.name} = {value}")
-    return [f"Fixed in this code: {', '.join(found)}."] if found else []
+            choices.append(f"{field.name} = {value}")
+    return [f"Fixed in this code: {', '.join(choices)}."] if choices else []
 
 
 def _source(code: Code, public: dict[str, str]) -> str:

@@ -76,7 +76,7 @@ class Types:
         self.read = read
 
     def of(self, value: Any, annotation: str = "") -> Type | None:
-        """Return the type of a value; None where nothing of it is left once equations are recorded."""
+        """Return the type of a value; None where recording leaves nothing of it."""
         if value is None or isinstance(value, (bool, int, Buffer)):
             return None
         if not isinstance(value, tuple):
@@ -107,7 +107,7 @@ class Types:
         return self._keep(Type(name, name, tuple(members), "", True, sentence(cls.__doc__ or ""))) if members else None
 
     def several(self, name: str, parts: list[tuple[str, Type | None, int]], text: str = "") -> Type | None:
-        """Return a struct of values that only stand together."""
+        """Return a struct of values that belong together."""
         members = tuple(Member(word, kind, place) for word, kind, place in parts if kind is not None)
         return self._keep(Type(name, name, members, "", bool(text), text)) if members else None
 
@@ -125,12 +125,12 @@ class Types:
             yield member, self.within(value)[member.place]
 
     def within(self, value: Any) -> Any:
-        """Return what tuples of one value hold."""
+        """Return the value inside tuples of one value."""
         while isinstance(value, tuple) and not hasattr(value, "_fields"):
-            held = [part for part in value if self.of(part) is not None]  # pyright: ignore
-            if len(held) != 1:
+            typed = [part for part in value if self.of(part) is not None]  # pyright: ignore
+            if len(typed) != 1:
                 break
-            value = held[0]
+            value = typed[0]
         return value
 
 

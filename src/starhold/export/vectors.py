@@ -26,8 +26,8 @@ _PRIME, _BASIS = 0x100000001B3, 0xCBF29CE484222325
 
 
 class Vector(NamedTuple):
-    """Before a step: whether the state is set anew, and what is measured (the numbers that are read); after it the numbers
-    of the command, and the digest of those of the state."""
+    """Before a step: whether the state is set anew, and the measured numbers that are read; after it the numbers of the
+    command, and the digest of those of the state."""
 
     first: bool
     inputs: list[float]
@@ -36,11 +36,11 @@ class Vector(NamedTuple):
 
 
 def kept_inputs(code: Code) -> list[int]:
-    """Return the places of those of the inputs' numbers that the law reads."""
+    """Return the places of the inputs' numbers that the law reads."""
 
     def those(kind: Type | None, value: Any) -> list[int]:
-        found = [place for member, part in code.types.members(kind, value) for place in those(member.type, part)]
-        return found or [code.types.within(value)]
+        kept = [place for member, part in code.types.members(kind, value) for place in those(member.type, part)]
+        return kept or [code.types.within(value)]
 
     kind = code.given["input"]
     return [] if kind is None else those(kind, places(code.flight.inputs))
@@ -50,7 +50,7 @@ def random_columns(
     rng: np.random.Generator, value: Any, count: int, edges: float = 0.0, name: str = ""
 ) -> NDArray[np.float64]:
     """Return (numbers, count) to stand in place of the floats of a value: quaternions of unit length, flags of 0 or 1,
-    others of any size up to twice the largest of their field; of which some, by the share `edges`, are special."""
+    others of any size up to twice the largest of their field; a share `edges` of them is special."""
     if hasattr(value, "_fields"):
         pairs = list(zip(value._fields, value, strict=True))
     elif isinstance(value, tuple) and any(isinstance(part, tuple) for part in value):
@@ -62,17 +62,17 @@ def random_columns(
     flat = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
     shape = (len(flat), count)
     if name in ("attitude", "followed") and len(flat) == 4:
-        found = rng.normal(size=shape)
-        found /= np.linalg.norm(found, axis=0)
+        values = rng.normal(size=shape)
+        values /= np.linalg.norm(values, axis=0)
     elif name in ("attitude_is_new", "begun"):
-        found = rng.integers(0, 2, shape).astype(float)
+        values = rng.integers(0, 2, shape).astype(float)
     elif name == "sign":
-        found = rng.choice([-1.0, 1.0], shape)
+        values = rng.choice([-1.0, 1.0], shape)
     else:
         size = max([abs(x) for x in flat if math.isfinite(x)] or [0.0]) or 1.0
-        found = size * rng.uniform(-2.0, 2.0, shape) * 10.0 ** rng.uniform(-4.0, 0.0, shape)
+        values = size * rng.uniform(-2.0, 2.0, shape) * 10.0 ** rng.uniform(-4.0, 0.0, shape)
     special = rng.choice(np.array(EDGES), shape)
-    return np.where(rng.random(shape) < edges, special, found)
+    return np.where(rng.random(shape) < edges, special, values)
 
 
 def with_numbers(value: Any, column: NDArray[np.float64]) -> Any:
@@ -83,7 +83,7 @@ def with_numbers(value: Any, column: NDArray[np.float64]) -> Any:
 
 class Stepper:
     """The step that C must equal, step(state, inputs) -> (command, state): the equations of the simulation, recorded and
-    compiled as the simulation's are, so that it goes on beyond a division by zero as C does."""
+    compiled as there, so that it goes on beyond a division by zero as C does."""
 
     def __init__(self, code: Code) -> None:
         flight, recorder = code.flight, Recorder()
@@ -102,8 +102,8 @@ class Stepper:
         given = np.array([x for leaf in leaves(values) for x in _in_order(leaf)])
         self._call(given.ctypes.data, self._gives.ctypes.data)
         numbers, left = iter(self._gives.tolist()), iter(given.tolist())
-        held = [[next(left) for _ in _in_order(leaf)] for leaf in leaves(values)]
-        buffers = iter([cells for cells, leaf in zip(held, leaves(values), strict=True) if isinstance(leaf, Buffer)])
+        cells_of = [[next(left) for _ in _in_order(leaf)] for leaf in leaves(values)]
+        buffers = iter([cells for cells, leaf in zip(cells_of, leaves(values), strict=True) if isinstance(leaf, Buffer)])
         return mapped(self._after, lambda leaf: Buffer(next(buffers)) if isinstance(leaf, Buffer) else next(numbers))
 
 
@@ -120,11 +120,11 @@ def fresh(state: Any) -> Any:
 
 def digest(values: list[float]) -> int:
     """Return the 64-bit FNV-1a hash of the bits of numbers, any NaN being the same."""
-    found = _BASIS
+    value = _BASIS
     for word in bits(values):
         for shift in range(0, 64, 8):
-            found = ((found ^ (word >> shift & 0xFF)) * _PRIME) & 0xFFFFFFFFFFFFFFFF
-    return found
+            value = ((value ^ (word >> shift & 0xFF)) * _PRIME) & 0xFFFFFFFFFFFFFFFF
+    return value
 
 
 def bits(values: list[float]) -> list[int]:
@@ -137,7 +137,7 @@ def vectors(code: Code, seed: int = 1) -> list[Vector]:
     """Return steps that follow one another from the start in some runs, each with measurements of its own; in every
     second run some of them are special."""
     rng, step, keep = np.random.default_rng(seed), Stepper(code), kept_inputs(code)
-    found: list[Vector] = []
+    flights: list[Vector] = []
     for run in range(RUNS // 3 if code.buffers else RUNS):
         state = fresh(code.flight.start)
         for k in range(STEPS):
@@ -145,8 +145,8 @@ def vectors(code: Code, seed: int = 1) -> list[Vector]:
             inputs = with_numbers(code.flight.inputs, column)
             command, state = step(state, inputs)
             given = numbers(inputs)
-            found.append(Vector(k == 0, [given[place] for place in keep], numbers(command), digest(numbers(state))))
-    return found
+            flights.append(Vector(k == 0, [given[place] for place in keep], numbers(command), digest(numbers(state))))
+    return flights
 
 
 def selftest_rows(cases: list[Vector]) -> str:

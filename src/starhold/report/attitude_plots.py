@@ -132,7 +132,7 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
 def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:
     errors = [roll_pitch_yaw(flight.recording["attitude_error"]) for flight in flights]
     panels = [
-        Panel(f"{name}, deg", [_unwrapped(thin(own[:, i], factor)) for own in errors], source=("turn", i))
+        Panel(f"{name}, deg", [_unwrapped(thin(angles[:, i], factor)) for angles in errors], source=("turn", i))
         for i, name in enumerate(("roll", "pitch", "yaw"))
     ]
     return Plot("roll-pitch-yaw", "roll, pitch and yaw error", panels)
@@ -184,7 +184,7 @@ def _transient(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tu
     fastest = table.rate_limit * degrees
     panels = [Panel("norm, deg/s", rates, False, near((fastest,), rates), source=("norm", "rate", degrees))]
     for i, axis in enumerate("xyz"):
-        curves = [thin(own[:, i], factor) for own in turned]
+        curves = [thin(angles[:, i], factor) for angles in turned]
         limit = table.acceleration_limit * degrees
         levels = near((-limit, limit), curves)
         panels.append(Panel(f"{axis}, deg/s²", curves, False, levels, source=("acceleration", i, degrees)))
@@ -231,7 +231,7 @@ def _rate_unit(flights: Sequence[Flight]) -> tuple[float, str]:
 
 
 def _limit(flights: Sequence[Flight], scenario: Scenario) -> tuple[tuple[float, ...], str]:
-    """The limit of the torque (N m) that binds first, and what it is."""
+    """The limit of the torque (N m) that binds first, and its name."""
     attrs: dict[Any, Any] = flights[0].recording.attrs
     limit, kind = float(attrs["torque_limit"]), attrs["limit"]
     limit = math.inf if kind == "none" else limit

@@ -16,8 +16,8 @@ LINE, LIMIT = {"color": "0.3", "linewidth": 1.0, "dashes": (5, 3)}, {"color": "#
 
 
 class Bars(NamedTuple):
-    """A panel: its label, the length of each bar and the words at its end, a dashed line; a title, and what is required,
-    which is a line where that is not too far away."""
+    """A panel: its label, the length of each bar and the words at its end, a dashed line; a title, and the required value, a
+    line unless it is too far away."""
 
     label: str
     values: Sequence[float]

@@ -14,14 +14,15 @@ if TYPE_CHECKING:
 
 
 class Sampling(NamedTuple):
-    """Plots keep two of so many samples; where the transient is shown alone, of so many samples two of so many."""
+    """How plots are thinned: two samples kept of every `factor`. early: samples of the transient where it is shown alone,
+    and their factor."""
 
     factor: int
     early: tuple[int, int] | None = None
 
 
 class PageParts(NamedTuple):
-    """The parts of a page that are the body's own: the data of its scripts, of which "plots" has a box each, HTML, and the
+    """The parts of a page that belong to the body: the data of its scripts (each plot in "plots" has a box), HTML, and the
     names of scripts among the assets."""
 
     data: dict[str, Any]
@@ -42,7 +43,7 @@ class PageParts(NamedTuple):
 
 
 class BodyReport(Protocol):
-    """All that pictures and pages ask of a body; `starhold.report.bodies` holds one `REPORT` a module."""
+    """The hooks of a body for pictures and pages; `starhold.report.bodies` holds one `REPORT` a module."""
 
     def picture(self, flights: Sequence[Flight], scenario: Scenario) -> Picture:
         """Gather what the figures show."""

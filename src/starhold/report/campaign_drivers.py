@@ -23,23 +23,23 @@ UP, DOWN, BOTH = "213,94,0", "0,114,178", "123,63,160"
 """Red, green and blue of what grows, what falls, and what otherwise changes with an input."""
 
 
-def drivers(found: Drivers, words: Wording, most: int) -> Section:
+def drivers(causes: Drivers, words: Wording, most: int) -> Section:
     """Tell what makes runs of a law fail and what moves its metrics, at most so many of a kind."""
     kinds = [
-        [_failure(item) for item in found.inputs if item.significant],
-        [_pair(item) for item in found.pairs if item.significant],
-        [_metric(item, words) for item in found.metrics if item.significant],
+        [_failure(item) for item in causes.inputs if item.significant],
+        [_pair(item) for item in causes.pairs if item.significant],
+        [_metric(item, words) for item in causes.metrics if item.significant],
     ]
     rows = [row for kind in kinds for row in kind[:most]]
     left = sum(map(len, kinds)) - len(rows)
-    told = [f"{found.failures} of {counted(found.runs, 'run')} failed."]
-    told += [] if rows else ["Nothing that was looked at stands out from chance."]
-    told += [f"{counted(left, 'weaker one')} that stand out as well are left out of the table."] if left else []
-    told += [f"{found.remark[:1].upper()}{found.remark[1:]}."] if found.remark else []
-    if found.skipped:
-        told.append(f"Not looked at, for they are constant or lack values: {', '.join(found.skipped)}.")
+    sentences = [f"{causes.failures} of {counted(causes.runs, 'run')} failed."]
+    sentences += [] if rows else ["Nothing that was looked at stands out from chance."]
+    sentences += [f"{counted(left, 'weaker one')} that stand out as well are left out of the table."] if left else []
+    sentences += [f"{causes.remark[:1].upper()}{causes.remark[1:]}."] if causes.remark else []
+    if causes.skipped:
+        sentences.append(f"Not looked at, for they are constant or lack values: {', '.join(causes.skipped)}.")
     columns = [*map(Column, ("what happens", "with", "how", "strength")), *numbers("p, corrected")]
-    return Section("", Table(columns, rows), " ".join(told))
+    return Section("", Table(columns, rows), " ".join(sentences))
 
 
 def _failure(item: FailureDriver) -> list[Any]:
@@ -75,46 +75,48 @@ def indices(result: CampaignResult, words: Wording) -> list[Section]:
     """The sensitivity indices of each law's metrics, or why there are none; nothing where none were asked for."""
     from starhold.campaign.sensitivity import Morris, Refused
 
-    told: list[Section] = []
+    sections: list[Section] = []
     for law in result.laws:
-        for metric, found in law.indices.items():
+        for metric, outcome in law.indices.items():
             measure = words.measure(metric)
             heading = f"{law.law}: {measure.heading}"
-            if isinstance(found, Refused):
-                told.append(Section(heading, Table([], []), f"No sensitivity indices: {found.reason}."))
+            if isinstance(outcome, Refused):
+                sections.append(Section(heading, Table([], []), f"No sensitivity indices: {outcome.reason}."))
             else:
-                told.append(_morris(found, measure, heading) if isinstance(found, Morris) else _sobol(found, heading))
-    return told
+                sections.append(
+                    _morris(outcome, measure, heading) if isinstance(outcome, Morris) else _sobol(outcome, heading)
+                )
+    return sections
 
 
-def _morris(found: Morris, measure: Measure, heading: str) -> Section:
-    most, scale = max(map(abs, found.mu_star), default=0.0) or 1.0, measure.scale
+def _morris(effects: Morris, measure: Measure, heading: str) -> Section:
+    most, scale = max(map(abs, effects.mu_star), default=0.0) or 1.0, measure.scale
     rows = [
         [
-            found.names[i],
-            Cell(_with_width(found.mu_star[i], found.mu_star_width[i], scale), "share", found.mu_star[i] / most),
-            *(figure(scale * x[i]) for x in (found.mu, found.sigma)),
+            effects.names[i],
+            Cell(_with_width(effects.mu_star[i], effects.mu_star_width[i], scale), "share", effects.mu_star[i] / most),
+            *(figure(scale * x[i]) for x in (effects.mu, effects.sigma)),
         ]
-        for i in _strongest(found.mu_star)
+        for i in _strongest(effects.mu_star)
     ]
     note = (
         "Elementary effects from the lowest to the highest level of each input, beyond which an eighth of its probability "
     )
-    note += f"lies on each side; ± holds with {percent(found.confidence)} confidence."
-    if found.dropped:
-        note += f" {found.dropped} of {found.trajectories} trajectories were dropped, for they hold failed runs."
+    note += f"lies on each side; ± holds with {percent(effects.confidence)} confidence."
+    if effects.dropped:
+        note += f" {effects.dropped} of {effects.trajectories} trajectories were dropped, for they hold failed runs."
     columns = [Column("input"), Column("mean magnitude μ*", measure.unit)]
     columns += numbers(f"mean μ|{measure.unit}", f"spread σ|{measure.unit}")
     return Section(heading, Table(columns, rows), note)
 
 
-def _sobol(found: Sobol, heading: str) -> Section:
-    kinds = ((found.first, found.first_width), (found.total, found.total_width))
+def _sobol(shares: Sobol, heading: str) -> Section:
+    kinds = ((shares.first, shares.first_width), (shares.total, shares.total_width))
     rows = [
-        [found.names[i], *(Cell(_with_width(share[i], width[i]), "share", share[i]) for share, width in kinds)]
-        for i in _strongest(found.total)
+        [shares.names[i], *(Cell(_with_width(share[i], width[i]), "share", share[i]) for share, width in kinds)]
+        for i in _strongest(shares.total)
     ]
-    note = f"Shares of the metric's variance; ± holds with {percent(found.confidence)} confidence."
+    note = f"Shares of the metric's variance; ± holds with {percent(shares.confidence)} confidence."
     return Section(heading, Table([*map(Column, ("input", "by itself", "with all others"))], rows), note)
 
 
@@ -128,15 +130,15 @@ def _strongest(values: Iterable[float]) -> Sequence[int]:
     return sorted(range(len(listed)), key=lambda i: (math.isnan(listed[i]), -listed[i]))
 
 
-def picture(found: Drivers, words: Wording) -> str:
+def picture(causes: Drivers, words: Wording) -> str:
     """Show the strengths of all inputs that stand out as colours, one row an input, one column for failure and each
     metric."""
     cells = {
         (item.input, ""): Cell(f"{item.distance:.2f}", "shade", item.distance, BOTH)
-        for item in found.inputs
+        for item in causes.inputs
         if item.significant
     }
-    for item in found.metrics:
+    for item in causes.metrics:
         if item.significant:
             colour = BOTH if item.words else UP if item.correlation > 0.0 else DOWN
             text = f"{item.correlation:{'' if item.words else '+'}.2f}".replace("-", "−")

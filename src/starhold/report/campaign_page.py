@@ -93,19 +93,19 @@ def _shown(section: Section | None, level: int = 2, fit: bool = False) -> str:
 
 
 def _headlines(result: CampaignResult, words: Wording) -> Iterator[str]:
-    """Tell of each law what its verdicts come to."""
+    """Sum up the verdicts of each law in a sentence."""
     for number, law in enumerate(result.laws):
-        told = escape(headline(law, result.sampling, words).replace(" %", f"{NBSP}%"))
-        yield f'<p class="said">{pill(outcome_of(law))}<span><b>{swatch(number)}{escape(law.law)}</b> {told}</span></p>'
+        text = escape(headline(law, result.sampling, words).replace(" %", f"{NBSP}%"))
+        yield f'<p class="said">{pill(outcome_of(law))}<span><b>{swatch(number)}{escape(law.law)}</b> {text}</span></p>'
 
 
 def _in_words(result: CampaignResult) -> str:
-    told = "".join(
+    items = "".join(
         f"<li>{swatch(number)}{escape(f'{law.law}: {verdict.sentence()}')}</li>"
         for number, law in enumerate(result.laws)
         for verdict in law.verdicts
     )
-    return f'<details><summary>The verdicts in words</summary><ul class="note">{told}</ul></details>'
+    return f'<details><summary>The verdicts in words</summary><ul class="note">{items}</ul></details>'
 
 
 def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
@@ -127,9 +127,9 @@ def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
 
 
 def _indices(result: CampaignResult, words: Wording) -> Iterator[str]:
-    found = indices(result, words)
-    yield "<h2>Sensitivity indices</h2>" if found else ""
-    yield from (_shown(section, 3, fit=True) for section in found)
+    sections = indices(result, words)
+    yield "<h2>Sensitivity indices</h2>" if sections else ""
+    yield from (_shown(section, 3, fit=True) for section in sections)
 
 
 def _for_script(plot: dict[str, Any]) -> dict[str, Any]:
@@ -172,18 +172,18 @@ def _over_time(plots: list[dict[str, Any]], result: CampaignResult) -> str:
 def _store(result: CampaignResult, words: Wording) -> str:
     folder = shlex.quote(result.folder.as_posix())
     questions = ["select law, count(*) as runs, avg(failed::int) as failed from runs group by law"]
-    if found := headings_of(result, words):
-        column = '"{}"'.format(found[0].replace('"', '""'))
+    if headings := headings_of(result, words):
+        column = '"{}"'.format(headings[0].replace('"', '""'))
         questions.append(f"select law, run, {column} from runs where failed order by {column} desc limit 10")
-    asked = "".join(f"<p>{code(f'starhold query {folder} {shlex.quote(question)}')}</p>" for question in questions)
+    examples = "".join(f"<p>{code(f'starhold query {folder} {shlex.quote(question)}')}</p>" for question in questions)
     return (
         "<h2>Results</h2>\n"
         f'<p>Digest (SHA-256 of the sorted results): <code class="copy">{escape(result.digest)}</code></p>\n'
         '<p class="note">The same scenario gives the same digest, whatever flies it. Every run is a row of the table '
-        f"<code>runs</code>, with its inputs, metrics and margins:</p>\n{asked}"
+        f"<code>runs</code>, with its inputs, metrics and margins:</p>\n{examples}"
     )
 
 
 def _reading() -> str:
-    items = "".join(f"<dt>{escape(what)}</dt><dd>{escape(told)}</dd>" for what, told in READING.items())
+    items = "".join(f"<dt>{escape(what)}</dt><dd>{escape(meaning)}</dd>" for what, meaning in READING.items())
     return f'<h2>How to read this page</h2>\n<dl class="reading">{items}</dl>'

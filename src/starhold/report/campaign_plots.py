@@ -28,7 +28,7 @@ NEAR = 1.0
 
 def histograms(result: CampaignResult, words: Wording) -> list[dict[str, Any]]:
     """Make a plot for each metric of which some law has a histogram."""
-    found: list[dict[str, Any]] = []
+    plots: list[dict[str, Any]] = []
     for metric in headings_of(result, words):
         spreads = {
             number: spread
@@ -37,8 +37,8 @@ def histograms(result: CampaignResult, words: Wording) -> list[dict[str, Any]]:
             if spread.metric == metric and _drawable(spread)
         }
         if spreads:
-            found.append(_histogram(f"spread-{len(found)}", metric, spreads, result, words))
-    return found
+            plots.append(_histogram(f"spread-{len(plots)}", metric, spreads, result, words))
+    return plots
 
 
 def _drawable(spread: Spread) -> bool:
@@ -48,9 +48,9 @@ def _drawable(spread: Spread) -> bool:
 def _histogram(name: str, metric: str, spreads: dict[int, Spread], result: CampaignResult, words: Wording) -> dict[str, Any]:
     measure = words.measure(metric)
     edges = {number: spread.edges for number, spread in spreads.items()}
-    log = all(own[0] > 0.0 for own in edges.values()) and any(map(_geometric, edges.values()))
+    log = all(bins[0] > 0.0 for bins in edges.values()) and any(map(_geometric, edges.values()))
     first = next(iter(edges.values()))
-    same = all(np.array_equal(own, first) for own in edges.values())
+    same = all(np.array_equal(bins, first) for bins in edges.values())
     curves: list[dict[str, Any]] = []
     for number, spread in spreads.items():
         scaled = edges[number] * measure.scale
@@ -59,17 +59,17 @@ def _histogram(name: str, metric: str, spreads: dict[int, Spread], result: Campa
         values = share if same else np.divide(share, width, out=np.zeros_like(share), where=width > 0.0)
         curves.append({"law": number, "edges": rounded(scaled, 7), "values": rounded(values, 5), "share": rounded(share, 4)})
     per = "" if same else " a decade" if log else f" per {measure.unit or 'unit'}"
-    low = min(float(own[0]) for own in edges.values()) * measure.scale
-    high = max(float(own[-1]) for own in edges.values()) * measure.scale
-    asked = [item for item in words.asked.values() if item.column == metric and math.isfinite(item.bound)]
-    bounds = [item.bound * measure.scale for item in asked]
+    low = min(float(bins[0]) for bins in edges.values()) * measure.scale
+    high = max(float(bins[-1]) for bins in edges.values()) * measure.scale
+    required = [item for item in words.requirements.values() if item.column == metric and math.isfinite(item.bound)]
+    bounds = [item.bound * measure.scale for item in required]
     missing = ", ".join(
         f"{result.laws[number].law} {count_text(spread.missing)}" for number, spread in spreads.items() if spread.missing
     )
     return {
         "name": name,
         "title": measure.heading,
-        "notes": [f"required: {words.asks(item.name)}" for item in asked]
+        "notes": [f"required: {words.asks(item.name)}" for item in required]
         + ([f"runs without a value: {missing}"] if missing else []),
         "xlabel": measure.unit or measure.heading,
         "ylabel": f"% of runs{per}",
@@ -98,21 +98,21 @@ def _near(bound: float, low: float, high: float, log: bool) -> bool:
 def envelopes(result: CampaignResult, words: Wording) -> list[dict[str, Any]]:
     """Make a plot over time for each quantity, all laws in it."""
     names = list(dict.fromkeys(envelope.name for law in result.laws for envelope in law.envelopes))
-    found: list[dict[str, Any]] = []
+    plots: list[dict[str, Any]] = []
     for name in names:
-        own = {
+        by_law = {
             number: envelope
             for number, law in enumerate(result.laws)
             for envelope in law.envelopes
             if envelope.name == name and len(envelope.times)
         }
-        if own:
-            found.append(_envelope(f"envelope-{len(found)}", own, words))
-    return found
+        if by_law:
+            plots.append(_envelope(f"envelope-{len(plots)}", by_law, words))
+    return plots
 
 
-def _envelope(name: str, own: dict[int, Envelope], words: Wording) -> dict[str, Any]:
-    first = next(iter(own.values()))
+def _envelope(name: str, by_law: dict[int, Envelope], words: Wording) -> dict[str, Any]:
+    first = next(iter(by_law.values()))
     measure = plain_measure(first.name, first.unit, first.meaning)
     curves = [
         {
@@ -120,9 +120,9 @@ def _envelope(name: str, own: dict[int, Envelope], words: Wording) -> dict[str, 
             "times": rounded(envelope.times / words.metric_set.tick),
             **{key: rounded(values * measure.scale, 4) for key, values in _lines(envelope).items()},
         }
-        for number, envelope in own.items()
+        for number, envelope in by_law.items()
     ]
-    known = np.concatenate([values for envelope in own.values() for values in _lines(envelope).values()]) * measure.scale
+    known = np.concatenate([values for envelope in by_law.values() for values in _lines(envelope).values()]) * measure.scale
     known = known[np.isfinite(known) & (known > 0.0)]
     span = ticks = None
     if len(known) and math.log10(float(known.max()) / float(known.min())) > DECADES:

@@ -1,4 +1,4 @@
-"""The tables that a campaign comes to, as the terminal prints them and the page shows them."""
+"""The tables that sum up a campaign, as the terminal prints them and the page shows them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Section(NamedTuple):
-    """A table under its heading, and what is said of it."""
+    """A table under its heading, and a note on it."""
 
     heading: str
     table: Table
@@ -34,7 +34,7 @@ class Section(NamedTuple):
 
 
 def numbers(*names: str) -> list[Column]:
-    """Columns of what stands at the right: each its heading, and after a stroke what stands below."""
+    """Columns of numbers, aligned right: each its heading, and after a stroke the line below it."""
     return [Column(name, below, ">") for name, _, below in (one.partition("|") for one in names)]
 
 
@@ -48,12 +48,12 @@ def verdicts(result: CampaignResult, words: Wording) -> Section | None:
     rows: list[list[Any]] = []
     ends: set[int] = set()
     for name in dict.fromkeys(verdict.name for law in result.laws for verdict in law.verdicts):
-        told: Any = words.called(name)
+        heading: Any = words.called(name)
         for number, law in enumerate(result.laws):
             for verdict in law.verdicts:
                 if verdict.name == name:
-                    rows.append([told, law_cell(result, number), *_verdict(verdict, words)])
-                    told = ""
+                    rows.append([heading, law_cell(result, number), *_verdict(verdict, words)])
+                    heading = ""
         ends.add(len(rows) - 1)
     if not rows:
         return None
@@ -81,15 +81,15 @@ def _verdict(verdict: Verdict, words: Wording) -> list[Any]:
 
 def _conditions(result: CampaignResult) -> list[str]:
     """The conditions known before flight in which requirements are not met."""
-    told: list[str] = []
+    sentences: list[str] = []
     for law in result.laws:
         for verdict in law.verdicts:
             part = verdict.worst_part
             if part is not None and part.outcome != "met" and verdict.independent:
                 missed = f"{count_text(part.failures)} of {counted(part.runs, 'run')} miss it"
                 where = f"with {part.name}, known before flight"
-                told.append(f"{law.law}: {where}, {verdict.name} is {part.outcome}: {missed}.")
-    return told
+                sentences.append(f"{law.law}: {where}, {verdict.name} is {part.outcome}: {missed}.")
+    return sentences
 
 
 def runs(result: CampaignResult) -> Section:
@@ -107,22 +107,21 @@ def runs(result: CampaignResult) -> Section:
 
 
 def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> Section | None:
-    """The distribution of each metric under each law, or of the first ones; those that something is required of before
-    all."""
-    found, asked = headings_of(result, words), {item.column for item in words.asked.values()}
+    """The distribution of each metric under each law, the required ones first; `most`: no more metrics than these."""
+    headings, required = headings_of(result, words), {item.column for item in words.requirements.values()}
     rows: list[list[Any]] = []
     ends: set[int] = set()
-    for metric in sorted(found, key=lambda metric: (metric not in asked, found.index(metric)))[:most]:
+    for metric in sorted(headings, key=lambda metric: (metric not in required, headings.index(metric)))[:most]:
         measure = words.measure(metric)
-        told: list[Any] = [Cell(measure.heading, detail=measure.meaning), measure.unit]
+        cells: list[Any] = [Cell(measure.heading, detail=measure.meaning), measure.unit]
         for number, law in enumerate(result.laws):
             for spread in law.spreads:
                 if spread.metric == metric:
                     least, low, _, median, _, high, largest = spread.quantiles
                     values = (figure(measure.scale * x) for x in (least, low, median, high, largest, spread.mean))
                     missing = count_text(spread.missing) if spread.missing else DASH
-                    rows.append([*told, law_cell(result, number), *values, missing])
-                    told = ["", ""]
+                    rows.append([*cells, law_cell(result, number), *values, missing])
+                    cells = ["", ""]
         ends.add(len(rows) - 1)
     if not rows:
         return None
@@ -154,11 +153,11 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
     for number, law in enumerate(result.laws):
         for item in law.brackets:
             measure = words.measure(item.metric, item.unit)
-            told, why = worst_text(item, measure), "nothing is proved of it"
+            text, why = worst_text(item, measure), "nothing is proved of it"
             if item.proved is not None:
-                told, why = f"{told} {order(item)} {with_unit(item.proved, measure)}", item.assumption
+                text, why = f"{text} {order(item)} {with_unit(item.proved, measure)}", item.assumption
             tries = f"{counted(item.evaluations, 'flight')} of the search" if item.evaluations else DASH
-            rows.append([measure.heading, law_cell(result, number), told, why, tries, Cell(item.file, "typed")])
+            rows.append([measure.heading, law_cell(result, number), text, why, tries, Cell(item.file, "typed")])
             faults += [f"{law.law}, {measure.heading}: {CONTRADICTED}"] if item.contradicted else []
     if not rows:
         return None

@@ -1,4 +1,4 @@
-"""How the numbers of a campaign are told: metrics and requirements in the units of the other pages, shares, counts."""
+"""How the numbers of a campaign are shown: metrics and requirements in the units of the other pages, shares, counts."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ INDEPENDENT = "random"
 
 @dataclass(frozen=True)
 class Wording:
-    """How a campaign's numbers are told: its body's metrics, the requirements by name, the SI units of metrics by name."""
+    """How a campaign's numbers are shown: its body's metrics, the requirements by name, the SI units of metrics by name."""
 
     metric_set: MetricSet
-    asked: Mapping[str, Requirement]
+    requirements: Mapping[str, Requirement]
     units: Mapping[str, str]
 
     @classmethod
     def of(cls, body: str, result: CampaignResult) -> Wording:
-        """Make the wording for a campaign on the body of this name; what its metrics are called is the body's matter."""
+        """Make the wording for a campaign on the body of this name, whose analysis names the metrics."""
         known = getattr(body_module("starhold.analysis", body), "METRICS", None) or MetricSet({}, ())
         units = {spread.metric: spread.unit for law in result.laws for spread in law.spreads}
         return cls(known, {item.name: item for item in result.requirements}, units)
@@ -44,25 +44,25 @@ class Wording:
 
     def required(self, name: str) -> Measure:
         """Tell how the metric of the requirement of this name is shown."""
-        return self.measure(self.asked[name].column if name in self.asked else name)
+        return self.measure(self.requirements[name].column if name in self.requirements else name)
 
     def is_loss(self, name: str) -> bool:
         """Tell whether the requirement of this name is that the motion is not lost."""
-        return name in self.asked and self.asked[name].column == LOST
+        return name in self.requirements and self.requirements[name].column == LOST
 
     def asks(self, name: str) -> str:
         """Tell what the requirement of this name asks for; empty where only the name is known."""
-        if name not in self.asked:
+        if name not in self.requirements:
             return ""
-        item, measure = self.asked[name], self.required(name)
+        item, measure = self.requirements[name], self.required(name)
         if self.is_loss(name):
             return "the motion is not lost"
         return f"{measure.heading} at {'most' if item.at_most else 'least'} {with_unit(item.bound, measure)}"
 
     def called(self, name: str) -> str:
-        """Tell the requirement of this name, and what it asks for."""
+        """Name the requirement of this name, and say what it asks for."""
         asks = self.asks(name)
-        return f"{name}: {asks}" if asks and name != self.asked[name].metric else asks or name
+        return f"{name}: {asks}" if asks and name != self.requirements[name].metric else asks or name
 
     def margin(self, name: str, value: float | None) -> str:
         """Show a margin of the requirement of this name, with its unit; it is minus infinity where a run has no value."""
@@ -74,7 +74,7 @@ class Wording:
 
 
 def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
-    """Tell how a quantity with a unit (SI) is shown of which no more is known; angles in degrees."""
+    """Tell how a quantity is shown of which only the unit (SI) is known; angles in degrees."""
     heading = name.replace("_", " ")
     if unit == "rad" or unit.startswith("rad/"):
         return Measure(heading, f"deg{pretty_unit(unit[3:])}", meaning, 180.0 / math.pi)
@@ -96,12 +96,12 @@ def figure(value: float, digits: int = 4) -> str:
 
 
 def with_unit(value: float, measure: Measure) -> str:
-    """Show an SI value in a measure's unit, which is told."""
+    """Show an SI value in a measure's unit, which is named."""
     return f"{figure(value * measure.scale)} {measure.unit}".rstrip()
 
 
 def worst_text(bracket: Bracket, measure: Measure) -> str:
-    """Tell a bracket up to what is true of the metric, whose worst is the largest value or the least."""
+    """Show the worst of a metric, the largest value or the least, as the first part of a bracket."""
     if math.isnan(bracket.flown):
         return "lost, or without a value"
     return f"{with_unit(bracket.flown, measure)} {order(bracket)} true"
@@ -127,18 +127,18 @@ def count_text(number: int) -> str:
 
 def headings_of(result: CampaignResult, words: Wording) -> list[str]:
     """List the metrics of a campaign: those of the body first, in its order, then the others as they come."""
-    found = dict.fromkeys(spread.metric for law in result.laws for spread in law.spreads)
-    known: list[str] = [metric for metric in words.metric_set.measures if metric in found]
-    return [*known, *(metric for metric in found if metric not in known)]
+    metrics = dict.fromkeys(spread.metric for law in result.laws for spread in law.spreads)
+    known: list[str] = [metric for metric in words.metric_set.measures if metric in metrics]
+    return [*known, *(metric for metric in metrics if metric not in known)]
 
 
 def bounds_text(verdict: Verdict) -> str:
-    """Tell between what the failure probability lies, as far as is known."""
+    """Show the bounds between which the failure probability lies, as far as they are known."""
     if verdict.lower is None or verdict.upper is None:
         return DASH
     return f"{figure(100.0 * verdict.lower, 3)} to {few_percent(verdict.upper)}"
 
 
 def counted(number: int, what: str) -> str:
-    """Tell how many there are of something whose plural ends in s."""
+    """Show a count and its noun, whose plural ends in s."""
     return f"{count_text(number)} {what}{'' if number == 1 else 's'}"

@@ -1,4 +1,4 @@
-"""The sentences that a campaign comes to, each with the assumption that decides it."""
+"""The sentences that sum up a campaign, each with the assumption that it rests on."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ SAMPLINGS = {
 
 
 def outcome_of(law: LawResult) -> str:
-    """Tell what all verdicts of a law come to; empty where nothing is required."""
+    """Tell the outcome of all verdicts of a law together; empty where nothing is required."""
     outcomes = {verdict.outcome for verdict in law.verdicts}
     return next((outcome for outcome in ("missed", "not decided", "met") if outcome in outcomes), "")
 
 
 def headline(law: LawResult, sampling: str, words: Wording) -> str:
-    """Tell in one or two sentences whether a law keeps what is required, and what that rests on; without its name."""
+    """Tell in one or two sentences whether a law keeps its requirements, and what that rests on; without its name."""
     outcome = outcome_of(law)
     chosen = [verdict for verdict in law.verdicts if verdict.outcome == outcome]
     if outcome == "met":
@@ -65,8 +65,8 @@ def _met(verdicts: list[Verdict], words: Wording) -> str:
 
 def _missed(verdicts: list[Verdict], total: int, words: Wording) -> str:
     # A verdict of "missed" has bounds.
-    told = listed([_shortfall(verdict, words) for verdict in verdicts])
-    return f"misses {_some(len(verdicts), total)}: {told}. Shown with {_confidences(verdicts)}, {_provided(verdicts)}"
+    shortfalls = listed([_shortfall(verdict, words) for verdict in verdicts])
+    return f"misses {_some(len(verdicts), total)}: {shortfalls}. Shown with {_confidences(verdicts)}, {_provided(verdicts)}"
 
 
 def _shortfall(verdict: Verdict, words: Wording) -> str:
@@ -81,7 +81,7 @@ def _open(verdicts: list[Verdict], total: int, sampling: str, words: Wording) ->
     if sampling != INDEPENDENT or not all(verdict.independent for verdict in verdicts):
         seen = listed([f"{percent(verdict.observed)} {_keep(verdict, words)}" for verdict in verdicts])
         return f"is not judged, for runs by {sampled(sampling)} are not independent of each other; of those flown {seen}."
-    found: list[str] = []
+    questions: list[str] = []
     for verdict in verdicts:
         part, one = verdict.worst_part, verdict.failures == 1
         lacking = ("is lost" if one else "are lost") if words.is_loss(verdict.name) else ("misses it" if one else "miss it")
@@ -90,10 +90,10 @@ def _open(verdicts: list[Verdict], total: int, sampling: str, words: Wording) ->
             seen += f", {count_text(part.failures)} of the {count_text(part.runs)} with {part.name}"
         if verdict.more:
             seen += f"; about {counted(verdict.more, 'further run')} without a failure would show it"
-        found.append(f"whether {percent(verdict.share)} of all flights {_keep(verdict, words)} ({seen})")
+        questions.append(f"whether {percent(verdict.share)} of all flights {_keep(verdict, words)} ({seen})")
     return (
-        f"leaves {_some(len(verdicts), total)} open: {listed(found)}. This is to be shown with {_confidences(verdicts)}, "
-        f"{_provided(verdicts)}"
+        f"leaves {_some(len(verdicts), total)} open: {listed(questions)}. This is to be shown with "
+        f"{_confidences(verdicts)}, {_provided(verdicts)}"
     )
 
 

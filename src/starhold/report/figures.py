@@ -1,4 +1,4 @@
-"""Figures as PNG files, every law in every figure, and what they are drawn with."""
+"""Figures as PNG files, every law in every figure, and the helpers that draw them."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Picture(Protocol):
     """All that the figures show, without the runs it was taken from: small, and quickly sent to another process."""
 
     def makers(self) -> dict[str, Callable[[], Any]]:
-        """Tell what draws each figure, by the names of their files."""
+        """Return the function that draws each figure, by the name of its file."""
         ...
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:
-    """Flights without what was recorded."""
+    """Flights without their recordings."""
     return [replace(flight, recording=NOTHING) for flight in flights]
 
 
@@ -104,14 +104,14 @@ WORD_HEIGHT, WORD_ROWS = 9.5, 4
 
 def word_rows(marks: Sequence[Mark], end: float) -> dict[Mark, int]:
     """The row in which the word of each mark stands, so that none overlaps another; those without room are left out."""
-    ends, found = [-1.0] * WORD_ROWS, dict[Mark, int]()
+    ends, rows = [-1.0] * WORD_ROWS, dict[Mark, int]()
     for mark in sorted(marks):
         row = next((row for row, taken in enumerate(ends) if mark.time >= taken), None)
         if mark.word and row is not None:
             # About 4.6 points a letter on axes of 507 points.
-            found[mark] = row
+            rows[mark] = row
             ends[row] = mark.time + end * (4.6 * len(shortened(mark.word, 24)) + 8.0) / 507.0
-    return found
+    return rows
 
 
 def blank(
@@ -146,7 +146,7 @@ def headed(
     from matplotlib.lines import Line2D
 
     # As many names in a line as fit.
-    names = [_told(flight) for flight in flights]
+    names = [_legend_text(flight) for flight in flights]
     per_row = max(1, min(len(flights), 104 // (7 + max(map(len, names), default=0))))
     lines = -(-len(flights) // per_row)
     head = 0.40 + 0.20 * lines + gap
@@ -170,13 +170,13 @@ def headed(
         columnspacing=1.6,
     )
     # Set afterwards, for a name may start with an underscore or hold a dollar sign, which labels read as commands.
-    for text, told in zip(legend.get_texts(), names, strict=True):
+    for text, words in zip(legend.get_texts(), names, strict=True):
         text.set_parse_math(False)
-        text.set_text(told)
+        text.set_text(words)
     return figure, total, 1.0 - head / total
 
 
-def _told(flight: Flight) -> str:
+def _legend_text(flight: Flight) -> str:
     fate = "" if flight.lost is None else f" (diverged at {lost_text(flight, 4)})"
     return shortened(flight.name, (48 if fate else 40) - len(fate)) + fate
 

@@ -1,4 +1,4 @@
-"""Tables of results as HTML, and what stands beside them."""
+"""HTML for tables of results, and for outcomes, code and notes beside them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PILLS = {"met": "proved", "missed": "refuted", "not decided": "undecided"}
 
 
 def table_html(table: Table, kind: str = "", fit: bool = False) -> str:
-    """Make a table that scrolls where it is too wide, and is no wider than it needs to be if it shall `fit`."""
+    """Make a table that scrolls where it is too wide; with `fit` it is no wider than its contents."""
     sides = [' class="number"' if column.format else ' class="words"' for column in table.columns]
     heads = "".join(
         f'<th scope="col"{side}>{escape(column.name)}{f"<small>{escape(column.unit)}</small>" if column.unit else ""}</th>'

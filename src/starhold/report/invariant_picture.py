@@ -94,17 +94,17 @@ def _handles(drawn: Sequence[Portrait]) -> list[Any]:
     from matplotlib.patches import Patch
 
     theorems = {item.claim.numbers["theorem"] for item in drawn}
-    found: list[Any] = []
+    handles: list[Any] = []
     if any(item.claim.numbers.get("level") for item in drawn):
-        found.append(Patch(facecolor=INSIDE, alpha=0.6, edgecolor=SET, label="{V ≤ level}"))
+        handles.append(Patch(facecolor=INSIDE, alpha=0.6, edgecolor=SET, label="{V ≤ level}"))
     if any(item.equilibrium is None and item.claim.numbers["theorem"] != "unstable" for item in drawn):
-        found.append(Patch(facecolor=SET, alpha=0.6, label="M"))
+        handles.append(Patch(facecolor=SET, alpha=0.6, label="M"))
     if any(item.equilibrium is not None for item in drawn):
-        found.append(Line2D([], [], color=SET, marker="o", linestyle="", label="M, an equilibrium"))
+        handles.append(Line2D([], [], color=SET, marker="o", linestyle="", label="M, an equilibrium"))
     if "unstable" in theorems:
-        found.append(Patch(facecolor=AGAINST, alpha=0.2, label="V > 0: left by every motion"))
+        handles.append(Patch(facecolor=AGAINST, alpha=0.2, label="V > 0: left by every motion"))
     if any(item.orbit is not None for item in drawn):
-        found.append(Line2D([], [], color=TRUE, linestyle=(0, (5, 2)), label="border of the true region"))
+        handles.append(Line2D([], [], color=TRUE, linestyle=(0, (5, 2)), label="border of the true region"))
     if any(item.marks for item in drawn):
-        found.append(Line2D([], [], color=AGAINST, marker="X", linestyle="", label="refutes"))
-    return found
+        handles.append(Line2D([], [], color=AGAINST, marker="X", linestyle="", label="refutes"))
+    return handles

@@ -1,4 +1,4 @@
-"""The part of the page that tells the linear loop near the target: its margins, and Bode and Nichols plots."""
+"""The section of the page on the linear loop near the target: its margins, and Bode and Nichols plots."""
 
 from __future__ import annotations
 
@@ -85,17 +85,17 @@ def _rows(one: _Known) -> str:
     name = f"{swatch(one.number)}{escape(one.name)}"
     if one.linear is None:
         return f'<tr><th scope="row">{name}</th><td colspan="6">no linear form: {escape(one.why)}</td></tr>'
-    told = "" if one.linear.is_stable else '<td colspan="3">not stable</td>'
-    found: list[str] = []
+    unstable = "" if one.linear.is_stable else '<td colspan="3">not stable</td>'
+    rows: list[str] = []
     for about in one.margins:
         values = [_decibels(about), number_text(math.degrees(about.phase), DIGITS), number_text(about.delay, DIGITS)]
-        cells = told or "".join(f"<td>{value}</td>" for value in values)
+        cells = unstable or "".join(f"<td>{value}</td>" for value in values)
         rest = [
             number_text(value, DIGITS) if math.isfinite(value) else "—" for value in (about.crossover, about.sensitivity)
         ]
         cells += "".join(f"<td>{value}</td>" for value in rest)
-        found.append(f'<tr><th scope="row">{name}</th><td>{about.axis}</td>{cells}</tr>')
-    return "".join(found)
+        rows.append(f'<tr><th scope="row">{name}</th><td>{about.axis}</td>{cells}</tr>')
+    return "".join(rows)
 
 
 def _decibels(about: Margins) -> str:
@@ -162,8 +162,8 @@ def _plots(known: Sequence[_Known]) -> str:
 
 def _unwrapped(loop: Any) -> Any:
     """The phase without jumps, from the highest gain on, within (-270, 90] degrees there."""
-    found = np.unwrap(np.angle(loop))
-    return found - 2.0 * math.pi * np.ceil((found[0] - 0.5 * math.pi) / (2.0 * math.pi))
+    phase = np.unwrap(np.angle(loop))
+    return phase - 2.0 * math.pi * np.ceil((phase[0] - 0.5 * math.pi) / (2.0 * math.pi))
 
 
 def _frame(panel: _Panel) -> str:

@@ -1,4 +1,5 @@
-"""Pages fly their scenario again with these data: programs, sliders, the file with open values, what claims stand on."""
+"""The data by which a page flies its scenario again: programs, sliders, the file with open values, the conditions of
+claims."""
 
 from __future__ import annotations
 
@@ -42,7 +43,7 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
     numbers = {flight.name: number for number, flight in enumerate(flights)}
     laws = [law for law in made.laws if law.name in numbers]
     if not any(law.follows for law in laws):
-        return "; ".join(sorted({*made.grounded.values(), *(why for law in laws for why in law.held.values())}))
+        return "; ".join(sorted({*made.grounded.values(), *(why for law in laws for why in law.unfollowed.values())}))
     table = scenario.table
     transient = getattr(table, "transient", None)
     keys = [key for key in made.dials if key not in made.gains or key.partition(".")[2].rpartition(".")[0] in numbers]
@@ -50,9 +51,9 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
         "dials": [_dial(made, key) for key in keys],
         "asked": [
             {"law": one.law, "keys": one.keys, "program": _script(one.program), "refusals": one.refusals}
-            for one in made.asked.questions
+            for one in made.checks.questions
         ],
-        "ranged": made.asked.ranged,
+        "ranged": made.checks.ranged,
         "ranges": {"near": NEAR, "range": RANGE, "least": LEAST, "most": MOST},
         "linked": dict(scenario.hooks.linked),
         "file": [piece._asdict() for piece in made.pieces],
@@ -73,11 +74,11 @@ def _dial(made: Reflight, key: str) -> dict[str, Any]:
     gain = _declared(made.scenario, key) if item is None else item.gain
     bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
     unit = "" if gain.unit == "1" else gain.unit.replace("^2", "²")
-    found: dict[str, Any] = {"key": key, "value": made.dials[key], "unit": unit} | bounds
+    dial: dict[str, Any] = {"key": key, "value": made.dials[key], "unit": unit} | bounds
     if item is None:
-        found["degrees"] = unit.startswith("rad") and "deg" in _written(made.scenario, key, made.dials[key])
-        return found | {"label": LABELS.get(key, key), "law": None, "text": ""}
-    return found | {"label": item.name, "law": key.partition(".")[2].rpartition(".")[0], "text": gain.text}
+        dial["degrees"] = unit.startswith("rad") and "deg" in _written(made.scenario, key, made.dials[key])
+        return dial | {"label": LABELS.get(key, key), "law": None, "text": ""}
+    return dial | {"label": item.name, "law": key.partition(".")[2].rpartition(".")[0], "text": gain.text}
 
 
 def _declared(scenario: Scenario, key: str) -> Gain:
@@ -87,19 +88,19 @@ def _declared(scenario: Scenario, key: str) -> Gain:
 
 
 def _written(scenario: Scenario, key: str, value: Any) -> str:
-    """Return what the file has for a key of its own tables, where that is told with units; else ""."""
+    """Return the file's text for a key of its own tables, where that has units; else ""."""
     table, _, name = key.partition(".")
     return with_units(read_toml(scenario.text, scenario.where).get(table, {}).get(name), value)
 
 
 def _law(law: Reflown) -> dict[str, Any]:
-    """The page flies a law with these; numbers are the bytes of 64-bit floats."""
+    """The data by which the page flies a law; numbers are the bytes of 64-bit floats."""
     return {
         "name": law.name,
         "fly": _script(law.program),
         "derive": None if law.derive is None else _script(law.derive),
         "follows": law.follows,
-        "held": law.held,
+        "held": law.unfollowed,
         "places": law.places,
         "carried": law.carried,
         "numbers": _bytes(law.numbers),
@@ -115,7 +116,8 @@ def _law(law: Reflown) -> dict[str, Any]:
 
 
 def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
-    """Give the page the metrics of a law's flights; numbers that a slider or the flight's length changes go by name."""
+    """Give the page the equations of the metrics of a law's flights; numbers that a slider or the flight's length changes go
+    by name."""
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
     meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)
@@ -141,19 +143,19 @@ def _bytes(numbers: Any) -> str:
 
 
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
-    """Tell what every claim of the page stands on."""
-    found: list[dict[str, Any]] = []
+    """Tell under which conditions each claim of the page stands."""
+    claims: list[dict[str, Any]] = []
     for number, flight in enumerate(flights):
         if flight.name not in laws:
             continue
         for place, certificate in enumerate(flight.certificates):
             for i, claim in enumerate(certificate.claims):
-                told = asdict(standing(claim, laws[flight.name].reads))
+                conditions = asdict(standing(claim, laws[flight.name].reads))
                 moments = (
                     [certificate.subject["inertia"][k][k] for k in range(3)] if "inertia" in certificate.subject else []
                 )
-                found.append({"mark": f"{number}:{place}:{i}", "law": flight.name, "moments": moments, **told})
-    return found
+                claims.append({"mark": f"{number}:{place}:{i}", "law": flight.name, "moments": moments, **conditions})
+    return claims
 
 
 def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The page that tells a comparison, opens offline and loads nothing."""
+"""The page of a comparison; it opens offline and loads nothing."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> Non
 
 def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """The report as HTML text. Whatever comes from files is escaped."""
-    own = report_of(scenario.body).page(flights, scenario)
-    living = "the page of this body has none" if own.sampling is None else living_data(scenario, flights, own.sampling)
+    parts = report_of(scenario.body).page(flights, scenario)
+    living = "the page of this body has none" if parts.sampling is None else living_data(scenario, flights, parts.sampling)
     grounded = (
         f'<p class="note">Nothing here can be flown again with sliders: {escape(living)}.</p>'
         if isinstance(living, str)
@@ -45,16 +45,16 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     sections = [
         lost_alarm(flights),
         ranking(flights),
-        own.measured,
+        parts.measured,
         proved(flights),
-        *own.views,
-        over_time_heading(own.transient),
+        *parts.views,
+        over_time_heading(parts.transient),
         grounded,
-        *(plot_box(plot) for plot in own.data["plots"] if "planes" not in plot),
+        *(plot_box(plot) for plot in parts.data["plots"] if "planes" not in plot),
         laws_table(flights),
-        own.units,
-        settings(scenario, own.settings),
+        parts.units,
+        settings(scenario, parts.settings),
         columns_list(flights),
     ]
-    data, moved = {"laws": law_data(flights), **own.data}, None if isinstance(living, str) else living
-    return document(scenario, sections, data, own.scripts, f"{versions()}{own.footer}.", moved)
+    data, moved = {"laws": law_data(flights), **parts.data}, None if isinstance(living, str) else living
+    return document(scenario, sections, data, parts.scripts, f"{versions()}{parts.footer}.", moved)

@@ -51,26 +51,26 @@ def document(
         f"<details><summary>Scenario text</summary><pre>{escape(scenario.text)}</pre></details>",
         f"<footer>{escape(footer)}</footer>",
     ]
-    libraries, own = [], [*scripts]
+    libraries, used = [], [*scripts]
     if any(name in WITH_PLOTLY for name in scripts):
         from plotly.offline import get_plotlyjs
 
         libraries.append(get_plotlyjs())
-        own.insert(0, "look.js")
+        used.insert(0, "look.js")
     if data["plots"]:
         # Its licence goes with every copy.
         libraries.append(f"/*!\n{_asset('uplot.LICENSE').strip()}\n*/\n{_asset('uplot.js')}")
-        own.insert(0, "plots.js")
-    held = [_held("data", data)]
+        used.insert(0, "plots.js")
+    embedded = [_embedded("data", data)]
     if living is not None:
-        held += [_held("living", living), f'<script type="text/plain" id="flight">\n{_asset("flight.js")}</script>']
+        embedded += [_embedded("living", living), f'<script type="text/plain" id="flight">\n{_asset("flight.js")}</script>']
         body.append(DIALS)
-        own += ["living.js", "sliders.js"]
+        used += ["living.js", "sliders.js"]
     ending = [
-        *held,
+        *embedded,
         *(f"<script>{library}</script>" for library in libraries),
         f"<script>\n{_asset('page.js')}{_asset('tables.js')}</script>",
-        f"<script>\n{''.join(_asset(name) for name in own)}</script>",
+        f"<script>\n{''.join(_asset(name) for name in used)}</script>",
     ]
     return plain_document(scenario.name, [*body, *ending])
 
@@ -103,7 +103,7 @@ DIALS = """\
 </aside>"""
 
 
-def _held(name: str, data: Mapping[str, Any]) -> str:
+def _embedded(name: str, data: Mapping[str, Any]) -> str:
     """Data for scripts. A script's text ends at the first "</", also within a string."""
     embedded = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{embedded}</script>'
@@ -170,9 +170,9 @@ def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[Mark] = ())
 def lost_alarm(flights: Sequence[Flight]) -> str:
     """List the motions that diverged, and the metrics that are not numbers; empty if there are none."""
     lost = [f"{flight.name} (at {lost_text(flight)})" for flight in flights if flight.lost is not None]
-    told = [f"Diverged, and so without final values: {', '.join(lost)}"] if lost else []
-    told += [said for flight in flights if (said := unknown_text(flight))]
-    return "".join(f'<p class="alarm">{escape(said)}.</p>' for said in told)
+    sentences = [f"Diverged, and so without final values: {', '.join(lost)}"] if lost else []
+    sentences += [said for flight in flights if (said := unknown_text(flight))]
+    return "".join(f'<p class="alarm">{escape(said)}.</p>' for said in sentences)
 
 
 def ranking(flights: Sequence[Flight]) -> str:
@@ -192,7 +192,7 @@ def ranking(flights: Sequence[Flight]) -> str:
         flight = flights[numbers[name]]
         lost = flight.lost is not None
         cells = "".join(
-            f"{BEST if name in best[metric] else '<td>'}{metric_set.told(metric, flight.metrics)}</td>" for metric in metrics
+            f"{BEST if name in best[metric] else '<td>'}{metric_set.cell(metric, flight.metrics)}</td>" for metric in metrics
         )
         fate = f"diverged at {lost_text(flight)}" if lost else flight.law if flight.law != name else ""
         rows.append(
@@ -245,13 +245,15 @@ def settings(scenario: Scenario, title: str) -> str:
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
         # What a campaign draws is not flown here, nor a target beside one that is a part.
-        own = any(fitted.part.role == name for fitted in scenario.parts)
-        if isinstance(table, BaseModel) and name != "campaign" and not own:
+        is_part = any(fitted.part.role == name for fitted in scenario.parts)
+        if isinstance(table, BaseModel) and name != "campaign" and not is_part:
             parts.append(_table(name, table, shared, written.get(name, {})))
         elif table is None:
             # Told with each part where the table is not there.
             shared = {key: value for key, value in shared.items() if not key.startswith(f"{name}.")}
-    parts += [_part(fitted, shared, own) for fitted, own in zip(scenario.parts, written.get("part", []), strict=True)]
+    parts += [
+        _part(fitted, shared, is_part) for fitted, is_part in zip(scenario.parts, written.get("part", []), strict=True)
+    ]
     return f'<h2>{title}</h2>\n<div class="columns">{"".join(parts)}</div>'
 
 
@@ -277,9 +279,11 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
         if isinstance(value, BaseModel):
             inner = {f"{key}.{one}": getattr(value, one) for one in type(value).model_fields}
             texts = written.get(key, {})
-            for one, found in inner.items():
-                if found is not None:
-                    rows.append(_row(one, with_units(texts.get(one.partition(".")[2]), found) or _value(found), ""))
+            for one, inner_value in inner.items():
+                if inner_value is not None:
+                    rows.append(
+                        _row(one, with_units(texts.get(one.partition(".")[2]), inner_value) or _value(inner_value), "")
+                    )
         elif value is not None:
             meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
             rows.append(_row(key, (with_units(written.get(key), value) or _value(value)) + given, meaning))
@@ -288,7 +292,7 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
 
 
 def with_units(written: Any, value: Any) -> str:
-    """Return what a file has for numbers, where that is told with units; "" where it is not."""
+    """Return the file's text of numbers, where that has units; "" where it has none."""
     texts = cast(list[Any], written) if isinstance(written, list) else [written]
     numbers = isinstance(value, (int, float, tuple, list, np.ndarray)) and not isinstance(value, bool)
     return ", ".join(texts) if numbers and texts and all(isinstance(text, str) for text in texts) else ""
@@ -301,9 +305,9 @@ def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         if item.gain.shared in shared:
             continue
-        told = item.gain.choices[value] if item.gain.choices else _value(value)
+        text = item.gain.choices[value] if item.gain.choices else _value(value)
         unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
-        rows.append(_row(item.name, with_units(written.get(item.name), value) or told + unit, item.gain.text))
+        rows.append(_row(item.name, with_units(written.get(item.name), value) or text + unit, item.gain.text))
     title = f"{fitted.part.role} {fitted.called}"
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
 
@@ -363,5 +367,5 @@ def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, 
 
 
 def rounded(values: Iterable[float], digits: int = 6) -> list[float | None]:
-    """Numbers of a few digits for JSON, which has none for what is not finite."""
+    """Numbers of a few digits for JSON, which has none that are not finite."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()]

@@ -61,7 +61,7 @@ class Painter:
 
     @contextmanager
     def paused(self) -> Generator[None]:
-        """Let nothing be drawn for a while, so that what is timed has the machine to itself."""
+        """Draw nothing for a while, so that a timed call has the machine to itself."""
         self._signal("SIGSTOP")
         try:
             yield
@@ -87,14 +87,14 @@ class Painter:
             self._sender.join()
 
     def finish(self) -> InputError | None:
-        """Wait for the files. Returns why they cannot be written; RuntimeError tells what else went wrong."""
+        """Wait for the files. Returns why they cannot be written; RuntimeError for any other failure."""
         self._sent()
         _, said = self._process.communicate()
-        told = said.decode(errors="replace").strip()
+        message = said.decode(errors="replace").strip()
         if self._process.returncode == UNWRITABLE:
-            return InputError(told.splitlines()[0], "", "", "")
+            return InputError(message.splitlines()[0], "", "", "")
         if self._process.returncode != 0:
-            raise RuntimeError(f"the figures could not be drawn: {told[-2000:]}")
+            raise RuntimeError(f"the figures could not be drawn: {message[-2000:]}")
         return None
 
 

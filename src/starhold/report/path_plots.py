@@ -114,8 +114,8 @@ def _control(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int
         panels.append(Panel(f"{axis}, µm/s²", curves, False, near(each, curves) if each else ()))
     sizes = [thin(np.linalg.norm(flight.recording["control"], axis=1) * worth, factor) for flight in flights]
     panels.append(Panel("norm, µm/s²", sizes, False, near(tuple(limits), sizes) if limits and kind == "norm" else ()))
-    told = ", ".join(f"{limit:.4g}" for limit in limits)
-    dashed = f"limit of {'each axis' if kind == 'axis' else 'the norm'}, {told} µm/s²" if limits else "no limit"
+    limits_text = ", ".join(f"{limit:.4g}" for limit in limits)
+    dashed = f"limit of {'each axis' if kind == 'axis' else 'the norm'}, {limits_text} µm/s²" if limits else "no limit"
     return Plot("control", "control acceleration", panels, dashed, True, clock)
 
 

@@ -44,16 +44,16 @@ class _Axis:
 
     def path(self, start: Any, step: float) -> NDArray[np.float64]:
         """From many starts (2, n) the paths (2, n, steps), by the classical Runge-Kutta method; far away they stop."""
-        state, found = np.array(start, dtype=float), []
+        state, states = np.array(start, dtype=float), []
         for _ in range(STEPS):
-            found.append(state)
+            states.append(state)
             a = self.slope(state)
             b = self.slope(state + 0.5 * step * a)
             c = self.slope(state + 0.5 * step * b)
             d = self.slope(state + step * c)
             near = np.abs(state).max(axis=0) < 3.0 * WINDOW * self.saddle
             state = state + np.where(near, step / 6.0, 0.0) * (a + 2.0 * b + 2.0 * c + d)
-        return np.stack(found, axis=-1)
+        return np.stack(states, axis=-1)
 
     def separatrix(self, side: float) -> tuple[Curve, Curve]:
         """The path that ends in a saddle: where the region of attraction ends."""

@@ -59,11 +59,13 @@ def swatch(number: int) -> str:
 
 def section(flights: Sequence[Flight]) -> str:
     """The section as HTML; nothing where no flight has a certificate."""
-    told = [_law(flight, number, i) for number, flight in enumerate(flights) for i in range(len(flight.certificates))]
-    if not told:
+    blocks = [_law(flight, number, i) for number, flight in enumerate(flights) for i in range(len(flight.certificates))]
+    if not blocks:
         return ""
     command = escape(recheck([certificate for flight in flights for certificate in flight.certificates]))
-    return f'<h2>What is proved</h2>\n<p class="note">{NOTE}{RECHECK % command}</p>\n<div class="laws">{"".join(told)}</div>'
+    return (
+        f'<h2>What is proved</h2>\n<p class="note">{NOTE}{RECHECK % command}</p>\n<div class="laws">{"".join(blocks)}</div>'
+    )
 
 
 def _law(flight: Flight, number: int, place: int) -> str:
@@ -80,7 +82,7 @@ def _law(flight: Flight, number: int, place: int) -> str:
 
 
 def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> str:
-    told = sentence(claim, subject)
+    statement = sentence(claim, subject)
     why = "".join(
         f'<span class="why">{escape(f"Needed, but {o.outcome}: {OBLIGATIONS[o.name]}.")} <b>{escape(evidence(o))}</b></span>'
         for o in claim.obligations
@@ -91,7 +93,7 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> st
     rows = "".join(_obligation(o) for o in claim.obligations)
     return (
         f'<details class="claim" data-claim="{mark}"><summary>{_outcome(claim.outcome)}<span class="what">'
-        f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(told))}. "
+        f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(statement))}. "
         f"<small>By {escape(methods(claim))}.</small>{why}</span></summary>\n"
         f'<div class="wide"><table class="text"><tbody>{rows}</tbody></table></div>{_numbers(claim)}'
         f"<p><b>Assuming</b> {escape('; '.join(claim.assumptions))}.</p></details>\n"
@@ -100,9 +102,9 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> st
 
 def _obligation(obligation: Obligation) -> str:
     text = OBLIGATIONS[obligation.name]
-    found = f"<br><b>{escape(evidence(obligation))}</b>" if obligation.evidence else ""
+    reason = f"<br><b>{escape(evidence(obligation))}</b>" if obligation.evidence else ""
     return (
-        f"<tr><td>{_outcome(obligation.outcome)}</td><td>{escape(_sentence_case(text))}{found}</td>"
+        f"<tr><td>{_outcome(obligation.outcome)}</td><td>{escape(_sentence_case(text))}{reason}</td>"
         f"<td>{escape(obligation.how)}</td></tr>"
     )
 

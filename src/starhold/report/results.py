@@ -40,9 +40,9 @@ def open_folder(folder: Path, force: bool) -> Path:
         claim(folder)
         clear_unfinished(folder)
         # Looked for once nobody else writes them.
-        held = [mark for mark in MARKS if (folder / mark).exists()]
-        if held and not force:
-            raise InputError(str(folder), "", f"results already there ({held[0]})", "another folder with -o, or --force")
+        marks = [mark for mark in MARKS if (folder / mark).exists()]
+        if marks and not force:
+            raise InputError(str(folder), "", f"results already there ({marks[0]})", "another folder with -o, or --force")
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
     except BlockingIOError:
@@ -50,7 +50,7 @@ def open_folder(folder: Path, force: bool) -> Path:
     except OSError as error:
         shown = cut(str(folder), LONGEST_PATH)
         raise InputError(shown, "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
-    if held:
+    if marks:
         _clear(folder)
     return folder
 

@@ -166,7 +166,7 @@ def _places(what: StabilityMap, texts: Any) -> list[tuple[float, float]]:
     # A corner of the box lies above the border where K_a < c K_w^2.
     bend = c * what.K_w[-1] ** 2 / what.K_a[-1]
     steps = np.linspace(0.0, 1.0, 61)
-    found: list[tuple[float, float]] = []
+    places: list[tuple[float, float]] = []
     for text, wanted, side in texts:
         lines = text.split("\n")
         half = np.array([0.012 + 0.0058 * max(map(len, lines)), 0.014 + 0.0182 * len(lines)])
@@ -178,10 +178,10 @@ def _places(what: StabilityMap, texts: Any) -> list[tuple[float, float]]:
                 hidden = (np.abs(taken - [[x], [y]]) < half[:, None] + 0.008).all(axis=0).sum()
                 choices.append((int(hidden), float(np.hypot(x - wanted[0], y - wanted[1])), (float(x), float(y))))
         place = min(choices, default=(0, 0.0, wanted))[2]
-        found.append(place)
+        places.append(place)
         inside = (np.mgrid[-1:1:21j, -1:1:21j].reshape(2, -1) * half[:, None]) + np.array(place)[:, None]
         taken = np.hstack([taken, inside])
-    return found
+    return places
 
 
 def _axes(ratios: tuple[float, ...]) -> list[tuple[str, float]]:

@@ -61,8 +61,8 @@ def _how(departures: Sequence[str]) -> str:
 
 def unknown_text(flight: Flight) -> str:
     """Recorded quantities of a flight that are no numbers to its end, for reading; empty where all are."""
-    told = [f"{name} from {flight.metric_set.moment(time)} on" for name, time in flight.unknown.items()]
-    return f"{flight.name}: no number to the end: {', '.join(told)}" if told else ""
+    spans = [f"{name} from {flight.metric_set.moment(time)} on" for name, time in flight.unknown.items()]
+    return f"{flight.name}: no number to the end: {', '.join(spans)}" if spans else ""
 
 
 def lost_text(flight: Flight, digits: int = 6) -> str:

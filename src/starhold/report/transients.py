@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 
-def told(flight: Flight) -> str:
+def transient_text(flight: Flight) -> str:
     """One line about a flight with such metrics."""
     time, rate, accelerations, fate = _cells(flight)
     return f"transient {time}; peak rate {rate}; peak acceleration {accelerations}: {fate}"
@@ -37,14 +37,14 @@ def section(flights: Sequence[Flight]) -> str:
 
 
 def _cells(flight: Flight) -> tuple[str, str, str, str]:
-    found = flight.metrics
-    time = "comes to no end" if found["transient_time"] is None else f"{found['transient_time']:.4g} s"
-    accelerations = ", ".join(f"{math.degrees(x):.4g}" for x in found["peak_accelerations"])
+    metrics = flight.metrics
+    time = "comes to no end" if metrics["transient_time"] is None else f"{metrics['transient_time']:.4g} s"
+    accelerations = ", ".join(f"{math.degrees(x):.4g}" for x in metrics["peak_accelerations"])
     return (
         time,
-        f"{math.degrees(found['peak_rate']):.4g}{_most(found['rate_limit'])} deg/s",
-        f"{accelerations}{_most(found['acceleration_limit'])} deg/s²",
-        "kept" if found["limits_kept"] else "exceeded",
+        f"{math.degrees(metrics['peak_rate']):.4g}{_most(metrics['rate_limit'])} deg/s",
+        f"{accelerations}{_most(metrics['acceleration_limit'])} deg/s²",
+        "kept" if metrics["limits_kept"] else "exceeded",
     )
 
 

@@ -1,2 +1,2 @@
-"""Flights with their metrics and certificates, and what is asked of many: comparisons, sweeps, failures, budgets. Each body
-has a study in `bodies`."""
+"""Flights with their metrics and certificates, and studies of many flights: comparisons, sweeps, failures, budgets. Each
+body has a study in `bodies`."""

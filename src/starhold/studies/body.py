@@ -46,7 +46,7 @@ class BodyStudy:
     nothing is claimed."""
 
     def name_samples(self, scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
-        """Name the samples of `fly`, with what they are measured by among the attributes."""
+        """Name the samples of `fly`; the attributes hold the numbers that metrics need."""
         return label(loop, samples, carry, scenario.table.simulation.record_every)
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
@@ -54,16 +54,16 @@ class BodyStudy:
         return any_body.measure(run)
 
     def meter(self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES) -> Meter:
-        """Make what measures many flights along their way, as `metrics_of` does recordings of every control step. gains:
-        those of all lanes, with an array (lanes,) in place of a number that differs; extras: metrics that are measured where
-        they are asked for; cones: axes with the directions that they are to stay away from, by the names of their metrics.
-        ValueError where the body has no such thing."""
+        """Make the meter that measures many flights along their way, as `metrics_of` does recordings of every control step.
+        gains: those of all lanes, with an array (lanes,) in place of each number that differs; extras: metrics that are
+        measured only where they are asked for; cones: axes with the directions that they are to stay away from, by the names
+        of their metrics. ValueError where the body has no such thing."""
         nothing_more(extras, cones)
         clock = getattr(loop.body.module, "TIME_UNIT", "s")
         return any_body.make_meter(recorded_of(loop), scenario.table.simulation.steps, loop.period, clock)
 
     def metric_set(self, run: Recording) -> MetricSet:
-        """Say how metrics of such runs are told and ranked."""
+        """Return how metrics of such runs are shown and ranked."""
         return any_body.metric_set(run)
 
     def state_names(self, run: Recording) -> Sequence[str]:
@@ -111,6 +111,6 @@ def nothing_more(extras: Sequence[str], cones: Cones) -> None:
 
 def body_module(package: str, body: str) -> Any:
     """The module of a package that is named for a body, else its `any_body`."""
-    own = f"{package}.{body.replace('-', '_')}"
-    there = body.replace("-", "").isalnum() and find_spec(own) is not None
-    return import_module(own if there else f"{package}.any_body")
+    name = f"{package}.{body.replace('-', '_')}"
+    there = body.replace("-", "").isalnum() and find_spec(name) is not None
+    return import_module(name if there else f"{package}.any_body")

@@ -1,5 +1,5 @@
-"""A pointing error budget: what each source contributes to the error, what all of them together do, and the root sum square
-of the contributions beside it."""
+"""A pointing error budget: the contribution of each source to the error, their root sum square, and the error under all
+sources together."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ MOST = 5_000_000
 
 @dataclass(frozen=True)
 class Settings:
-    """How errors were taken: from when on (s), over windows of what length (s), whose starts are how far apart for drift
-    (s), the share of the errors that their level keeps and what it is a share of, how many runs, the line of sight."""
+    """How errors are taken: from which time on (s), over windows of which length (s), how far apart windows start for drift
+    (s), the share of the errors that a level keeps and how the share is meant, the number of runs, and the line of sight."""
 
     start: float
     window: float
@@ -82,8 +82,8 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Budget:
-    """The pointing errors of a law by source. Levels are told about the line of sight where there is one, else of the angle
-    about whatever axis."""
+    """The pointing errors of a law by source. Levels are about the line of sight where there is one, else of the angle about
+    any axis."""
 
     scenario: str
     law: str
@@ -95,7 +95,7 @@ class Budget:
 
     @property
     def axis(self) -> str:
-        """The axis that levels are told about."""
+        """The axis that levels are about."""
         return ANGLE if self.settings.boresight is None else LINE
 
     @property
@@ -110,8 +110,8 @@ class Budget:
 
     def row(self, name: str) -> Contribution:
         """The row of this name. KeyError where there is none."""
-        found = {row.name: row for row in self.rows}
-        return found[name]
+        rows = {row.name: row for row in self.rows}
+        return rows[name]
 
     def level(self, name: str, index: str) -> float:
         """The level of an index (rad) in the row of this name."""
@@ -140,10 +140,10 @@ class Budget:
     def records(self) -> list[dict[str, Any]]:
         """The rows of `table`."""
         return [
-            {"source": row.name, "kind": row.kind, "index": index, "axis": axis, **found._asdict()}
+            {"source": row.name, "kind": row.kind, "index": index, "axis": axis, **figures._asdict()}
             for row in self.rows
             for index, axes in row.figures.items()
-            for axis, found in axes.items()
+            for axis, figures in axes.items()
         ]
 
 
@@ -164,15 +164,15 @@ def study(
     the windows do not fit into the run, or a motion is lost.
     """
     scenario = scenario.about("rigid-body").with_({"fault": None, "campaign": None})
-    found, clock = sources(scenario), _Clock.of(scenario)
-    if not found:
+    disturbing, clock = sources(scenario), _Clock.of(scenario)
+    if not disturbing:
         allowed = "noise, a torque, wheel friction or another source of error"
         raise InputError(scenario.where, "", "nothing that disturbs the loop", allowed)
-    names = (LOOP, *(source.name for source in found), TOGETHER)
+    names = (LOOP, *(source.name for source in disturbing), TOGETHER)
     flown: list[tuple[Array, Array | None]] = []
     for done, name in enumerate(names):
         notice(done, len(names), name)
-        away = [source for source in found if name not in (source.name, TOGETHER)]
+        away = [source for source in disturbing if name not in (source.name, TOGETHER)]
         changes = {key: value for source in away for key, value in source.without.items()}
         gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
         loop = build(scenario.with_(changes), _without_effectors(entry, gone))
@@ -191,8 +191,8 @@ def study(
     still, rows = flown[0], list[Contribution]()
     for name, errors in zip(names, flown, strict=True):
         kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
-        own = errors if kind != "source" else tuple(_less(a, b) for a, b in zip(errors, still, strict=True))
-        rows.append(Contribution(name, kind, _figures(clock, *own)))
+        moved = errors if kind != "source" else tuple(_less(a, b) for a, b in zip(errors, still, strict=True))
+        rows.append(Contribution(name, kind, _figures(clock, *moved)))
     rows.insert(-1, Contribution(COMBINED, "combined", _combined(rows[:-1])))
     wanted = scenario.table.budget.requirement.model_dump()
     required = {index.upper(): most for index, most in wanted.items() if most is not None}
@@ -205,14 +205,15 @@ def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
     if not isinstance(module, Modes):
         return entry
     left = [mode.effectors and tuple(name for name in mode.effectors if name not in gone) for mode in module.modes]
-    modes = tuple(mode._replace(effectors=own) for mode, own in zip(module.modes, left, strict=True))
+    modes = tuple(mode._replace(effectors=kept) for mode, kept in zip(module.modes, left, strict=True))
     return replace(entry, law=make_law(modes))
 
 
 def sources(scenario: Scenario) -> tuple[Source, ...]:
-    """Tell what disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and
-    whatever of a sensor may be zero and is not, but for times. Actuators, estimators and sampling belong to the loop."""
-    found = [
+    """Tell what disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and the
+    parameters of a sensor that may be zero and are not, except times. Actuators, estimators and sampling belong to the
+    loop."""
+    disturbing = [
         Source(key.replace("_", " "), {f"{name}.{key}": type(value)()})
         for name in ("environment", "sensor")
         for key, value in getattr(scenario.table, name)
@@ -220,18 +221,18 @@ def sources(scenario: Scenario) -> tuple[Source, ...]:
     ]
     wheels = wheels_of(scenario)
     if wheels is not None and np.any((wheels.viscous, wheels.coulomb)):
-        found.append(Source("wheel friction", _smooth(scenario)))
+        disturbing.append(Source("wheel friction", _smooth(scenario)))
     for fitted in scenario.parts:
         key, part = f"part.{fitted.called}", fitted.part
         passive = part.role == "effector" and not part.flag("ACTS")
         if passive or (part.role == "environment" and part.hook("torque") is not None):
-            found.append(Source(fitted.called, {key: None}))
+            disturbing.append(Source(fitted.called, {key: None}))
         elif part.role == "sensor":
             errors = _errors_of(fitted)
-            found += [
+            disturbing += [
                 Source(f"{fitted.called} {name.replace('_', ' ')}", {f"{key}.{name}": zero}) for name, zero in errors.items()
             ]
-    return tuple(found)
+    return tuple(disturbing)
 
 
 def _smooth(scenario: Scenario) -> dict[str, Any]:
@@ -240,14 +241,14 @@ def _smooth(scenario: Scenario) -> dict[str, Any]:
 
 
 def _errors_of(fitted: Fitted) -> dict[str, Any]:
-    """The parameters of a sensor that are errors, with zeros in their place."""
-    found: dict[str, Any] = {}
+    """The parameters of a sensor that are errors, by name, with the zeros that remove them."""
+    zeros: dict[str, Any] = {}
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         # What has to be given may be a direction, unless zero is where its bounds begin.
         absent = item.gain.at_least == 0.0 if item.required else not np.any(item.default)
         if absent and _may_be_zero(item.gain) and np.any(value):
-            found[item.name] = [0.0] * item.gain.shape[0] if item.gain.shape else 0.0
-    return found
+            zeros[item.name] = [0.0] * item.gain.shape[0] if item.gain.shape else 0.0
+    return zeros
 
 
 def _may_be_zero(gain: Parameter) -> bool:
@@ -269,10 +270,10 @@ class _Clock(NamedTuple):
     @classmethod
     def of(cls, scenario: Scenario) -> _Clock:
         """The times of a scenario's [budget] table. InputError where they do not fit into its runs."""
-        timing, told = scenario.table.simulation, scenario.table.budget
+        timing, wanted = scenario.table.simulation, scenario.table.budget
         period = timing.control_period * timing.record_every
         last = (timing.steps - 1) // timing.record_every
-        start = 0.5 * timing.duration if told.start is None else told.start
+        start = 0.5 * timing.duration if wanted.start is None else wanted.start
         first = math.ceil(start / period - 1e-9)
         count = last - first + 1
 
@@ -287,13 +288,13 @@ class _Clock(NamedTuple):
 
         if count < 4:
             raise InputError(scenario.where, "budget.start", f"{start:g} s", f"at most {(last - 3) * period:g} s")
-        length = samples("window", told.window, 0.1, count - 1, 2)
-        apart = samples("separation", told.separation, 0.5, count - length, 1)
-        if count * told.runs > MOST:
-            raise InputError(scenario.where, "budget.runs", f"{told.runs} of {count} samples", f"at most {MOST} in all")
-        boresight = None if told.boresight is None else tuple(told.boresight)
+        length = samples("window", wanted.window, 0.1, count - 1, 2)
+        apart = samples("separation", wanted.separation, 0.5, count - length, 1)
+        if count * wanted.runs > MOST:
+            raise InputError(scenario.where, "budget.runs", f"{wanted.runs} of {count} samples", f"at most {MOST} in all")
+        boresight = None if wanted.boresight is None else tuple(wanted.boresight)
         settings = Settings(
-            first * period, length * period, apart * period, told.confidence, told.interpretation, told.runs, boresight
+            first * period, length * period, apart * period, wanted.confidence, wanted.interpretation, wanted.runs, boresight
         )
         return cls(settings, timing.steps, timing.record_every, first, length, apart)
 
@@ -310,7 +311,7 @@ def _note(parts: Composition, knows: bool) -> Any:
     """The equations of the notes; one function for loops that one kernel flies."""
     read = sampled(parts)
 
-    def note(seen: Any, decided: Any, carry: Any, step: Any, setup: Any, told: Any) -> _Noted:
+    def note(seen: Any, decided: Any, carry: Any, step: Any, setup: Any, numbers: Any) -> _Noted:
         error = rotation_vector(read(decided, step, setup)["attitude_error"])
         estimate = decided.memories.estimate
         return _Noted(error, rotation_vector(relative(decided.state.attitude, estimate.attitude)) if knows else ())
@@ -344,8 +345,8 @@ def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock,
         pool.share(work, batch.count, 1)()
     lost = batch.carries()[places(batch.like).lost_at]
     if (lost >= 0.0).any():
-        found = f"{name}: the motion is lost at {lost[lost >= 0.0].min() * loop.period:g} s"
-        raise InputError(scenario.where, f"law.{entry.name}", found, "a law that holds the attitude")
+        reason = f"{name}: the motion is lost at {lost[lost >= 0.0].min() * loop.period:g} s"
+        raise InputError(scenario.where, f"law.{entry.name}", reason, "a law that holds the attitude")
     errors = noted.reshape(-1, len(instants), size)[:runs]
     return errors[..., :3], errors[..., 3:] if knows else None
 
@@ -356,18 +357,18 @@ def _less(errors: Array | None, still: Array | None) -> Array | None:
 
 def _figures(clock: _Clock, errors: Array | None, knowledge: Array | None) -> dict[str, dict[str, Figures]]:
     """The figures of each index about each axis."""
-    told, vectors = clock.settings, dict[str, Array]()
+    settings, vectors = clock.settings, dict[str, Array]()
     if errors is not None:
         vectors |= indices(errors, clock.length, clock.apart)
     if knowledge is not None:
-        own = indices(knowledge, clock.length, clock.apart)
-        vectors |= {name: own[like] for name, like in KNOWLEDGE.items()}
+        known = indices(knowledge, clock.length, clock.apart)
+        vectors |= {name: known[like] for name, like in KNOWLEDGE.items()}
     return {
         index: {
-            axis: figures(values, told.confidence, told.interpretation)
-            for axis, values in about_axes(found, told.boresight).items()
+            axis: figures(values, settings.confidence, settings.interpretation)
+            for axis, values in about_axes(samples, settings.boresight).items()
         }
-        for index, found in vectors.items()
+        for index, samples in vectors.items()
     }
 
 

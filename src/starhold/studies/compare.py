@@ -37,21 +37,21 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
 
 
 def timed(scenario: Scenario, loop: Any, flight: Flight) -> Flight:
-    """The flight with what a call of its law costs, told truly only where nothing else keeps the machine busy."""
+    """The flight with the cost of a call of its law, measured truly only on a machine that does nothing else."""
     return replace(flight, metrics=flight.metrics | study_of(scenario.body).call_costs(loop, flight.recording))
 
 
 def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight) -> Flight:
-    """The flight with the certificates of its law, and how it leaves their claims; without where the law takes the craft for
-    another one, of which they would speak."""
+    """The flight with the certificates of its law, and how it leaves their claims; without either where the law's nominal
+    model is not the craft."""
     study = study_of(scenario.body)
-    found = [] if loop.nominal is not None else study.certify(scenario, entry, loop)
-    left = tuple(study.departures(issued, loop, flight.recording) for issued in found)
-    return replace(flight, certificates=tuple(issued.certificate for issued in found), departures=left)
+    certified = [] if loop.nominal is not None else study.certify(scenario, entry, loop)
+    left = tuple(study.departures(issued, loop, flight.recording) for issued in certified)
+    return replace(flight, certificates=tuple(issued.certificate for issued in certified), departures=left)
 
 
 def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress | None = None) -> Flight:
-    """The flight with what half the integration step changes among its metrics."""
+    """The flight with the change of its metrics under half the integration step."""
     from starhold.analysis.step_check import halved, step_error
 
     finer = record(scenario, halved(loop), progress)
@@ -73,12 +73,12 @@ def name_samples(scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Rec
 
 
 def metrics_of(run: Recording) -> dict[str, Any]:
-    """The metrics of a recorded run, but for those of the law's calls."""
+    """The metrics of a recorded run, without those of the law's calls."""
     return study_of(run.attrs["body"]).metrics_of(run)
 
 
 def metric_set_of(run: Recording) -> MetricSet:
-    """How the metrics of a recorded run are told."""
+    """How the metrics of a recorded run are shown."""
     return study_of(run.attrs["body"]).metric_set(run)
 
 

@@ -1,4 +1,4 @@
-"""The failures of wheels: what a spacecraft can still do after the loss of one or two of them."""
+"""The failures of wheels: the control that a spacecraft has after the loss of one or two of them."""
 
 from __future__ import annotations
 
@@ -108,14 +108,14 @@ def study(
     losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
     intact = authority(wheels)
     eta = _degree(scenario, entry, entry.gains)
-    found: list[Failure] = []
+    failures: list[Failure] = []
     for done, lost in enumerate(losses):
         failure = _left(wheels, lost, intact)
         notice(done, len(losses), failure.name)
         failure = replace(failure, eta_intact=eta)
-        found.append(_flown(scenario, entry, failure) if failure.controllable else failure)
+        failures.append(_flown(scenario, entry, failure) if failure.controllable else failure)
     notice(len(losses), len(losses), "")
-    return found
+    return failures
 
 
 def directions_lacking(axes: Array) -> Array:
@@ -183,9 +183,9 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         FaultTable(time=0.0, wheel=wheel, lost=True, action="both" if retune else "reallocate") for wheel in failure.lost
     ]
     # What the law does about faults of the file is no matter here.
-    own = replace(entry, options=entry.options._replace(fault_action=None))
+    plain_entry = replace(entry, options=entry.options._replace(fault_action=None))
     try:
-        loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), own)
+        loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), plain_entry)
     except InputError as error:
         if not faults:
             raise
@@ -257,12 +257,9 @@ def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
 
 
 def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
-    """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s).
-
-    Growth is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit; the
-    largest momentum on its side within that time is carried on with it, which is right to within an orbit. Wheels in the
-    answer count from 1.
-    """
+    """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s). Growth
+    is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit, and added to the
+    largest momentum of its sign in that time, which is right to within an orbit. Wheels in the answer count from 1."""
     beyond = np.argwhere(np.abs(filled) > FULL)
     if len(beyond):
         row, wheel = beyond[0].tolist()

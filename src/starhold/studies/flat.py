@@ -1,7 +1,7 @@
 """All numbers that a loop flies with, in one row, each with its name; and the trial whether an equation gives them.
 
-Which keys of a file an equation follows is told by no list: scenarios with other values are built, and their numbers
-compared with what the equation gives, to the last bit.
+No list says which keys of a file an equation follows: scenarios with other values are built, and their numbers compared with
+those of the equation, to the last bit.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Flat:
         may change it."""
         phases = loop.phases(steps)
         carry = phases[0].entered(loop.carry()) if entered else loop.carry()
-        found = named_numbers(loop, numbers_of(carry), phases)
-        return cls(loop, kernel_key(Flying(loop, steps, 1)), tuple(found), np.array([*found.values()], dtype=float))
+        numbers = named_numbers(loop, numbers_of(carry), phases)
+        return cls(loop, kernel_key(Flying(loop, steps, 1)), tuple(numbers), np.array([*numbers.values()], dtype=float))
 
     def gives(self, other: Flat | None, numbers: Any) -> bool:
         """Whether another loop, None for one that cannot be, is flown by this one's kernel with these numbers, to the last
@@ -51,18 +51,18 @@ class Flat:
 
     def places(self, name: str) -> list[int]:
         """The places of a number of this name, in every phase that has it."""
-        return [place for place, own in enumerate(self.names) if own == name or own.endswith(f"].{name}")]
+        return [place for place, full in enumerate(self.names) if full == name or full.endswith(f"].{name}")]
 
 
 def named_numbers(loop: ClosedLoop, carry: Sequence[Any], phases: Sequence[Phase]) -> dict[str, Any]:
     """The numbers of a loop, or arrays (lanes,) in their places, by name: of its carry, what its buffers hold at the end; of
     phases, those of events by their number; then the times of events, in the body's unit of time."""
     names = [name for name, _ in named(loop.carry(), "")]
-    found = dict(zip([*names, *(f"buffer[{k}]" for k in range(1, len(carry) - len(names) + 1))], carry, strict=True))
+    numbers = dict(zip([*names, *(f"buffer[{k}]" for k in range(1, len(carry) - len(names) + 1))], carry, strict=True))
     for number, phase in enumerate(phases):
         prefix = f"event[{number}]." if number else ""
-        found |= {f"{prefix}{name}": value for name, value in named(Numbers.of(phase), "")}
-    return found | {f"event[{number}].time": phase.first * loop.period for number, phase in enumerate(phases) if number}
+        numbers |= {f"{prefix}{name}": value for name, value in named(Numbers.of(phase), "")}
+    return numbers | {f"event[{number}].time": phase.first * loop.period for number, phase in enumerate(phases) if number}
 
 
 def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
@@ -70,8 +70,8 @@ def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
     if isinstance(value, tuple):
         fields = getattr(value, "_fields", None)
         for place, part in enumerate(value):
-            own = f"{name}.{fields[place]}".lstrip(".") if fields else f"{name}[{place + 1}]"
-            yield from named(part, own)
+            full = f"{name}.{fields[place]}".lstrip(".") if fields else f"{name}[{place + 1}]"
+            yield from named(part, full)
     elif isinstance(value, float | np.ndarray | Handle):
         yield name, value
 
@@ -81,8 +81,7 @@ _OF_ONE = re.compile(r"(memories|setup)\.(estimator|target)\b")
 
 
 def shown_name(loop: ClosedLoop, name: str) -> str:
-    """The name by which tables call a number: after the part that it is of, with its state or its memory apart from its
-    parameters."""
+    """The name by which tables call a number: its part first; its state and memory are set apart from its parameters."""
 
     def called(where: str | None, fitted: Any) -> str:
         return fitted.called + {"setup": "", "memories": ".memory"}.get(where or "", ".state")

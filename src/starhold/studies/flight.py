@@ -1,4 +1,4 @@
-"""One flown law with all that a report says about it."""
+"""One flown law with all that reports need of it."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Begun(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Flight:
-    """One law's run of a scenario: the name the scenario gives the law, the law's type, what was recorded, its metrics, its
-    gains with their units, how metrics are told and ranked, and its certificates."""
+    """One law's run of a scenario: the name the scenario gives the law, the law's type, the recording, its metrics, its
+    gains with their units, how metrics are shown and ranked, and its certificates."""
 
     name: str
     law: str
@@ -48,11 +48,11 @@ class Flight:
 
     def __repr__(self) -> str:
         shown = self.metric_set
-        told = [
+        results = [
             f"{shown.measures[name].heading} {shown.shown(name, self.metrics.get(name))} {shown.measures[name].unit}"
             for name in shown.order
         ]
-        fate = ", ".join(told) if self.lost is None else f"diverged at {shown.moment(self.lost)}"
+        fate = ", ".join(results) if self.lost is None else f"diverged at {shown.moment(self.lost)}"
         return f"<Flight {self.name}: {fate}>"
 
     @cached_property
@@ -67,14 +67,15 @@ class Flight:
 
     @cached_property
     def unknown(self) -> dict[str, float]:
-        """Recorded quantities that are no numbers to the end of a motion that was not lost, and since when (s)."""
-        run, found = self.recording, dict[str, float]()
+        """Recorded quantities that are NaN from some time on (s) to the end of a motion that was not lost, with that
+        time."""
+        run, times = self.recording, dict[str, float]()
         for name in run.columns if self.lost is None else ():
             values = np.asarray(run.arrays.get(name, 0.0))
             if values.dtype.kind == "f" and values.ndim and np.isnan(values[-1]).any():
                 sound = np.flatnonzero(~np.isnan(values.reshape(len(values), -1)).any(1))
-                found[name] = float(run["time"][sound[-1] + 1 if len(sound) else 0])
-        return found
+                times[name] = float(run["time"][sound[-1] + 1 if len(sound) else 0])
+        return times
 
     def left(self, certificate: int, kind: str) -> tuple[Departure, ...]:
         """How this flight leaves a claim of one of its certificates; empty where it does not."""
@@ -88,7 +89,7 @@ class Flight:
         for number, certificate in enumerate(self.certificates):
             for claim in certificate.claims:
                 left = [one._asdict() for one in self.left(number, claim.kind)]
-                told = {"certificate": certificate.name, "claim": claim.kind, "outcome": claim.outcome}
-                claims.append(told | {"left_at": left[0]["time"] if left else None, "left": left})
+                stated = {"certificate": certificate.name, "claim": claim.kind, "outcome": claim.outcome}
+                claims.append(stated | {"left_at": left[0]["time"] if left else None, "left": left})
         modes = {"modes": [one._asdict() for one in self.modes]} if self.modes else {}
         return self.metrics | modes | ({"claims": claims} if self.certificates else {})

@@ -1,4 +1,4 @@
-"""Results as tidy tables of pandas: what is measured in columns, what it is measured of in rows."""
+"""Results as tidy tables of pandas: measured numbers in columns, their subjects in rows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def frame_of(rows: Sequence[dict[str, Any]]) -> DataFrame:
-    """A table of rows; what is None counts as missing."""
+    """A table of rows; None counts as missing."""
     # Loaded here, for no command needs it.
     import pandas as pd
 

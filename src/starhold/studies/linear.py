@@ -63,8 +63,8 @@ def linear_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> Linear
 
 
 def margins_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> list[Margins]:
-    """The margins of the linear loop of a law of a scenario; of one that is not stable they are NaN, which a warning says.
-    InputError where there is no linear loop."""
+    """The margins of the linear loop of a law of a scenario; NaN, with a warning, where it is not stable. InputError where
+    there is no linear loop."""
     linear = linear_of(scenario, entry, delay)
     if not linear.is_stable:
         why = f"a pole of a step of the linear loop has size {abs(linear.poles[0]):.6g}, so the loop is not stable"

@@ -55,7 +55,7 @@ class Study:
         return np.array([math.nan if item.hard is None else item.hard.root for item in self.results])
 
     def fits(self) -> dict[str, TwoPieceFit]:
-        """The fits there are, by how tables call them."""
+        """The fits by the names that tables give them; empty where there are none."""
         both = {"fit": self.fitted, "published": self.published}
         return {name: pieces for name, pieces in both.items() if pieces is not None}
 
@@ -79,13 +79,13 @@ def study(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, tot
     table: Any = scenario.table.transient
     limits, eased = _limits(table)
     problem = problem_of(scenario, entry)
-    found = search(problem, table.angles, table.roots, limits, eased, lambda done, total: notice(done, total, "angles"))
-    for item in found:
+    answers = search(problem, table.angles, table.roots, limits, eased, lambda done, total: notice(done, total, "angles"))
+    for item in answers:
         if item.hard is None:
             raise _unreachable(scenario, problem, item.angle, limits)
-    hard = [item.hard.root for item in found if item.hard is not None]
+    hard = [item.hard.root for item in answers if item.hard is not None]
     b = problem.b
-    return Study(found, b, eased != limits, fit(table.angles, hard), PUBLISHED if _as_published(table, b) else None)
+    return Study(answers, b, eased != limits, fit(table.angles, hard), PUBLISHED if _as_published(table, b) else None)
 
 
 def problem_of(scenario: Scenario, entry: LawEntry) -> SlewProblem:

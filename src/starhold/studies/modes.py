@@ -1,4 +1,4 @@
-"""Flights of modes: when they switch, and what is certified of each mode and of the hand-over to it."""
+"""Flights of modes: when they switch, and the certificates of each mode and of each hand-over."""
 
 from __future__ import annotations
 
@@ -59,17 +59,19 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
 
     module: Any = loop.law.module
     assert isinstance(module, Modes)
-    found: list[Issued] = []
+    issued: list[Issued] = []
     for place, mode in enumerate(module.modes):
-        own = loop_of_mode(loop, place)
-        found.append(Issued(certify(own, f"{name}: {mode.name}", wanted), own, mode=place + 1))
+        mode_loop = loop_of_mode(loop, place)
+        issued.append(Issued(certify(mode_loop, f"{name}: {mode.name}", wanted), mode_loop, mode=place + 1))
     for place, (mode, _, switches) in enumerate(module.parts(loop.gains)):
         for switch, (_, _, *levels) in switches:
-            own, title = loop_of_mode(loop, switch.to), f"{name}: {mode.name} to {module.modes[switch.to].name}"
-            certificate = hand_over(own, loop_of_mode(loop, place), title, dict(zip(switch.tests, levels, strict=True)))
+            mode_loop, title = loop_of_mode(loop, switch.to), f"{name}: {mode.name} to {module.modes[switch.to].name}"
+            certificate = hand_over(
+                mode_loop, loop_of_mode(loop, place), title, dict(zip(switch.tests, levels, strict=True))
+            )
             if certificate is not None:
-                found.append(Issued(certificate, own, mode=switch.to + 1, before=place + 1))
-    return found
+                issued.append(Issued(certificate, mode_loop, mode=switch.to + 1, before=place + 1))
+    return issued
 
 
 def same_numbers(one: Any, other: Any) -> bool:
@@ -85,19 +87,19 @@ def mode_departures(issued: Issued, run: Recording, fault: int | None) -> dict[s
 
     flown = stretches(run)
     befores = [None, *(one.mode for one in flown)]
-    own = [
+    spans = [
         one
         for one, before in zip(flown, befores, strict=False)
         if one.mode == issued.mode and issued.before in (None, before)
     ]
-    if not own:
+    if not spans:
         never = Departure(0.0, "this flight has no such mode" if issued.before is None else "this flight has no such switch")
         return {claim.kind: (never,) for claim in issued.certificate.claims if claim.outcome == "proved"}
-    found: dict[str, set[Departure]] = {}
-    for one in own:
+    reasons: dict[str, set[Departure]] = {}
+    for one in spans:
         last, change = one.last, NEXT
         if fault is not None and (last is None or fault < last):
             last, change = max(fault, one.first), CHANGES
         for kind, left in departures(issued.certificate, issued.loop, run, one.first, last, change).items():
-            found.setdefault(kind, set()).update(left)
-    return {kind: tuple(sorted(left)) for kind, left in found.items()}
+            reasons.setdefault(kind, set()).update(left)
+    return {kind: tuple(sorted(left)) for kind, left in reasons.items()}

@@ -67,7 +67,7 @@ def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, lengt
         return rates / np.maximum(np.linalg.norm(rates, axis=0), TINY)
 
     step, state, going = length / steps, np.array(starts, dtype=float), np.ones(count)
-    found, a = [state], heading(state)
+    states, a = [state], heading(state)
     for _ in range(steps):
         b = heading(state + 0.5 * step * a)
         c = heading(state + 0.5 * step * b)
@@ -76,8 +76,8 @@ def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, lengt
         turned = heading(ahead)
         going = going * ((a * turned).sum(axis=0) > 0.0)
         state, a = np.where(going > 0.0, ahead, state), turned
-        found.append(state)
-    return np.stack(found, axis=-1).swapaxes(0, 1)
+        states.append(state)
+    return np.stack(states, axis=-1).swapaxes(0, 1)
 
 
 def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start: tuple[float, ...] | None) -> Portrait:
@@ -119,9 +119,9 @@ def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
         for offset in np.array(np.meshgrid(*[side] * len(width))).reshape(len(width), -1).T:
             tried = centre.copy()
             tried[2:moving] += (offset * width)[:, None]
-            found = sign * Values(what, tried).V
-            better = found < values
-            values[better], best[:, better] = found[better], tried[:, better]
+            value = sign * Values(what, tried).V
+            better = value < values
+            values[better], best[:, better] = value[better], tried[:, better]
         width = width * (0.25 if step == 0 else 0.6)
     return values
 
@@ -136,7 +136,7 @@ class _Rates:
         self._cells = [(cell.signs, [EnclosedPolynomial(rate) for rate in cell.rates[:moving]]) for cell in pieces.cells]
 
     def __call__(self, points: Any) -> Any:
-        found = np.full((self._moving, points.shape[1]), np.nan)
+        speeds = np.full((self._moving, points.shape[1]), np.nan)
         sides, free = [surface.at(points) for surface in self._surfaces], np.ones(points.shape[1], dtype=bool)
         for signs, rates in self._cells:
             here = free.copy()
@@ -144,12 +144,12 @@ class _Rates:
                 here &= sign * side >= 0.0
             free &= ~here
             for k, rate in enumerate(rates):
-                found[k, here] = rate.at(points[:, here])
-        return found
+                speeds[k, here] = rate.at(points[:, here])
+        return speeds
 
 
 def _orbit(what: Candidate, start: Any) -> Any:
-    """One turn of the closed motion that the motion from a state comes to backwards in time; None if it comes to none."""
+    """One turn of the closed motion that the motion from a state reaches backwards in time; None where it reaches none."""
     from scipy.integrate import solve_ivp
 
     rates = _Rates(what, 2)

@@ -46,21 +46,21 @@ class Asked(NamedTuple):
 def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str, Any]) -> Asked:
     """The questions of a scenario whose laws have these loops, about these keys."""
     shared = {key: value for key, value in dials.items() if not key.startswith("law.")}
-    found, unasked = _recorded("", lambda values: scenario.hooks.admitted(scenario, values), shared)
+    questions, unasked = _recorded("", lambda values: scenario.hooks.admitted(scenario, values), shared)
     fixed, ranged = dict.fromkeys(unasked, UNASKED), dict[str, float]()
     # First of all laws what is asked as a file is read, then what is asked as loops are built.
     for entry, reads in [(entry, reads) for reads in (True, False) for entry in scenario.laws]:
         check, prefix = _check(scenario, entry, loops[entry.name], reads), f"law.{entry.name}."
-        own = {key: value for key, value in dials.items() if key.startswith(prefix) and "." not in key[len(prefix) :]}
-        questions, unasked = _recorded(entry.name, check, shared | own)
-        found += questions
-        fixed |= {key: UNASKED for key in unasked if key in own}
+        gains = {key: value for key, value in dials.items() if key.startswith(prefix) and "." not in key[len(prefix) :]}
+        more, unasked = _recorded(entry.name, check, shared | gains)
+        questions += more
+        fixed |= {key: UNASKED for key in unasked if key in gains}
         for key in unasked:
             if key in shared:
                 ranged[key] = NEAR if isinstance(shared[key], tuple) else RANGE
                 if not all(_takes(scenario, check, {key: value}) for value in _corners(shared[key], ranged[key])):
                     fixed[key] = UNASKED
-    return Asked(tuple(found), fixed, ranged)
+    return Asked(tuple(questions), fixed, ranged)
 
 
 def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -> Callable[[Mapping[str, Any]], None]:
@@ -68,9 +68,9 @@ def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -
     memory made."""
 
     def check(values: Mapping[str, Any]) -> None:
-        own = {key.rpartition(".")[2]: value for key, value in values.items() if key.startswith("law.")}
+        gains_given = {key.rpartition(".")[2]: value for key, value in values.items() if key.startswith("law.")}
         shared = {key: value for key, value in values.items() if not key.startswith("law.")}
-        gains, craft = entry.gains._replace(**own), scenario.hooks.moved(scenario, loop, shared).nominal
+        gains, craft = entry.gains._replace(**gains_given), scenario.hooks.moved(scenario, loop, shared).nominal
         try:
             if not reads:
                 entry.law.remember(gains, craft, loop.period)

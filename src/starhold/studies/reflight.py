@@ -56,9 +56,9 @@ class Reflown:
 
     program: `fly` as `kernels.one` records it; derive: the numbers at `places` among those of the carry and, after them, of
     the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all as the scenario has them;
-    held: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the recorded
-    quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia" or
-    "torque_limit".
+    unfollowed: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the
+    recorded quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia"
+    or "torque_limit".
     """
 
     name: str
@@ -75,7 +75,7 @@ class Reflown:
     seed: int
     run: int
     period: float
-    held: dict[str, str] = field(default_factory=dict[str, str])
+    unfollowed: dict[str, str] = field(default_factory=dict[str, str])
     reads: frozenset[str] = frozenset()
 
 
@@ -90,7 +90,7 @@ class Reflight:
     laws: tuple[Reflown, ...]
     grounded: dict[str, str]
     pieces: tuple[Piece, ...]
-    asked: Asked
+    checks: Asked
 
     def changed(self, values: Mapping[str, Any]) -> Scenario:
         """The scenario with these values at keys of `dials`, as the page's file has it."""
@@ -107,12 +107,12 @@ class Piece(NamedTuple):
 
 def reflight(scenario: Scenario) -> Reflight:
     """Make what flies a scenario again. Designed gains are held as they are: the scenario has them as numbers."""
-    held = _explicit(scenario)
-    dials = dict(held.hooks.dials(held))
+    explicit = _explicit(scenario)
+    dials = dict(explicit.hooks.dials(explicit))
     shared = list(dials)
     gains: dict[str, Field] = {}
     grounded: dict[str, str] = {}
-    for entry in held.laws:
+    for entry in explicit.laws:
         if mode_laws(entry.law, entry.gains):
             grounded[entry.name] = MODES
             continue
@@ -121,12 +121,12 @@ def reflight(scenario: Scenario) -> Reflight:
                 key = f"law.{entry.name}.{item.name}"
                 dials[key], gains[key] = value, item
     # An attitude that is given by angles is moved as a quaternion.
-    held = changed(held, _changes(held, {key: dials[key] for key in shared if key == "initial.attitude"}))
-    tried = _Tried(held, dials)
+    explicit = changed(explicit, _changes(explicit, {key: dials[key] for key in shared if key == "initial.attitude"}))
+    tried = _Tried(explicit, dials)
     laws: list[Reflown] = []
-    loops = {entry.name: build(held, entry) for entry in held.laws}
-    asked = ask(held, loops, dials)
-    for entry in held.laws:
+    loops = {entry.name: build(explicit, entry) for entry in explicit.laws}
+    checks = ask(explicit, loops, dials)
+    for entry in explicit.laws:
         loop = loops[entry.name]
         if entry.name in grounded:
             continue
@@ -135,11 +135,13 @@ def reflight(scenario: Scenario) -> Reflight:
         elif loop.nominal is not None:
             grounded[entry.name] = SUPPOSED
         else:
-            own = [
+            gain_keys = [
                 key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)
             ]
-            laws.append(_reflown(held, entry, loop, {key: dials[key] for key in (*shared, *own)}, tried, asked.fixed))
-    return Reflight(held, dials, gains, tuple(laws), grounded, tuple(_pieces(held, dials)), asked)
+            laws.append(
+                _reflown(explicit, entry, loop, {key: dials[key] for key in (*shared, *gain_keys)}, tried, checks.fixed)
+            )
+    return Reflight(explicit, dials, gains, tuple(laws), grounded, tuple(_pieces(explicit, dials)), checks)
 
 
 def _names(entry: LawEntry) -> list[str]:
@@ -166,9 +168,9 @@ def _explicit(scenario: Scenario) -> Scenario:
 
 
 def _changes(scenario: Scenario, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The changes of the file that values of dials mean."""
-    own = {key: value for key, value in values.items() if key.startswith("law.")}
-    return scenario.hooks.changes({key: value for key, value in values.items() if key not in own}) | own
+    """The changes of the file that give dials these values."""
+    of_law = {key: value for key, value in values.items() if key.startswith("law.")}
+    return scenario.hooks.changes({key: value for key, value in values.items() if key not in of_law}) | of_law
 
 
 class _Tried:
@@ -206,43 +208,43 @@ def _others(value: Any) -> Iterator[Any]:
 
 
 def _reflown(
-    scenario: Scenario, entry: LawEntry, loop: ClosedLoop, own: Values, tried: _Tried, fixed: Mapping[str, str]
+    scenario: Scenario, entry: LawEntry, loop: ClosedLoop, by_key: Values, tried: _Tried, fixed: Mapping[str, str]
 ) -> Reflown:
     steps = scenario.table.simulation.steps
     flat = Flat.of(loop, steps, entered=True)
 
     def follows(*keys: str) -> bool:
         """Whether the equation of all kept keys gives the numbers of a scenario in which these are moved."""
-        if (found := tried.of(*keys)) is None:
+        if (other_values := tried.of(*keys)) is None:
             return False
-        values, other = found
+        values, other = other_values
         try:
             # Not tried out, as `build` does: only its numbers are looked at.
             made = other.hooks.build(other, other.pick(entry.name))
             # A key that goes with another has its value, unless it is moved itself.
             along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
-            given = {key: (own | along | values)[key] for key in kept}
+            given = {key: (by_key | along | values)[key] for key in kept}
             return flat.gives(Flat.of(made, steps, entered=True), _given(scenario, loop, given))
         except (InputError, ValueError, ZeroDivisionError):
             return False
 
-    held: dict[str, str] = {}
+    unfollowed: dict[str, str] = {}
     # The start is the file's own with no key moved, as with all of them given.
-    kept = [key for key in own if not key.startswith("law.")]
-    kept = kept if flat.gives(flat, _given(scenario, loop, {key: own[key] for key in kept})) else []
-    held |= {key: COMPUTED for key in own if not key.startswith("law.") and key not in kept}
-    kept += [key for key in own if key.startswith("law.")]
-    held |= {key: fixed[key] for key in kept if key in fixed}
-    held |= {key: ALONE for key in kept if key not in held and not tried.of(key)}
-    kept = [key for key in kept if key not in held]
+    kept = [key for key in by_key if not key.startswith("law.")]
+    kept = kept if flat.gives(flat, _given(scenario, loop, {key: by_key[key] for key in kept})) else []
+    unfollowed |= {key: COMPUTED for key in by_key if not key.startswith("law.") and key not in kept}
+    kept += [key for key in by_key if key.startswith("law.")]
+    unfollowed |= {key: fixed[key] for key in kept if key in fixed}
+    unfollowed |= {key: ALONE for key in kept if key not in unfollowed and not tried.of(key)}
+    kept = [key for key in kept if key not in unfollowed]
     # All at once, and those alone that others go with; one by one only where that does not do.
     if kept and not (follows(*kept) and all(follows(key) for key in scenario.hooks.linked.values() if key in kept)):
-        held |= {key: COMPUTED for key in kept if not follows(key)}
-        kept = [key for key in kept if key not in held]
+        unfollowed |= {key: COMPUTED for key in kept if not follows(key)}
+        kept = [key for key in kept if key not in unfollowed]
         if kept and not follows(*kept):
-            held |= dict.fromkeys(kept, COMPUTED)
+            unfollowed |= dict.fromkeys(kept, COMPUTED)
             kept = []
-    derive, places = _recorded(scenario, loop, {key: own[key] for key in kept}) if kept else (None, ())
+    derive, places = _recorded(scenario, loop, {key: by_key[key] for key in kept}) if kept else (None, ())
     carry, phase = loop.carry(), loop.phases(steps)[0]
     step = make_step(loop.composition())
     program = one(step, carry, Numbers.of(phase), loop.substeps)
@@ -262,7 +264,7 @@ def _reflown(
         loop.seed,
         loop.run,
         loop.period,
-        held,
+        unfollowed,
         _reads(program, phase),
     )
 
@@ -277,8 +279,8 @@ def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Call
 
     def numbers(values: Any) -> list[Any]:
         given = dict(zip(keys, values, strict=True))
-        own = {key.rpartition(".")[2]: value for key, value in given.items() if key.startswith("law.")}
-        gains = loop.gains._replace(**{name: own[name] for name in names if name in own})
+        given_gains = {key.rpartition(".")[2]: value for key, value in given.items() if key.startswith("law.")}
+        gains = loop.gains._replace(**{name: given_gains[name] for name in names if name in given_gains})
         moved = scenario.hooks.moved(scenario, loop, {k: v for k, v in given.items() if not k.startswith("law.")})
         setup = loop.setup()
         setup = setup._replace(limit=moved.limit)
@@ -294,16 +296,16 @@ def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> list[Any]:
     return _equation(scenario, loop, list(values))(tuple(values.values()))
 
 
-def _recorded(scenario: Scenario, loop: ClosedLoop, own: Values) -> tuple[Program, tuple[int, ...]]:
+def _recorded(scenario: Scenario, loop: ClosedLoop, by_key: Values) -> tuple[Program, tuple[int, ...]]:
     """The equation as a program, which gives the numbers that depend on the values alone, and their places."""
-    equation, found = _equation(scenario, loop, list(own)), list[int]()
+    equation, places = _equation(scenario, loop, list(by_key)), list[int]()
 
     def depending(values: Any) -> tuple[Any, ...]:
         numbers = equation(values)
-        found[:] = [place for place, number in enumerate(numbers) if isinstance(number, Handle)]
-        return tuple(numbers[place] for place in found)
+        places[:] = [place for place, number in enumerate(numbers) if isinstance(number, Handle)]
+        return tuple(numbers[place] for place in places)
 
-    return record_call(depending, (tuple(own.values()),))[0], tuple(found)
+    return record_call(depending, (tuple(by_key.values()),))[0], tuple(places)
 
 
 def _reads(program: Program, phase: Any) -> frozenset[str]:

@@ -46,8 +46,8 @@ def sweep(
     def measured(number: int, samples: Any, carry: Any) -> dict[str, Any]:
         return metrics_of(name_samples(flown[number], flights[number].loop, samples, carry))
 
-    found = fly_batched(flights, measured, threads, progress)
-    return frame_of([row | metrics for row, metrics in zip(rows, found, strict=True)])
+    results = fly_batched(flights, measured, threads, progress)
+    return frame_of([row | metrics for row, metrics in zip(rows, results, strict=True)])
 
 
 def _points(scenario: Scenario, changes: Any) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ from multiprocessing import parent_process
 
 
 def begin() -> None:
-    """Let files that are run print nowhere, and the process end with the studio alone, whatever ends that."""
+    """Silence the output of files that are run, and end the process when the studio ends, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for stream in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)

@@ -24,7 +24,7 @@ class Checker:
         self._pool: ProcessPoolExecutor | None = None
 
     def check(self, text: str, where: str, folder: Path) -> dict[str, Any]:
-        """Tell of a text what `editing.check` does, or that its check does not end."""
+        """Return the answer of `editing.check` about a text, or that its check does not end."""
         with self._lock:
             self._pool = self._pool or ProcessPoolExecutor(1, get_context("spawn"), begin)
             try:

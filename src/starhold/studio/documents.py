@@ -12,15 +12,15 @@ from starhold.files import atomic_write
 
 
 class RefusedError(Exception):
-    """A file is not written; `told` is the answer."""
+    """A file is not written; `answer` is the reply."""
 
-    def __init__(self, error: str, **told: Any) -> None:
+    def __init__(self, error: str, **details: Any) -> None:
         super().__init__(error)
-        self.told = {"error": error, **told}
+        self.answer = {"error": error, **details}
 
 
 class Documents:
-    """Files of scenarios in a folder; `path`: the one that the studio was started with, whatever it is called."""
+    """Files of scenarios in a folder; `path`: the one that the studio was started with, of any name."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = None if path is None else path.absolute()

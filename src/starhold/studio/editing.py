@@ -38,7 +38,7 @@ def files_run(text: str) -> list[str]:
         tables = read_toml(text, "")
     except InputError:
         return []
-    found: set[str] = set()
+    files: set[str] = set()
     left: list[Any] = [tables]
     while left:
         value = left.pop()
@@ -46,18 +46,18 @@ def files_run(text: str) -> list[str]:
             given = cast(dict[str, Any], value)
             file = given.get("file")
             if isinstance(file, str) and Path(file).suffix.lower() not in TABLES:
-                found.add(file)
+                files.add(file)
             left += given.values()
         elif isinstance(value, list):
             left += cast(list[Any], value)
-    return sorted(found)
+    return sorted(files)
 
 
-def line_of(text: str, key: str, found: str = "") -> int | None:
+def line_of(text: str, key: str, message: str = "") -> int | None:
     """The line, from 1, that holds a key as errors call it ("law[2].k_rate", "spacecraft.inertia"), its table where the key
     is missing, or what a TOML error says; None where that is nowhere."""
-    if told := re.search(r"at line (\d+)", found):
-        return int(told[1])
+    if place := re.search(r"at line (\d+)", message):
+        return int(place[1])
     parts = re.findall(r"([^.\[\]]+)(?:\[(\d+)\])?", key.replace("law ", "law."))
     if not parts:
         return None
@@ -71,9 +71,9 @@ def line_of(text: str, key: str, found: str = "") -> int | None:
             if (table, counts[table]) == wanted or table == key:
                 best = number
         elif "=" in line and not line.lstrip().startswith("#"):
-            own = line.partition("=")[0].strip().strip('"')
+            name = line.partition("=")[0].strip().strip('"')
             here = (table, counts.get(table, 0))
-            if (here == wanted and own == leaf) or (not table and own == key) or (table == parts[0][0] == own):
+            if (here == wanted and name == leaf) or (not table and name == key) or (table == parts[0][0] == name):
                 return number
     return best
 
@@ -91,36 +91,36 @@ def words() -> dict[str, Any]:
         return what
 
     def keys(table: Any) -> dict[str, Any]:
-        return {name: _told(opened(item)) for name, item in opened(table).get("properties", {}).items()}
+        return {name: _meaning(opened(item)) for name, item in opened(table).get("properties", {}).items()}
 
     for body in schema["anyOf"]:
         for name, item in body["properties"].items():
             if name in kinds:
                 for one in opened(item)["items"]["anyOf"]:
-                    own = opened(one)
-                    kind = own["properties"].get("type", {})
+                    kind_table = opened(one)
+                    kind = kind_table["properties"].get("type", {})
                     label = kind.get("const") or kind.get("default")
                     if label:
-                        kinds[name].setdefault(str(label), {}).update(keys(own))
+                        kinds[name].setdefault(str(label), {}).update(keys(kind_table))
                 continue
             item = opened(item)
             options = [opened(one) for one in item.get("anyOf", [item])]
-            found = next(
+            described = next(
                 (one for one in (*options, *(opened(o.get("items", {})) for o in options)) if "properties" in one), None
             )
-            if found is None:
-                tables.setdefault("", {})[name] = _told(item)
+            if described is None:
+                tables.setdefault("", {})[name] = _meaning(item)
             else:
-                tables.setdefault(name, {}).update(keys(found))
+                tables.setdefault(name, {}).update(keys(described))
     return {"tables": tables, **kinds}
 
 
-def _told(item: Any) -> dict[str, Any]:
+def _meaning(item: Any) -> dict[str, Any]:
     options = [item, *item.get("anyOf", [])]
-    found = next((one["enum"] for one in options if isinstance(one, dict) and "enum" in one), None)
-    if found is None and item.get("type") == "boolean":
-        found = [True, False]
-    return {"text": item.get("description", ""), **({} if found is None else {"words": found})}
+    choices = next((one["enum"] for one in options if isinstance(one, dict) and "enum" in one), None)
+    if choices is None and item.get("type") == "boolean":
+        choices = [True, False]
+    return {"text": item.get("description", ""), **({} if choices is None else {"words": choices})}
 
 
 def choices() -> dict[str, Any]:

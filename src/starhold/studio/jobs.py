@@ -23,7 +23,7 @@ MOST = 3
 
 @dataclass
 class Job:
-    """One thing that was asked for: its number, kind, folder, how far it is, and what came of it."""
+    """One task: its number, kind, folder, progress and result."""
 
     number: int
     kind: str
@@ -34,8 +34,8 @@ class Job:
     state: dict[str, Any] = field(default_factory=dict[str, Any])
     ended: bool = False
 
-    def told(self) -> dict[str, Any]:
-        """Tell the page of it."""
+    def status(self) -> dict[str, Any]:
+        """Describe the task for the page."""
         return {
             "number": self.number,
             "kind": self.kind,
@@ -47,7 +47,7 @@ class Job:
 
 
 class Jobs:
-    """All that was asked for since the studio began."""
+    """All tasks since the studio began."""
 
     def __init__(self) -> None:
         self._place = tempfile.TemporaryDirectory(prefix="starhold-studio-", ignore_cleanup_errors=True)
@@ -62,13 +62,13 @@ class Jobs:
             number = len(self._jobs) + 1
             folder = Path(self._place.name) / str(number)
             folder.mkdir()
-            told, teller = SPAWN.Pipe(duplex=False)
+            reports, teller = SPAWN.Pipe(duplex=False)
             process = SPAWN.Process(target=work, args=(teller, kind, text, where, beside, folder, laws))
             process.start()
             # The end of the process closes the last teller.
             teller.close()
             job = self._jobs[number] = Job(number, kind, name, folder, process, laws)
-        threading.Thread(target=_follow, args=(job, told), daemon=True).start()
+        threading.Thread(target=_follow, args=(job, reports), daemon=True).start()
         return job
 
     def get(self, number: int) -> Job | None:
@@ -76,8 +76,8 @@ class Jobs:
         return self._jobs.get(number)
 
     def all(self) -> list[dict[str, Any]]:
-        """Tell the page of all of them."""
-        return [job.told() for job in self._jobs.values()]
+        """Describe all tasks for the page."""
+        return [job.status() for job in self._jobs.values()]
 
     def stop(self, number: int) -> None:
         """End a job; what it has not written is lost."""
@@ -96,11 +96,11 @@ class Jobs:
         self._place.cleanup()
 
 
-def _follow(job: Job, told: Connection) -> None:
-    """Note what a process tells until it ends."""
+def _follow(job: Job, reports: Connection) -> None:
+    """Note the reports of a process until it ends."""
     with suppress(EOFError):
         while True:
-            state = told.recv()
+            state = reports.recv()
             if "error" not in job.state:
                 job.state = state
     job.process.join()

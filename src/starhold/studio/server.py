@@ -67,9 +67,9 @@ class Guard:
 
         async def guarded(message: Any) -> None:
             if message["type"] == "http.response.start":
-                own = {"content-security-policy": POLICY, "referrer-policy": "no-referrer", "cache-control": "no-store"}
-                own["x-content-type-options"] = "nosniff"
-                message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in own.items())]
+                headers = {"content-security-policy": POLICY, "referrer-policy": "no-referrer", "cache-control": "no-store"}
+                headers["x-content-type-options"] = "nosniff"
+                message["headers"] = [*message["headers"], *((k.encode(), v.encode()) for k, v in headers.items())]
             await send(message)
 
         await (answer or self._app)(scope, receives, guarded)
@@ -90,14 +90,14 @@ def _host(request: Request) -> str:
 
 async def _body(receive: Receive) -> bytes | None:
     """The whole body of a request, however it comes; None where it is too long."""
-    found = b""
+    body = b""
     while True:
         message = await receive()
-        found += message.get("body", b"")
-        if len(found) > MOST_TEXT:
+        body += message.get("body", b"")
+        if len(body) > MOST_TEXT:
             return None
         if message["type"] != "http.request" or not message.get("more_body", False):
-            return found
+            return body
 
 
 def _given(body: bytes, receive: Receive) -> Receive:
@@ -149,10 +149,10 @@ class Studio:
 
     async def _begin(self, request: Request) -> Response:
         words, choices = await run_in_threadpool(editing.words), await run_in_threadpool(editing.choices)
-        own = None if self.documents.path is None else self.documents.path.name
+        opened = None if self.documents.path is None else self.documents.path.name
         begun = {"name": self.name, "text": self.text, "version": ""}
-        told = {"own": own, "folder": str(self.folder), "words": words, "kinds": list(KINDS), **choices}
-        return await _answered(lambda: (begun if own is None else self.documents.read()) | told)
+        page = {"own": opened, "folder": str(self.folder), "words": words, "kinds": list(KINDS), **choices}
+        return await _answered(lambda: (begun if opened is None else self.documents.read()) | page)
 
     async def _builtin(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -161,8 +161,8 @@ class Studio:
         )
 
     async def _check(self, request: Request) -> Response:
-        asked = await _asked(request, "text")
-        return _malformed() if asked is None else JSONResponse(await self._checked(asked["text"]))
+        given = await _strings(request, "text")
+        return _malformed() if given is None else JSONResponse(await self._checked(given["text"]))
 
     async def _checked(self, text: str) -> dict[str, Any]:
         """Return what a check tells of a text; or the files that it would run and the user did not yet allow."""
@@ -183,44 +183,44 @@ class Studio:
         return await _answered(self.documents.read)
 
     async def _save(self, request: Request) -> Response:
-        asked = await _asked(request, "text", "name", "version")
-        return _malformed() if asked is None else await _answered(lambda: self.documents.save(**asked))
+        given = await _strings(request, "text", "name", "version")
+        return _malformed() if given is None else await _answered(lambda: self.documents.save(**given))
 
     async def _all(self, request: Request) -> Response:
         return JSONResponse(self.jobs.all())
 
     async def _start(self, request: Request) -> Response:
-        asked = await _asked(request, "text", "kind")
-        if asked is None:
+        given = await _strings(request, "text", "kind")
+        if given is None:
             return _malformed()
-        if asked["kind"] not in KINDS:
-            return JSONResponse({"error": f"no such thing: {asked['kind']}; one of {', '.join(KINDS)}"}, 422)
-        found = await self._checked(asked["text"])
-        if "name" not in found:
-            return JSONResponse(found, 422)
+        if given["kind"] not in KINDS:
+            return JSONResponse({"error": f"no such thing: {given['kind']}; one of {', '.join(KINDS)}"}, 422)
+        checked = await self._checked(given["text"])
+        if "name" not in checked:
+            return JSONResponse(checked, 422)
         try:
-            job = self.jobs.start(asked["kind"], found["name"], asked["text"], self.where, self.folder, found["laws"])
+            job = self.jobs.start(given["kind"], checked["name"], given["text"], self.where, self.folder, checked["laws"])
         except ValueError as error:
             return JSONResponse({"error": str(error)}, 409)
-        return JSONResponse(job.told(), 201)
+        return JSONResponse(job.status(), 201)
 
     async def _again(self, request: Request) -> Response:
         """Fly one run of a campaign that is a job of this studio again."""
-        asked, job = await _asked(request, "law", "run"), self.jobs.get(request.path_params["number"])
+        given, job = await _strings(request, "law", "run"), self.jobs.get(request.path_params["number"])
         if (
-            asked is None
+            given is None
             or job is None
             or job.kind != "campaign"
-            or not asked["run"].isdecimal()
-            or asked["law"] not in job.laws
+            or not given["run"].isdecimal()
+            or given["law"] not in job.laws
         ):
             return _malformed()
         try:
-            told = f"{asked['law']}, run {asked['run']}"
-            job = self.jobs.start(RERUN, told, "", str(job.folder), self.folder, (asked["law"], asked["run"]))
+            name = f"{given['law']}, run {given['run']}"
+            job = self.jobs.start(RERUN, name, "", str(job.folder), self.folder, (given["law"], given["run"]))
         except ValueError as error:
             return JSONResponse({"error": str(error)}, 409)
-        return JSONResponse(job.told(), 201)
+        return JSONResponse(job.status(), 201)
 
     async def _stop(self, request: Request) -> Response:
         self.jobs.stop(request.path_params["number"])
@@ -244,7 +244,7 @@ async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
     try:
         return JSONResponse(await run_in_threadpool(work))
     except RefusedError as refused:
-        return JSONResponse(refused.told, 409)
+        return JSONResponse(refused.answer, 409)
 
 
 async def _json(request: Request) -> Any:
@@ -257,7 +257,7 @@ async def _json(request: Request) -> Any:
     return given
 
 
-async def _asked(request: Request, *names: str) -> dict[str, str] | None:
+async def _strings(request: Request, *names: str) -> dict[str, str] | None:
     """Read the strings of these names in a request; None where it does not hold them."""
     given = await _json(request)
     if not isinstance(given, dict) or not all(isinstance(given.get(name), str) for name in names):
@@ -265,8 +265,9 @@ async def _asked(request: Request, *names: str) -> dict[str, str] | None:
     return {name: given[name] for name in names}
 
 
-def serve(path: Path | None, name: str, text: str, port: int, told: Callable[[str], None], browse: bool) -> None:
-    """Serve a studio until it is interrupted. told: hears the address with its token. InputError where the port is taken."""
+def serve(path: Path | None, name: str, text: str, port: int, announce: Callable[[str], None], browse: bool) -> None:
+    """Serve a studio until it is interrupted. announce: called with the address and its token. InputError where the port
+    is taken."""
     import uvicorn
 
     token, studio = secrets.token_urlsafe(24), Studio(path, name, text)
@@ -282,7 +283,7 @@ def serve(path: Path | None, name: str, text: str, port: int, told: Callable[[st
     # Who reads the address and asks at once waits for the server to begin.
     listener.listen()
     address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
-    told(address)
+    announce(address)
     if browse:
         webbrowser.open(address)
     config = uvicorn.Config(studio.app(token), log_level="error", lifespan="off")

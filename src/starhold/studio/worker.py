@@ -47,16 +47,16 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
     from starhold.studies.compare import name_samples
     from starhold.studies.flight import Flight
 
-    study, found = study_of(scenario.body), list[Any]()
+    study, flights = study_of(scenario.body), list[Any]()
     for place, entry in enumerate(scenario.laws):
         tell(place, len(scenario.laws), f"{entry.name} is certified")
         loop = build(scenario, entry)
         tried = certify_scenario(scenario, entry.name)
         run = name_samples(scenario, loop, *fly(loop, 1))
         certificates = tuple(one.certificate for one in tried)
-        found.append(Flight(entry.name, entry.law.name, run, {}, {}, study.metric_set(run), certificates))
-    write_proofs([certificate for flight in found for certificate in flight.certificates], scenario.name, folder)
-    text = document(scenario, [section(found)], {"laws": [], "plots": []}, (), f"{versions()}.")
+        flights.append(Flight(entry.name, entry.law.name, run, {}, {}, study.metric_set(run), certificates))
+    write_proofs([certificate for flight in flights for certificate in flight.certificates], scenario.name, folder)
+    text = document(scenario, [section(flights)], {"laws": [], "plots": []}, (), f"{versions()}.")
     return _page(folder, text)
 
 
@@ -127,8 +127,8 @@ def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
     from starhold.report.results import write_results
 
     tell(0, 0, f"run {run} of {law} flies")
-    found = fly_again(campaign, run, law)
-    return write_results(found.scenario, [found.flight], folder).name
+    again = fly_again(campaign, run, law)
+    return write_results(again.scenario, [again.flight], folder).name
 
 
 def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
@@ -169,12 +169,12 @@ def work(teller: Connection, kind: str, text: str, where: str, beside: Path, fol
     """Do it, in a process that this is all of; the last thing told is the file to look at, or what was wrong. laws: those of
     the scenario; of a run of a campaign, whose folder `where` is, the law and the run's number."""
     begin()
-    told = [0.0]
+    reported = [0.0]
 
     def tell(done: int, total: int, what: str) -> None:
         now = time.monotonic()
-        if now - told[0] >= PULSE or done == total:
-            told[0] = now
+        if now - reported[0] >= PULSE or done == total:
+            reported[0] = now
             teller.send({"done": done, "total": total, "what": what})
 
     try:

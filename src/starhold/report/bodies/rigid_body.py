@@ -100,7 +100,7 @@ class RigidBodyReport:
             data["transient"] = {"times": rounded(first.times), "plots": drawn}
         return PageParts(
             data,
-            views=("<h2>The turning body</h2>", views(flights, len(scene["times"]), "Attitude", _told(scene))),
+            views=("<h2>The turning body</h2>", views(flights, len(scene["times"]), "Attitude", _simplification(scene))),
             measured=transients.section(flights),
             transient=end,
             settings="Spacecraft and settings",
@@ -131,7 +131,7 @@ def _accuracy_figure(flights: Sequence[Flight], name: str) -> Any:
     return figure
 
 
-def _told(scene: Mapping[str, Any]) -> str:
+def _simplification(scene: Mapping[str, Any]) -> str:
     arrow = "" if scene["earth"] is None else f" The arrow leads to the {scene['centre']}."
     return _VIEWS + (_ORBITAL if scene["down"] else "") + arrow
 
@@ -190,7 +190,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
 
 def _earth(flights: Sequence[Flight], places: Any) -> list[list[float | None]]:
     """Where the centre of attraction is at these samples of the longest run, in the axes of the target, as unit vectors."""
-    run = max((flight.recording for flight in flights), key=lambda found: len(found["time"]))
+    run = max((flight.recording for flight in flights), key=lambda recording: len(recording["time"]))
     attitude, error, position = (run[name][places].T for name in ("attitude", "attitude_error", "position"))
     goal = multiply(tuple(attitude), conjugate(tuple(error)))
     toward = to_body(goal, tuple(-position / np.linalg.norm(position, axis=0)))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Column(NamedTuple):
-    """A column of a table: its heading, the unit below it, and the format of what stands at the right; else it is words."""
+    """A column of a table: its heading, the unit below it, and the format of its numbers; without one it holds words."""
 
     name: str
     unit: str = ""
@@ -23,9 +23,9 @@ class Column(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Words of a table that look in a way of their own. kind: "law", in the colour of the law of this number; an outcome,
-    "met", "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of the column below it;
-    "shade", in the colour that detail names, as strong as the number is far from 0; else detail says what the words mean."""
+    """Words of a table with a look of their own. kind: "law", in the colour of the law of this number; an outcome, "met",
+    "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of the column below it; "shade", in
+    the colour that detail names, the stronger the farther the number is from 0; else detail says what the words mean."""
 
     text: str
     kind: str = ""
@@ -51,7 +51,7 @@ class Table(NamedTuple):
         return [f"{column.name} ({column.unit})" if column.unit else column.name for column in self.columns]
 
     def texts(self) -> list[list[str]]:
-        """The cells for reading; what is nothing is a dash, and words keep their marks of style."""
+        """The cells for reading; an empty one is a dash, and words keep their marks of style."""
         return [
             [
                 value if isinstance(value, str) else "—" if value is None else format(value, column.format)
@@ -87,8 +87,8 @@ class Result(NamedTuple):
 
 
 class Option(NamedTuple):
-    """An option. key: the key of the scenario in whose place it stands, a whole number if `whole`, else a time; "" for a
-    text that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure."""
+    """An option. key: the key of the scenario whose value it replaces, a whole number if `whole`, else a time; "" for a text
+    that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure."""
 
     key: str
     help: str
@@ -98,7 +98,7 @@ class Option(NamedTuple):
 
 
 def number_or_text(value: str | float) -> str | float:
-    """A quantity as a file would have it: what is a number is one in SI."""
+    """A value as a file would hold it: a number, in SI, where the text is one."""
     try:
         return float(value) if isinstance(value, str) else value
     except ValueError:
@@ -106,7 +106,7 @@ def number_or_text(value: str | float) -> str | float:
 
 
 def later(path: str) -> Callable[..., Any]:
-    """The function of a path below starhold, whose module is loaded when it is called."""
+    """The function of a path below starhold; its module is loaded when it is called."""
     module, _, name = path.rpartition(".")
     return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given)
 
@@ -142,7 +142,7 @@ class Command(NamedTuple):
     read: Callable[..., tuple[Any, ...]] | None = None
 
     def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
-        """The arguments of `study`: the scenario with what options say, and the law; or what `read` gives."""
+        """The arguments of `study`: the scenario changed as options say, and the law; or those that `read` gives."""
         if self.read is not None:
             defaults = {name: option.default for name, option in self.options.items() if not option.file}
             return self.read(*about, **defaults | given)
@@ -152,15 +152,15 @@ class Command(NamedTuple):
         return scenario, self.pick(scenario, *about[1:] or (None,))
 
     def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None]) -> Result:
-        """Study what `prepare` gave, and present what is found."""
+        """Study the arguments that `prepare` gave, and present the result."""
         if self.doing is None:
             return self.present(*subject, self.study(*subject))
         doing = self.doing
 
-        def told(done: int, total: int, what: str) -> None:
+        def notify(done: int, total: int, what: str) -> None:
             notice(done, total, doing.format(what) if what else "flown")
 
-        return self.present(*subject, self.study(*subject, told))
+        return self.present(*subject, self.study(*subject, notify))
 
 
 def names() -> list[str]:

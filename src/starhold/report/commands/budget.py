@@ -22,57 +22,58 @@ INTERPRETED = {
 }
 
 
-def present(scenario: Scenario, entry: LawEntry, found: Budget) -> Result:
+def present(scenario: Scenario, entry: LawEntry, budget: Budget) -> Result:
     """One row a source, one column an index."""
     from starhold.analysis.pointing import MEANINGS, Figures
 
-    records = found.records()
+    records = budget.records()
     heads = [Column(name.replace("deviation", "standard deviation"), "rad") for name in Figures._fields]
     numbers = Table([*map(Column, list(records[0])[: -len(heads)]), *heads], [list(row.values()) for row in records])
-    sentences = [_setting_text(found), *(f"{index}: {MEANINGS[index]}." for index in found.indices)]
-    title = f"{found.scenario}, {found.law}: pointing error by source"
-    blocks, summary = ["", _table(found), *sentences], {found.law: found.summary()}
-    outcome = "met" if found.met else "missed"
-    return Result(title, blocks, numbers, lambda: draw(found, title), summary, outcome=outcome)
+    sentences = [_setting_text(budget), *(f"{index}: {MEANINGS[index]}." for index in budget.indices)]
+    title = f"{budget.scenario}, {budget.law}: pointing error by source"
+    blocks, summary = ["", _table(budget), *sentences], {budget.law: budget.summary()}
+    outcome = "met" if budget.met else "missed"
+    return Result(title, blocks, numbers, lambda: draw(budget, title), summary, outcome=outcome)
 
 
-def _table(found: Budget) -> Table:
+def _table(budget: Budget) -> Table:
     from starhold.studies.budget import COMBINED, TOGETHER
 
-    units = {index: _unit_of(found, index) for index in found.indices}
+    units = {index: _unit_of(budget, index) for index in budget.indices}
     rows: list[list[Any]] = [
-        [row.name, *(found.level(row.name, index) / size for index, (_, size) in units.items())] for row in found.rows
+        [row.name, *(budget.level(row.name, index) / size for index, (_, size) in units.items())] for row in budget.rows
     ]
     count, ends = len(rows), {len(rows) - 3, len(rows) - 1}
-    bold = [place for place, row in enumerate(found.rows) if row.name == TOGETHER]
-    ratios = [found.level(TOGETHER, index) / max(found.level(COMBINED, index), 1e-300) for index in found.indices]
+    bold = [place for place, row in enumerate(budget.rows) if row.name == TOGETHER]
+    ratios = [budget.level(TOGETHER, index) / max(budget.level(COMBINED, index), 1e-300) for index in budget.indices]
     rows.append(["together / root sum square", *(f"{ratio:.3g}" for ratio in ratios)])
-    if found.required:
+    if budget.required:
         verdicts = {True: "[green]met[/green]", False: "[red]missed[/red]"}
         shown = {
-            index: f"{most / units[index][1]:.4g} {verdicts[found.level(TOGETHER, index) <= most]}"
-            for index, most in found.required.items()
+            index: f"{most / units[index][1]:.4g} {verdicts[budget.level(TOGETHER, index) <= most]}"
+            for index, most in budget.required.items()
         }
-        rows.append(["required, at most", *(shown.get(index, "") for index in found.indices)])
+        rows.append(["required, at most", *(shown.get(index, "") for index in budget.indices)])
         ends.add(count)
     columns = [Column("source"), *(Column(index, unit, ".4g") for index, (unit, _) in units.items())]
     return Table(columns, rows, bold=bold, ends=ends)
 
 
 def _unit_of(budget: Budget, index: str) -> tuple[str, float]:
-    """The unit that the levels of an index are told in, and its size (rad)."""
+    """The unit that the levels of an index are shown in, and its size (rad)."""
     largest = max(budget.level(row.name, index) for row in budget.rows)
     return next((unit for unit in UNITS if largest >= LEAST * unit[1]), UNITS[-1])
 
 
 def _setting_text(budget: Budget) -> str:
-    """How the errors were taken, in a sentence or two."""
-    told = budget.settings
-    about = "about whatever axis" if told.boresight is None else "half the cone of the line of sight"
-    runs = "run" if told.runs == 1 else "runs"
+    """Say how the errors were taken, in a sentence or two."""
+    settings = budget.settings
+    about = "about any axis" if settings.boresight is None else "half the cone of the line of sight"
+    runs = "run" if settings.runs == 1 else "runs"
     return (
-        f"Levels that {100.0 * told.confidence:.6g} % {INTERPRETED[told.interpretation]} keep, {about}; {told.runs} {runs}. "
-        f"Errors from {told.start:g} s on, windows of {told.window:g} s, for drift {told.separation:g} s apart."
+        f"Levels that {100.0 * settings.confidence:.6g} % {INTERPRETED[settings.interpretation]} keep, {about}; "
+        f"{settings.runs} {runs}. Errors from {settings.start:g} s on, windows of {settings.window:g} s, "
+        f"for drift {settings.separation:g} s apart."
     )
 
 

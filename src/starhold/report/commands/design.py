@@ -15,12 +15,12 @@ WIDE = 132
 """Characters in a line of a matrix."""
 
 
-def present(scenario: Scenario, law: str | None, found: Sequence[Design]) -> Result:
-    """Show the inputs of each design, its gains, and what it can be judged by."""
+def present(scenario: Scenario, law: str | None, designs: Sequence[Design]) -> Result:
+    """Show the inputs of each design, its gains, and the numbers to judge it by."""
     from starhold.report.stability_map import draw_map
     from starhold.scenario.designing import map_inputs
 
-    blocks = [block for design in found for block in _blocks(scenario, design)]
+    blocks = [block for design in designs for block in _blocks(scenario, design)]
     return Result(f"{scenario.name}: designed laws", blocks, figure=lambda: draw_map(*map_inputs(scenario, law)))
 
 

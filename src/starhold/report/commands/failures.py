@@ -1,4 +1,4 @@
-"""A study of what is left after the loss of any one or two wheels."""
+"""A study of the control that is left after the loss of any one or two wheels."""
 
 from __future__ import annotations
 
@@ -13,31 +13,33 @@ if TYPE_CHECKING:
     from starhold.studies.failures import Failure
 
 
-def present(scenario: Scenario, entry: LawEntry, found: Sequence[Failure]) -> Result:
-    """One row a loss; of the gains those that were designed anew."""
+def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) -> Result:
+    """One row a loss; gains only where they were designed anew."""
     from starhold.report.text import number_text
 
-    flown = [failure.gains for failure in found if failure.gains is not None]
+    flown = [failure.gains for failure in failures if failure.gains is not None]
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
     sentences: list[str] = []
-    if any(not failure.controllable for failure in found):
+    if any(not failure.controllable for failure in failures):
         sentences.append("not (x, y, z): no torque is left about this body direction.")
-    sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in found if failure.refused]
-    if any(failure.certified is not None for failure in found):
+    sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in failures if failure.refused]
+    if any(failure.certified is not None for failure in failures):
         sentences.append("certified: turns from rest on which no motor or wheel is proved to meet its limit.")
     if not retuned:
         sentences.append("The gains are the same in all of them.")
-    if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in found):
+    if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in failures):
         sentences.append("~ extrapolated from the growth of the momentum late in the flight.")
     title = f"{scenario.name}, {entry.name}: loss of wheels"
-    return Result(title, ["", _table(found, retuned), *sentences], _numbers(found, entry), lambda: draw(found, title))
+    return Result(
+        title, ["", _table(failures, retuned), *sentences], _numbers(failures, entry), lambda: draw(failures, title)
+    )
 
 
-def _numbers(found: Sequence[Failure], entry: LawEntry) -> Table:
+def _numbers(failures: Sequence[Failure], entry: LawEntry) -> Table:
     """All numbers, with every gain."""
     gains = [Column(item.name, item.gain.unit) for item in entry.law.fields()]
-    rows = [[*_cells(failure).values(), *((failure.gains or {}).get(gain.name) for gain in gains)] for failure in found]
-    return Table([*_cells(found[0]), *gains], rows)
+    rows = [[*_cells(failure).values(), *((failure.gains or {}).get(gain.name) for gain in gains)] for failure in failures]
+    return Table([*_cells(failures[0]), *gains], rows)
 
 
 def _cells(failure: Failure) -> dict[Any, Any]:
@@ -68,13 +70,13 @@ def _cells(failure: Failure) -> dict[Any, Any]:
     }
 
 
-def _table(found: Sequence[Failure], retuned: Sequence[str]) -> Table:
-    designed = found[0].eta is not None
+def _table(failures: Sequence[Failure], retuned: Sequence[str]) -> Table:
+    designed = failures[0].eta is not None
     columns = [Column("lost"), Column("axes"), Column("cond.", "", ".3g")]
     columns += [Column("authority", "N m", ".4g"), Column("share", "%", ".1f"), *(Column(name, "", ">") for name in retuned)]
     columns += [Column("stability", "1/s, before → after", ">")] * designed
     columns += [Column("certified", "turn, °", ">"), Column("settling", "s", ".4g"), Column("wheel full", "min", ">")]
-    return Table(columns, [[failure.name, *_row(failure, retuned, designed)] for failure in found])
+    return Table(columns, [[failure.name, *_row(failure, retuned, designed)] for failure in failures])
 
 
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[Any]:
@@ -111,29 +113,29 @@ def _directions(failure: Failure) -> str:
     return " and ".join(f"({', '.join(f'{x:.3g}' for x in direction)})" for direction in failure.lacking)
 
 
-def draw(found: Sequence[Failure], title: str) -> Any:
+def draw(failures: Sequence[Failure], title: str) -> Any:
     """One row a loss, one panel a quantity."""
     from starhold.report.bars import draw_bars
 
-    panels = [_bars("authority left, % of intact", found, [100.0 * failure.share for failure in found])]
-    if any(failure.eta is not None for failure in found):
-        panels.append(_bars("degree of stability, 1/s", found, [failure.eta for failure in found]))
-    panels.append(_bars("settling time, s", found, [failure.settling for failure in found]))
-    if any(failure.certified is not None for failure in found):
+    panels = [_bars("authority left, % of intact", failures, [100.0 * failure.share for failure in failures])]
+    if any(failure.eta is not None for failure in failures):
+        panels.append(_bars("degree of stability, 1/s", failures, [failure.eta for failure in failures]))
+    panels.append(_bars("settling time, s", failures, [failure.settling for failure in failures]))
+    if any(failure.certified is not None for failure in failures):
         # Rounded down, so as not to say more than is proved.
-        turns = [None if f.certified is None else math.floor(10.0 * math.degrees(f.certified[0])) / 10.0 for f in found]
-        panels.append(_bars("certified turn, °", found, turns, "not proved"))
-    rows, hues = [failure.name for failure in found], [0 if failure.lost else 2 for failure in found]
-    struck = {k: f"no torque about {_directions(failure)}" for k, failure in enumerate(found) if not failure.controllable}
+        turns = [None if f.certified is None else math.floor(10.0 * math.degrees(f.certified[0])) / 10.0 for f in failures]
+        panels.append(_bars("certified turn, °", failures, turns, "not proved"))
+    rows, hues = [failure.name for failure in failures], [0 if failure.lost else 2 for failure in failures]
+    struck = {k: f"no torque about {_directions(failure)}" for k, failure in enumerate(failures) if not failure.controllable}
     kinds = {"intact": 2, "three axes left": 0}
     return draw_bars(title, "", rows, hues, panels, kinds, "as intact", "lost wheels", struck, "an axis without torque")
 
 
-def _bars(label: str, found: Sequence[Failure], values: Sequence[float | None], missing: str = "not settled") -> Any:
+def _bars(label: str, failures: Sequence[Failure], values: Sequence[float | None], missing: str = "not settled") -> Any:
     """A panel with the number at the end of each bar, or why there is none."""
     from starhold.report.bars import Bars
 
-    lost = ["diverged" if f.diverged_at is not None else "not flown" if f.refused else missing for f in found]
+    lost = ["diverged" if f.diverged_at is not None else "not flown" if f.refused else missing for f in failures]
     words = [why if value is None else f"{value:.3g}" for value, why in zip(values, lost, strict=True)]
     return Bars(label, [value or 0.0 for value in values], words, values[0])
 

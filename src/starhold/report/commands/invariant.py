@@ -1,4 +1,4 @@
-"""A table and a picture of what is proved of invariant sets of any small system."""
+"""A table and a picture of the proved invariant sets of any small system."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ def listed() -> list[Block]:
 
 
 def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
-    """The problem: made in Python, of a file, or the built-in one of a name."""
+    """The problem: made in Python, read from a file, or the built-in one of a name."""
     from starhold.certification import invariant as sets
 
     return (problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem),)
 
 
-def present(problem: InvariantProblem, found: Certificate) -> Result:
-    """Each claim with its outcome, how it was shown and what it lacks; the phase portrait with the sets."""
+def present(problem: InvariantProblem, certificate: Certificate) -> Result:
+    """Each claim with its outcome, how it was shown and what is missing; the phase portrait with the sets."""
     from starhold.certification import invariant as sets
     from starhold.studies.phase_portraits import portraits
 
-    shown = portraits(problem, found)
+    shown = portraits(problem, certificate)
     drawn = [item for item in shown if item.V is not None]
-    told = dict.fromkeys(a for claim in found.claims for a in claim.assumptions)
-    blocks = ["", Heading(found.name), _table(found, shown), f"  assuming: {'; '.join(told)}", ""]
+    assumptions = dict.fromkeys(a for claim in certificate.claims for a in claim.assumptions)
+    blocks = ["", Heading(certificate.name), _table(certificate, shown), f"  assuming: {'; '.join(assumptions)}", ""]
     figure = partial(_draw, drawn, problem.name) if drawn else None
-    outcome = {"proved": "met", "refuted": "missed"}.get(found.outcome, "undecided")
-    written: Any = partial(sets.write, found)
+    outcome = {"proved": "met", "refuted": "missed"}.get(certificate.outcome, "undecided")
+    written: Any = partial(sets.write, certificate)
     return Result(problem.name, blocks, figure=figure, certificate=written, outcome=outcome)  # type: ignore[arg-type]
 
 

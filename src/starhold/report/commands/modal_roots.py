@@ -17,59 +17,59 @@ POINTS = 200
 """Points of each piece of a fit."""
 
 
-def present(scenario: Scenario, entry: LawEntry, found: Study) -> Result:
+def present(scenario: Scenario, entry: LawEntry, result: Study) -> Result:
     """One row an angle, how good the fits are, and the law to be pasted."""
     from starhold.studies.modal_roots import law_lines
 
     sentences: list[str] = []
-    for name, pieces in found.fits().items():
-        off = 100.0 * abs(pieces.errors(found.angles, found.roots))
+    for name, pieces in result.fits().items():
+        off = 100.0 * abs(pieces.errors(result.angles, result.roots))
         sentences.append(f"{name}: off by {(off**2).mean() ** 0.5:.2f} % rms, {off.max():.2f} % at most")
-    if found.fitted is not None:
-        sentences.append("\n".join(["", *law_lines(found.fitted, found.b), ""]))
+    if result.fitted is not None:
+        sentences.append("\n".join(["", *law_lines(result.fitted, result.b), ""]))
     title = f"{scenario.name}: fastest root within the limits"
-    return Result(title, ["", _table(found), *sentences], _numbers(found), lambda: draw(found, title))
+    return Result(title, ["", _table(result), *sentences], _numbers(result), lambda: draw(result, title))
 
 
-def _numbers(found: Study) -> Table:
+def _numbers(result: Study) -> Table:
     head = ["angle", "root", "time", "peak_rate", *(f"peak_acceleration_{axis}" for axis in "xyz")]
-    head += ["eased_root", "eased_time"] * found.eased
-    fits = [pieces.at(found.angles).tolist() for pieces in found.fits().values()]
+    head += ["eased_root", "eased_time"] * result.eased
+    fits = [pieces.at(result.angles).tolist() for pieces in result.fits().values()]
     rows: list[list[Any]] = []
-    for item, *fitted in zip(found.results, *fits, strict=True):
+    for item, *fitted in zip(result.results, *fits, strict=True):
         hard: Any = item.hard
-        eased: Any = [item.eased.root, item.eased.time] if found.eased and item.eased is not None else []
+        eased: Any = [item.eased.root, item.eased.time] if result.eased and item.eased is not None else []
         peaks = hard.transient.peak_rate, *hard.transient.peak_acceleration
         rows.append([item.angle, hard.root, hard.time, *peaks, *eased, *fitted])
-    return Table([Column(name) for name in (*head, *(f"{name}_root" for name in found.fits()))], rows)
+    return Table([Column(name) for name in (*head, *(f"{name}_root" for name in result.fits()))], rows)
 
 
-def _table(found: Study) -> Table:
+def _table(result: Study) -> Table:
     columns = [Column("angle", "°", ".4g"), Column("root", "1/s", ".6g"), Column("time", "s", ".2f")]
     columns += [Column("peak rate", "°/s", ".2f"), Column("peak accel.", "°/s²", ".2f")]
     eased = [Column("root, eased", "1/s", ".6g"), Column("time, eased", "s", ".2f"), Column("gain", "%", ".1f")]
-    columns += eased * found.eased
-    for name in found.fits():
+    columns += eased * result.eased
+    for name in result.fits():
         columns += [Column(name, "1/s", ".4f"), Column("off by", "%", "+.2f")]
     rows: list[list[Any]] = []
-    for angle, root, time, rate, x, y, z, *more in _numbers(found).rows:
+    for angle, root, time, rate, x, y, z, *more in _numbers(result).rows:
         row = [math.degrees(angle), root, time, math.degrees(rate), math.degrees(max(x, y, z))]
-        if found.eased:
+        if result.eased:
             row += [*more[:2], 100.0 * (1.0 - more[1] / time)]
-        for pieces in found.fits().values():
+        for pieces in result.fits().values():
             row += [pieces.at(angle), 100.0 * pieces.errors(angle, root)]
         rows.append(row)
     return Table(columns, rows)
 
 
-def draw(found: Study, title: str) -> Any:
-    """The figure: roots and what they take, over the angle; errors of the fits where there are any."""
+def draw(result: Study, title: str) -> Any:
+    """The figure: roots, times and rates over the angle; errors of the fits where there are any."""
     import numpy as np
 
     from starhold.report.colours import COLOURS
     from starhold.report.figures import framed, plain
 
-    fits, angles = found.fits(), np.degrees(found.angles)
+    fits, angles = result.fits(), np.degrees(result.angles)
     ratios = [1.5, 0.8, 1.0] if fits else [1.5, 1.0]
     size, sides = (8.0, 2.3 * len(ratios) + 1.0), (0.784, 0.176, 0.5, 0.72)
     figure, grid = framed(size, title, len(ratios), 1, sides, sharex=True, height_ratios=ratios, hspace=0.1)
@@ -79,13 +79,13 @@ def draw(found: Study, title: str) -> Any:
         words, dashes, number = LINES[name]
         style: dict[str, Any] = {"color": COLOURS[number], "linestyle": dashes}
         _line(top, pieces, angles, words, style)
-        errors = 100.0 * pieces.errors(found.angles, found.roots)
+        errors = 100.0 * pieces.errors(result.angles, result.roots)
         axes[1].plot(angles, errors, linewidth=1.2, marker=".", markersize=5, **style)
     if fits:
         axes[1].axhline(0.0, color="0.35", linewidth=0.8)
         axes[1].set_ylabel("error of fit, %")
-    kinds = [("within the limits", [item.hard for item in found.results], COLOURS[0], COLOURS[0])]
-    kinds += [("with their tolerances", [item.eased for item in found.results], COLOURS[4], "white")] * found.eased
+    kinds = [("within the limits", [item.hard for item in result.results], COLOURS[0], COLOURS[0])]
+    kinds += [("with their tolerances", [item.eased for item in result.results], COLOURS[4], "white")] * result.eased
     for words, best, colour, inside in kinds:
         style = {"color": colour, "markerfacecolor": inside, "linestyle": "", "marker": "o", "markersize": 4.5}
         for axis, name in ((top, "root"), (last, "time")):

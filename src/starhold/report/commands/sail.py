@@ -69,8 +69,9 @@ def _number(name: str, text: Any) -> Any:
         raise InputError("sail", f"--{name}", text, error.message()) from None
 
 
-def present(station: Station, mass: float, area: float | None, found: Station) -> Result:
-    """The design in words, then the sail over rates and reflectivities, and what deficits leave of what the circle asks."""
+def present(station: Station, mass: float, area: float | None, _same: Station) -> Result:
+    """The design in words, then the sail over rates and reflectivities, and the control left at deficits of what the circle
+    asks."""
     from starhold.parts.bodies.libration_point import nonlinear
     from starhold.synthesis.circle import demand
 
@@ -100,12 +101,12 @@ def present(station: Station, mass: float, area: float | None, found: Station) -
     heads = ("rate", "period", "peak_scaled", "peak", "pressure", "radius", "specular", "diffuse", "area_per_mass")
     numbers = [
         [*rate, station.pressure, station.radius, mirror, min(station.diffuse, 1.0 - mirror), area]
-        for rate, own in zip(rates, areas, strict=True)
-        for mirror, area in zip(mirrors, own, strict=True)
+        for rate, by_mirror in zip(rates, areas, strict=True)
+        for mirror, area in zip(mirrors, by_mirror, strict=True)
     ]
     columns = [Column("rate", "Ω", ".4g"), Column("period", "days", ".4g"), Column("peak/radius", "Ω²", ".4g")]
     columns += [Column("peak", "m/s²", ".4g"), *(Column(f"{mirror:g}", "m²/kg", ".4g") for mirror in mirrors)]
-    rows = [[rate, period / DAY, *peaks, *own] for (rate, period, *peaks), own in zip(rates, areas, strict=True)]
+    rows = [[rate, period / DAY, *peaks, *by_mirror] for (rate, period, *peaks), by_mirror in zip(rates, areas, strict=True)]
     best = [number for number, (rate, *_) in enumerate(rates) if rate == station.rate]
     table = Table(columns, rows, "Sail over the rate and the reflectivity", bold=best)
     blocks = [*lines, "", table, "", _deficits(station, sorted(deficits)), NOTE]
@@ -123,8 +124,8 @@ def _margin(station: Station, area: float, mass: float) -> str:
     from starhold.synthesis.circle import demand, rates_held
 
     margin = station.margin(area, mass)
-    held = rates_held(margin * demand(station.rate, station.plant), station.plant)
-    rates = "no rate is held" if held is None else f"rates from {held[0]:.4g} to {held[1]:.4g} Ω are held"
+    rates_kept = rates_held(margin * demand(station.rate, station.plant), station.plant)
+    rates = "no rate is held" if rates_kept is None else f"rates from {rates_kept[0]:.4g} to {rates_kept[1]:.4g} Ω are held"
     return f"margin of {area:g} m²: {margin:.4g}; {rates}"
 
 

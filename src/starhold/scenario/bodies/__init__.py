@@ -1,5 +1,5 @@
-"""The bodies that scenarios can be about: each module or folder here tells the tables of one, and is named nowhere else;
-`any_body` tells those of all others."""
+"""The bodies that scenarios can be about: each module or folder here defines the tables of one, which is named nowhere else;
+`any_body` defines those of all others."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from starhold.scenario.bodies.interface import Body
 def bodies() -> dict[str, Body]:
     """The bodies by name: the `BODY` of every module of this package that has one."""
     modules = [import_module(f"{__name__}.{item.name}") for item in pkgutil.iter_modules(__path__)]
-    found: list[Body] = [module.BODY for module in modules if hasattr(module, "BODY")]
-    return {body.name: body for body in found}
+    all_bodies: list[Body] = [module.BODY for module in modules if hasattr(module, "BODY")]
+    return {body.name: body for body in all_bodies}
 
 
 def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:

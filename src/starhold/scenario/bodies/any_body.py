@@ -132,7 +132,7 @@ class AnyBody(Body):
 
 
 class NamedByTable:
-    """It stands for all these bodies until a file's [body] table tells which."""
+    """Stands for all these bodies until a file's [body] table names one."""
 
     name = ""
     marker = MARKER
@@ -151,14 +151,14 @@ class NamedByTable:
         given = cast(dict[str, Any], table)
         if "file" in given:
             return in_file(given, lambda path: _read(path, folder), "body", folder, where, MARKER)
-        name, own = given.get("type"), bodies.bodies()
-        if isinstance(name, str) and name in own:
-            raise InputError(where, f"{MARKER}.type", show(name), f"the [{own[name].marker}] table, which gives it")
-        known = {part.name: part for part in parts("body").values() if part.name not in own}
+        name, tabled = given.get("type"), bodies.bodies()
+        if isinstance(name, str) and name in tabled:
+            raise InputError(where, f"{MARKER}.type", show(name), f"the [{tabled[name].marker}] table, which gives it")
+        known = {part.name: part for part in parts("body").values() if part.name not in tabled}
         if not isinstance(name, str) or name not in known:
-            found = "nothing" if name is None else show(name)
+            given_name = "nothing" if name is None else show(name)
             allowed = f"{nearest(str(name), list(known))}; or a file" if known else "a file, for no other body is installed"
-            raise InputError(where, f"{MARKER}.type", found, allowed)
+            raise InputError(where, f"{MARKER}.type", given_name, allowed)
         try:
             return AnyBody(known[name], folder)
         except ValueError as error:
@@ -177,8 +177,8 @@ def _read(path: Path, folder: Path) -> AnyBody:
 
 @cache
 def tables_of(part: Part) -> type[ScenarioTable]:
-    """The tables of a file about a body but those of its laws. ValueError, one line, where the part does not declare itself
-    so that a file can give its numbers."""
+    """The tables of a file about a body but those of its laws. ValueError, one line, where the part's declaration leaves
+    numbers that a file cannot give."""
     try:
         state, params = _state(part), _params(part)
         recorded = quantities(part.module.Sample)
@@ -203,13 +203,13 @@ def tables_of(part: Part) -> type[ScenarioTable]:
     )
     time, said = ("s", "") if unit == "s" else ("1", f", in {unit}")
     duration = quantity(Gain(time, above=0.0, text=f"length of the run, in whole control periods{said}"))
-    held = quantity(Gain(time, above=0.0, text=f"for which a command is held{said}"))
+    hold = quantity(Gain(time, above=0.0, text=f"for which a command is held{said}"))
     timing: Any = create_model(
         f"{title}Timing",
         __base__=AnyTiming,
         __doc__=AnyTiming.__doc__,
         duration=(Annotated[float, *duration], ...),
-        control_period=(Annotated[float, *held], ...),
+        control_period=(Annotated[float, *hold], ...),
     )
 
     def rows(table: Any, info: ValidationInfo) -> Any:
@@ -253,7 +253,7 @@ def _state(part: Part) -> list[contract.Field]:
 
 
 def _within(gain: contract.Parameter) -> Any:
-    """A value that a parameter may have: 0.1 for each number, or what lies near that."""
+    """A value that a parameter may have: 0.1 for each number, or one near it within the bounds."""
     least = [0.1, *(x for x in (gain.at_least, None if gain.above is None else gain.above + 0.1) if x is not None)]
     value = min(max(least), math.inf if gain.at_most is None else gain.at_most)
     return [value] * gain.shape[0] if gain.shape else value

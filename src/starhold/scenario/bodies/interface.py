@@ -79,16 +79,16 @@ class Body(Protocol):
 
     def context(self, tables: Mapping[str, Any], where: str) -> Any:
         """The context that validators of these raw tables and of laws' gains need, such as the worth of scaled numbers.
-        InputError where the tables do not tell."""
+        InputError where the tables do not give it."""
         return None
 
     def make(self, table: Any, where: str) -> Made:
-        """The numbers that validated tables make. InputError where no body has them."""
+        """The numbers that validated tables make. InputError for numbers that no body has."""
         ...
 
-    def complete(self, scenario: Scenario, law: Law, spec: Any, own: Any) -> Any:
-        """The inputs of a law's design form, with what they leave to the scenario; `own` is the law's validated table.
-        ValueError where the scenario cannot give it."""
+    def complete(self, scenario: Scenario, law: Law, spec: Any, law_table: Any) -> Any:
+        """The inputs of a law's design form, completed from the scenario; `law_table` is the law's validated table.
+        ValueError where the scenario cannot give them."""
         return spec
 
     def target(self, scenario: Scenario, given: Any, context: Any, key: str) -> Fitted:
@@ -96,14 +96,14 @@ class Body(Protocol):
         where it gives none."""
         raise InputError(scenario.where, key, "a target", "none, for this body has no attitude")
 
-    def options(self, scenario: Scenario, own: Any, gains: Any, key: str) -> Any:
+    def options(self, scenario: Scenario, law_table: Any, gains: Any, key: str) -> Any:
         """The options of a law beside its gains, from its validated table (called `key` in errors) or else from the
         scenario. InputError if they do not fit the gains."""
         return None
 
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
-        """Return what the body's tables give of the closed loop of one law, by the names that `ClosedLoop` has for it: the
-        start, all parts, and what else is not as of any body."""
+        """Return the arguments of `ClosedLoop` that the body's tables give for one law: the start, all parts, and those in
+        which the body differs from any other."""
         ...
 
     def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
@@ -142,11 +142,11 @@ class Body(Protocol):
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
         """The body's numbers as laws know them under these values of the keys of `dials`, which may be recorded numbers;
-        InputError, as of a file, where no file may have them."""
+        InputError, as of a file, for values that no file may have."""
         return scenario.craft
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The changes of a file, as a scenario's `with_` takes them, that values of these keys mean."""
+        """The changes of a file, as a scenario's `with_` takes them, that give keys of `dials` these values."""
         return dict(values)
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 @final
 class LibrationPointStudy(BodyStudy):
-    """Runs are scaled, with what their units are worth among the attributes; metrics are in SI. Calls are not timed where
-    control surfaces move within hours."""
+    """Runs are scaled, their units in SI among the attributes; metrics are in SI. Calls are not timed where control surfaces
+    move within hours."""
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         units, goal = scenario.table.libration.units, goal_of(loop.gains)
@@ -36,10 +36,10 @@ class LibrationPointStudy(BodyStudy):
         return replace(run, attrs=run.attrs | worth)
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
-        told = run.attrs
-        units = Units(float(told["length_unit_m"]), float(told["rate_unit_rad_per_s"]))
-        goal = CircleGoal(*map(float, told["circle"])) if "circle" in told else EquilibriumGoal(vector(told["rest"]))
-        return measure(run, units, goal, float(told["settling_tolerance"]))
+        attrs = run.attrs
+        units = Units(float(attrs["length_unit_m"]), float(attrs["rate_unit_rad_per_s"]))
+        goal = CircleGoal(*map(float, attrs["circle"])) if "circle" in attrs else EquilibriumGoal(vector(attrs["rest"]))
+        return measure(run, units, goal, float(attrs["settling_tolerance"]))
 
     def meter(
         self,

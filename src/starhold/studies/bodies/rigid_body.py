@@ -35,27 +35,27 @@ class RigidBodyStudy(BodyStudy):
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         settling, transient = scenario.table.settling, scenario.table.transient
-        told = {f"settling_{name}": getattr(settling, name) for name in ("attitude_tolerance", "rate_tolerance")}
+        described = {f"settling_{name}": getattr(settling, name) for name in ("attitude_tolerance", "rate_tolerance")}
         if transient is not None:
-            told |= {f"transient_{name}": getattr(transient, name) for name in TRANSIENT}
+            described |= {f"transient_{name}": getattr(transient, name) for name in TRANSIENT}
         orbit, of_date = scenario.table.orbit, date_of_axes(scenario)
         if orbit is not None and orbit.epoch is not None:
-            told["epoch"] = iso_text(orbit.epoch)
+            described["epoch"] = iso_text(orbit.epoch)
         if of_date is not None:
-            told |= {"epoch": iso_text(of_date), "frame": OF_DATE}
+            described |= {"epoch": iso_text(of_date), "frame": OF_DATE}
         run = super().name_samples(scenario, loop, samples, carry)
         angle = {"error_angle": error_angle(run["attitude_error"])}
         meant = {"error_angle": Quantity("rad", "angle to the target")}
-        attrs = run.attrs | told | {"seed": scenario.table.simulation.seed}
+        attrs = run.attrs | described | {"seed": scenario.table.simulation.seed}
         return replace(run, arrays=run.arrays | angle, columns=run.columns | meant, attrs=attrs)
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
-        told = run.attrs
-        found = measure(run, told["settling_attitude_tolerance"], told["settling_rate_tolerance"])
-        if "transient_angle_end" not in told:
-            return found
-        rate, acceleration, angle_end, rate_end = (told[f"transient_{name}"] for name in TRANSIENT)
-        return found | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, found["cut_off"])
+        attrs = run.attrs
+        metrics = measure(run, attrs["settling_attitude_tolerance"], attrs["settling_rate_tolerance"])
+        if "transient_angle_end" not in attrs:
+            return metrics
+        rate, acceleration, angle_end, rate_end = (attrs[f"transient_{name}"] for name in TRANSIENT)
+        return metrics | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, metrics["cut_off"])
 
     def meter(
         self,
@@ -114,13 +114,13 @@ STUDY = RigidBodyStudy()
 
 
 def _differs(event: Event, issued: Issued) -> bool:
-    """Whether from an event on another loop flies, or is known to the law, than a certificate speaks of."""
+    """Whether from an event on a loop flies, or is known to the law, that differs from the one a certificate is about."""
     if event.step != issued.step or issued.step:
         return event.step > issued.step
     # A fault at the very start, of which the law knows or does not.
-    own = issued.loop
-    pairs = zip(event.parts, own.parts, strict=True)
-    same = same_numbers((event.craft, event.nominal, event.gains), (own.craft, own.craft, own.gains))
+    loop = issued.loop
+    pairs = zip(event.parts, loop.parts, strict=True)
+    same = same_numbers((event.craft, event.nominal, event.gains), (loop.craft, loop.craft, loop.gains))
     return not (same and all(same_numbers(one.params, other.params) for one, other in pairs))
 
 
@@ -133,18 +133,18 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[I
     wanted = Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum)
     if mode_laws(loop.law, loop.gains):
         return certify_modes(loop, entry.name, wanted)
-    found: list[Issued] = []
+    issued: list[Issued] = []
     for step, now in _known(loop, scenario.table.simulation.steps):
         name = f"{entry.name} from {step * loop.period:g} s" if step else entry.name
-        found.append(Issued(certify(now, name, wanted), now, step))
-    return found
+        issued.append(Issued(certify(now, name, wanted), now, step))
+    return issued
 
 
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
-    """The loop as it starts, and at each control step of a run from which on it is another that the law knows."""
-    found = [(0, replace(loop, events=()))]
+    """The loop as it starts, and each later loop that the law knows, with the control step from which on it flies."""
+    known = [(0, replace(loop, events=()))]
     if loop.remembers:
-        return found
+        return known
     latest = {event.step: event for event in loop.events if event.step < steps}
     for step, event in latest.items():
         sound = all(tells(f.params) for f in event.parts if (tells := f.part.hook("gives_allocated_torque")) is not None)
@@ -152,14 +152,14 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
             continue
         now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
         if step:
-            # A step more, for what the event changes at once.
+            # One step more, for the changes that come with the event.
             carry = fly(loop, step)[1]
             phase = next(phase for phase in loop.phases(steps) if phase.first == step)
             carry = phase.entered(carry)
             moving = zip(now.used("effector"), carry.effectors, strict=True)
-            now = replace(now, start=carry.state).with_parts(*(replace(f, start=own) for f, own in moving))
+            now = replace(now, start=carry.state).with_parts(*(replace(f, start=state) for f, state in moving))
             if loop.target.part.name == "history":
                 table = loop.target.params.table[step:]
                 now = now.with_parts(replace(loop.target, params=loop.target.params._replace(table=table)))
-        found = [(step, now)] if step == 0 else [*found, (step, now)]
-    return found
+        known = [(step, now)] if step == 0 else [*known, (step, now)]
+    return known

@@ -63,19 +63,19 @@ class LibrationPoint(Body):
     def make(self, table: LibrationPointTable, where: str) -> Made:
         return Made(table.libration.plant)
 
-    def options(self, scenario: Scenario, own: PointLawTable, gains: Any, key: str) -> Options:
-        lag = scenario.table.control.lag if own.lag is None else own.lag
-        return Options(_limit(scenario, own, gains, key), lag or 0.0)
+    def options(self, scenario: Scenario, law_table: PointLawTable, gains: Any, key: str) -> Options:
+        lag = scenario.table.control.lag if law_table.lag is None else law_table.lag
+        return Options(_limit(scenario, law_table, gains, key), lag or 0.0)
 
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
-        table, plant, own = scenario.table, scenario.craft, entry.options
+        table, plant, options = scenario.table, scenario.craft, entry.options
         field = "linear-gravity" if table.libration.model == "linear" else "three-body-gravity"
-        surfaces = (fit("actuator", "lag", own.lag),) if own.lag > 0.0 else ()
+        surfaces = (fit("actuator", "lag", options.lag),) if options.lag > 0.0 else ()
         return {
             "start": _start(scenario, entry),
             "parts": (fit("environment", field), *surfaces, *scenario.parts),
-            "limit": "none" if math.isinf(own.limit) else table.control.limit_kind,
-            "command_limit": own.limit,
+            "limit": "none" if math.isinf(options.limit) else table.control.limit_kind,
+            "command_limit": options.limit,
             "divergence_bound": table.simulation.lost_beyond or NEAR * min(abs(plant.from_smaller), abs(plant.from_larger)),
         }
 
@@ -92,10 +92,10 @@ class LibrationPoint(Body):
             raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)
 
 
-def _limit(scenario: Scenario, own: PointLawTable, gains: Any, key: str) -> float:
-    """The largest control (scaled) a law has, by what its own table says or else [control]."""
+def _limit(scenario: Scenario, law_table: PointLawTable, gains: Any, key: str) -> float:
+    """The largest control (scaled) a law has: from its table, else from [control]."""
     where, table = scenario.where, scenario.table
-    said, key = (own.told, key) if own.told else (table.control.told, "control")
+    said, key = (law_table.limits, key) if law_table.limits else (table.control.limits, "control")
     if not said:
         return math.inf
     if table.control.limit_kind == "none":

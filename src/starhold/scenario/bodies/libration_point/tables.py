@@ -44,18 +44,18 @@ class LibrationTable(Table):
 
     @model_validator(mode="after")
     def _bodies(self) -> LibrationTable:
-        own = {"larger": self.larger, "smaller": self.smaller, "separation": self.separation}
-        missing = [key for key, value in own.items() if value is None]
-        if self.primaries is not None and len(missing) < len(own):
+        given = {"larger": self.larger, "smaller": self.smaller, "separation": self.separation}
+        missing = [key for key, value in given.items() if value is None]
+        if self.primaries is not None and len(missing) < len(given):
             raise at_key("primaries", "either primaries or larger, smaller and separation", self.primaries)
-        if missing and len(missing) < len(own):
+        if missing and len(missing) < len(given):
             raise at_key(missing[0], "larger, smaller and separation together", None)
         if not missing:
             self._check_own()
         return self
 
     def _check_own(self) -> None:
-        """Errors where two bodies of one's own cannot be."""
+        """Raise an error for two given bodies that cannot be."""
         pair = self.pair
         check_gravity("larger", pair.larger)
         check_gravity("smaller", pair.smaller)
@@ -102,15 +102,15 @@ class Resources(Table):
     )
 
     @property
-    def told(self) -> dict[str, float]:
-        """The ways in which the limit is given."""
+    def limits(self) -> dict[str, float]:
+        """The limits given, by key."""
         given = {"limit": self.limit, "margin": self.margin, "deficit": self.deficit}
         return {key: value for key, value in given.items() if value is not None}
 
     @model_validator(mode="after")
     def _one_limit(self) -> Resources:
-        if len(self.told) > 1:
-            raise at_key(list(self.told)[1], f"one of limit, margin and deficit, not also {next(iter(self.told))}", None)
+        if len(self.limits) > 1:
+            raise at_key(list(self.limits)[1], f"one of limit, margin and deficit, not also {next(iter(self.limits))}", None)
         return self
 
 
@@ -173,6 +173,6 @@ class LibrationPointTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _limit_is_of_something(self) -> LibrationPointTable:
-        if self.control.limit_kind == "none" and self.control.told:
+        if self.control.limit_kind == "none" and self.control.limits:
             raise at_key("control.limit_kind", "norm or axis where there is a limit", "none")
         return self

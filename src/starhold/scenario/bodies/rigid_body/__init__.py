@@ -61,14 +61,14 @@ class RigidBody(Dials):
     def make(self, table: RigidBodyTable, where: str) -> Made:
         return make(table, where)
 
-    def complete(self, scenario: Scenario, law: Law, spec: Any, own: AttitudeLawTable) -> Any:
-        return law.complete(spec, lambda: told_to_design(scenario, own.quaternion_sign))
+    def complete(self, scenario: Scenario, law: Law, spec: Any, law_table: AttitudeLawTable) -> Any:
+        return law.complete(spec, lambda: told_to_design(scenario, law_table.quaternion_sign))
 
     def target(self, scenario: Scenario, given: Any, context: Any, key: str) -> Fitted:
         return mode_target(scenario, given, context, key)
 
-    def options(self, scenario: Scenario, own: AttitudeLawTable, gains: Any, key: str) -> Options:
-        return Options(own.quaternion_sign, own.hysteresis_width, own.fault_action)
+    def options(self, scenario: Scenario, law_table: AttitudeLawTable, gains: Any, key: str) -> Options:
+        return Options(law_table.quaternion_sign, law_table.hysteresis_width, law_table.fault_action)
 
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
         body, target, effectors = scenario.table.spacecraft, target_of(scenario), effectors_of(scenario)

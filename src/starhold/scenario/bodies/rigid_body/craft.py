@@ -49,7 +49,9 @@ def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
     if made is supposed or len(made) != len(supposed):
         return made
     pairs = zip(made, supposed, strict=True)
-    return tuple(replace(own, params=own.part.module.shared_as(own.params, known.params)) for own, known in pairs)
+    return tuple(
+        replace(fitted, params=fitted.part.module.shared_as(fitted.params, known.params)) for fitted, known in pairs
+    )
 
 
 def wheels_of(scenario: Scenario) -> Wheels | None:
@@ -77,10 +79,10 @@ def axial_inertia(effectors: tuple[Fitted, ...]) -> Any:
 
 
 def torque_limit(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
-    """The torque that a law may reckon with (N m): the limit of [spacecraft], or what the effectors among these parts surely
-    give in its way where that is less."""
-    own, least = table.spacecraft, sure_torque(table, parts)
-    return least if own.limit == "none" and least < math.inf else min(own.torque_limit, least)
+    """The torque that a law may reckon with (N m): the limit of [spacecraft], or, where that is less, the torque that the
+    effectors among these parts surely give by the same measure."""
+    craft, least = table.spacecraft, sure_torque(table, parts)
+    return least if craft.limit == "none" and least < math.inf else min(craft.torque_limit, least)
 
 
 def sure_torque(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:

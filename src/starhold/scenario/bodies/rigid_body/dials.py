@@ -1,4 +1,5 @@
-"""Inertia, limit and start of a spacecraft can be moved while its loop stays the same program; here are their equations."""
+"""The inertia, limit and start of a spacecraft can be moved while its loop stays the same program; here are their
+equations."""
 
 from __future__ import annotations
 
@@ -48,21 +49,21 @@ class Dials(Body):
         if table.fault or table.nominal:
             return {}
         inertia = compact(table.spacecraft.inertia)
-        found: dict[str, Any] = {KNOWN: inertia, TRUE: inertia}
+        dials: dict[str, Any] = {KNOWN: inertia, TRUE: inertia}
         if math.isfinite(table.spacecraft.torque_limit) and table.spacecraft.limit != "none":
-            found[LIMIT] = table.spacecraft.torque_limit
+            dials[LIMIT] = table.spacecraft.torque_limit
         attitude = table.initial.attitude or stated(table.initial)
-        return found | {ATTITUDE: tuple(map(float, attitude)), RATE: tuple(map(float, table.initial.rate))}
+        return dials | {ATTITUDE: tuple(map(float, attitude)), RATE: tuple(map(float, table.initial.rate))}
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The changes of a file that values of these keys mean: an inertia that the laws do not know is that of a fault at
-        the start, about which nothing is done."""
-        found = {key: value for key, value in values.items() if key != TRUE}
-        if ATTITUDE in found:
-            found[ANGLES] = None
+        """The changes of a file that give keys these values: an inertia that the laws do not know is that of a fault at the
+        start, on which nobody acts."""
+        changes = {key: value for key, value in values.items() if key != TRUE}
+        if ATTITUDE in changes:
+            changes[ANGLES] = None
         if TRUE in values:
-            found["fault"] = [{"time": 0.0, "inertia": values[TRUE], "action": "none"}]
-        return found
+            changes["fault"] = [{"time": 0.0, "inertia": values[TRUE], "action": "none"}]
+        return changes
 
     def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
         """The numbers of a loop under these values, as `build` and `make_events` give them."""
@@ -99,18 +100,18 @@ class Dials(Body):
     def drawn(self, scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:
         """Return the arguments of `moved`, with an array (lanes,) in place of each number; columns: values (components...,
         lanes) by key, of whole vectors or of single components. An inertia beside wheels is left out."""
-        initial, found = scenario.table.initial, dict[str, Any]()
+        initial, moved = scenario.table.initial, dict[str, Any]()
         for key, given in ((ATTITUDE, initial.attitude), (ANGLES, initial.angles), (RATE, initial.rate)):
             values = _whole(columns, key, given)
             if values is not None and key == ANGLES:
                 # One by one, for the sine of an array may differ from that of a number.
                 values = np.array([from_angles(*lane) for lane in values.T.tolist()]).T
             if values is not None:
-                found[key] = tuple(values)
+                moved[key] = tuple(values)
         moments = _moments(scenario, columns)
         if moments is not None and not effectors_of(scenario):
-            found[KNOWN] = _inertia(moments, isinstance(scenario.craft.inertia[0], tuple))
-        return found
+            moved[KNOWN] = _inertia(moments, isinstance(scenario.craft.inertia[0], tuple))
+        return moved
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
         """Which lanes have an inertia that no body has, (lanes,); None where that is not drawn."""
@@ -147,11 +148,11 @@ def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:
         return whole - rotors[i][j]
 
     # What is zero of the nominal one stays so, for it is but rounding.
-    own: Any = tuple(
+    without_rotors: Any = tuple(
         tuple(left(i, j) if like[i][j] != 0.0 else 0.0 for j in range(3)) if isinstance(like[0], tuple) else left(i, i)
         for i in range(3)
     )
-    return craft._replace(inertia=own, inverse_inertia=inverse(own), with_rotors=inertia)
+    return craft._replace(inertia=without_rotors, inverse_inertia=inverse(without_rotors), with_rotors=inertia)
 
 
 def _moments(scenario: Scenario, columns: Mapping[str, Array]) -> Array | None:
@@ -166,10 +167,10 @@ def _whole(columns: Mapping[str, Array], key: str, nominal: Any) -> Array | None
     drawn = {name: values for name, values in columns.items() if name.startswith(f"{key}[")}
     if not drawn or nominal is None or any("][" in name for name in drawn):
         return None
-    found = np.repeat(np.asarray(nominal, dtype=float)[:, None], len(next(iter(drawn.values()))), axis=1)
+    vectors = np.repeat(np.asarray(nominal, dtype=float)[:, None], len(next(iter(drawn.values()))), axis=1)
     for name, values in drawn.items():
-        found[int(name[len(key) + 1 :].partition("]")[0]) - 1] = values
-    return found
+        vectors[int(name[len(key) + 1 :].partition("]")[0]) - 1] = values
+    return vectors
 
 
 def _inertia(moments: Array, matrix: bool) -> Any:

@@ -1,4 +1,4 @@
-"""From the fault tables of a scenario to what changes during a run."""
+"""From the fault tables of a scenario to the events of a run."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def written_out(scenario: Scenario, target: Fitted, effectors: tuple[Fitted, ...
     table = scenario.table
     around, noise, body = table.environment, table.sensor, table.spacecraft
     lag, rate_limit = body.actuator_lag, body.torque_rate_limit
-    found = (
+    fitted_parts = (
         target,
         *_where(table.orbit is not None, "environment", "two-body"),
         *_where(around.gravity_gradient, "environment", "gravity-gradient"),
@@ -35,7 +35,7 @@ def written_out(scenario: Scenario, target: Fitted, effectors: tuple[Fitted, ...
         *_where(lag > 0.0, "actuator", "lag", lag, rate_limit),
         *_where(lag == 0.0 and math.isfinite(rate_limit), "actuator", "rate-limit", rate_limit),
     )
-    return (*found, *(fitted for fitted in scenario.parts if fitted not in found))
+    return (*fitted_parts, *(fitted for fitted in scenario.parts if fitted not in fitted_parts))
 
 
 def _where(there: bool, role: str, name: str, *numbers: float) -> tuple[Fitted, ...]:
@@ -64,9 +64,9 @@ def _number(name: str, table: Rotor, shared: Rotor, place: int) -> float:
         if given.unit is not None:
             if given.unit not in WHEEL_UNITS:
                 raise ValueError(f"no wheel unit {given.unit!r}; one of {', '.join(WHEEL_UNITS)}")
-            found = getattr(WHEEL_UNITS[given.unit], name, None)
-            if found is not None:
-                return float(found)
+            wheel_unit = getattr(WHEEL_UNITS[given.unit], name, None)
+            if wheel_unit is not None:
+                return float(wheel_unit)
     if name in ("viscous", "coulomb"):
         return 0.0
     raise ValueError(f"wheel {place} has no {name}: give it, or a unit")

@@ -1,4 +1,4 @@
-"""Where a run starts, and what it is to reach."""
+"""The start of a run, and its target."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def unit_of(given: Quaternion) -> Quaternion:
 def target_of(scenario: Scenario) -> Fitted:
     """The target of the scenario: its [[part]] with this role, or what [target] says."""
     table = scenario.table.target
-    own = next((fitted for fitted in scenario.parts if fitted.part.role == "target"), None)
-    if own is not None:
+    given_part = next((fitted for fitted in scenario.parts if fitted.part.role == "target"), None)
+    if given_part is not None:
         if "target" in scenario.table.model_fields_set:
-            raise InputError(scenario.where, f"part {own.called}", "a second target, beside [target]", "one target")
-        return _tried(scenario, own, f"part {own.called}")
-    return _told(scenario, table, "target")
+            raise InputError(scenario.where, f"part {given_part.called}", "a second target, beside [target]", "one target")
+        return _tried(scenario, given_part, f"part {given_part.called}")
+    return _from_table(scenario, table, "target")
 
 
 def _tried(scenario: Scenario, target: Fitted, key: str) -> Fitted:
@@ -75,17 +75,17 @@ def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
         raise InputError(scenario.where, key, show(given), 'a table, such as { mode = "orbital" } or { type = "a target" }')
     if "type" in given or ("file" in given and "mode" not in given):
         table, shared = cast(dict[str, Any], given), scenario.table.shared
-        found = read_part(table, "rigid-body", scenario.folder, scenario.where, key, shared, units)
-        if found.part.role != "target":
-            raise InputError(scenario.where, key, f"{found.part.name}, of the role {found.part.role}", "a target")
-        return _tried(scenario, found, key)
+        target = read_part(table, "rigid-body", scenario.folder, scenario.where, key, shared, units)
+        if target.part.role != "target":
+            raise InputError(scenario.where, key, f"{target.part.name}, of the role {target.part.role}", "a target")
+        return _tried(scenario, target, key)
     table = validate(TargetTable, given, scenario.where, key)
     if table.mode == "orbital" and scenario.table.orbit is None:
         raise InputError(scenario.where, f"{key}.mode", show("orbital"), "another mode without an [orbit] table")
-    return _told(scenario, table, key)
+    return _from_table(scenario, table, key)
 
 
-def _told(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
+def _from_table(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
     """The target that a table gives."""
     simulation = scenario.table.simulation
     if table.mode == "orbital":
@@ -129,17 +129,17 @@ def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[...
 
 
 def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None) -> State:
-    """The first state of a run with this target; of a unit quaternion or a rate in place of those of [initial] an
-    equation."""
+    """The first state of a run with this target; an equation where a unit quaternion or a rate replaces those of
+    [initial]."""
     table = scenario.table
     orbit = table.orbit
     position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
     turned = stated(table.initial) if attitude is None else attitude
     begun = State(turned, table.initial.rate if rate is None else rate, position, velocity, ZERO)
     if table.initial.relative_to == "target":
-        held = goal_at_start(goal, begun)
-        rate = add(begun.rate, to_body(begun.attitude, held.rate))
-        return begun._replace(attitude=multiply(held.attitude, begun.attitude), rate=rate)
+        aim = goal_at_start(goal, begun)
+        rate = add(begun.rate, to_body(begun.attitude, aim.rate))
+        return begun._replace(attitude=multiply(aim.attitude, begun.attitude), rate=rate)
     return begun
 
 
@@ -148,13 +148,13 @@ def goal_at_start(goal: Fitted, begun: State) -> Goal:
 
 
 def told_to_design(scenario: Scenario, sign: str) -> Start:
-    """The start that the design of a law may reckon with; `sign`: its quaternion sign policy."""
+    """The start that a design form may use; `sign`: the law's quaternion sign policy."""
     table, goal, effectors = scenario.table, target_of(scenario), effectors_of(scenario)
     begun = start_of(scenario, goal)
-    held = goal_at_start(goal, begun)
-    error = relative(held.attitude, begun.attitude)
+    aim = goal_at_start(goal, begun)
+    error = relative(aim.attitude, begun.attitude)
     error = error if sign == "as_published" else stretch(side(error[0]), error)
-    rate = subtract(begun.rate, to_body(error, held.rate))
+    rate = subtract(begun.rate, to_body(error, aim.rate))
     torque = (sure_torque if table.spacecraft.limit == "none" else torque_limit)(table, effectors)
     stored = total(f.part.module.momentum(f.start, f.params) for f in effectors)
     room = min((f.part.module.capacity(f.start, f.params) for f in effectors), default=math.inf)

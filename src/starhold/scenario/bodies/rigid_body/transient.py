@@ -45,10 +45,10 @@ def _values(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
             return tuple(_spread(first, last, step))
         if not isinstance(given, (list, tuple)) or not given:
             raise refuse(allowed)
-        found = tuple(read(value) for value in cast(list[Any], given))
-        if len(found) > MOST or any(a >= b for a, b in pairwise(found)):
-            raise refuse(f"at most {MOST} values" if len(found) > MOST else allowed)
-        return found
+        numbers = tuple(read(value) for value in cast(list[Any], given))
+        if len(numbers) > MOST or any(a >= b for a, b in pairwise(numbers)):
+            raise refuse(f"at most {MOST} values" if len(numbers) > MOST else allowed)
+        return numbers
 
     single = {"anyOf": [{"type": "number"}, {"type": "string"}]}
     keys = {"from": single, "to": single, "step": single}
