@@ -12,11 +12,11 @@ import starhold as sh
 from starhold.conformance.parts import examine_part, find_part
 from starhold.conformance.suite import examine, find_law
 from starhold.laws import catalogue as laws
+from starhold.parts.effectors import control_moment_gyros
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import parse
 from tests.parts.files import BODY, LAW, PARTS, PD, part
-from tests.parts.test_control_moment_gyros import pyramid
 from tests.refusals import refused
 from tests.running import starhold
 
@@ -114,7 +114,7 @@ INSTALLED = {
     "thrusters": ('torque = "50 mN m"\nminimum = "20 ms"\non = "5 mN m"\noff = "2 mN m"\n', "propellant", ("time",), "kg"),
     "hinged-panels": (f'mass = "30 kg"\npanels = [{ROW}]\n', "panel_angle", ("time", "panel"), "rad"),
     "control-moment-gyros": (
-        f"units = {[list(row) for row in pyramid(0.0, 0.0, 0.0, 0.0)]}\n", "rotor_momentum", ("time", "gyro"), "N m s"
+        f"units = {[*map(list, control_moment_gyros.examples()[0].units)]}\n", "rotor_momentum", ("time", "gyro"), "N m s"
     ),
 }  # fmt: skip
 
