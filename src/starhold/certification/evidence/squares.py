@@ -61,6 +61,21 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     return None
 
 
+def plainly(o: Squares) -> dict[str, Any] | None:
+    """Return evidence in which the matrix is what is left of p without relations; None where the kernel does not accept it."""
+    p, known, fixed = settled(o)
+    problem = posed(p, known, [], o.z)
+    if o.modulo or not p.terms.keys() <= {m for q in problem.columns for m in q.terms}:
+        return None
+    found = exactly(problem, [0.0] * len(problem.columns), 1)
+    evidence = None if found is None else written(o, problem, found, fixed, [])
+    try:
+        o.check(evidence)
+    except RefusedError:
+        return None
+    return evidence
+
+
 def counts(o: Squares) -> list[int]:
     """Return how many of z a matrix may be about: up to where another kind of monomial begins."""
     kinds = ["".join(sorted(name[0] for name in max(z.terms))) for z in o.z]

@@ -23,4 +23,7 @@ THEOREMS: dict[str, Theorem] = {
     "ends on the circle": station.ends_on_circle,
     "comes to rest": station.comes_to_rest,
     "returns with limited control": station.returns_with_limited_control,
+    "needs more control on the circle": station.needs_more_control,
+    "does not return": station.does_not_return,
+    "holds another circle": station.holds_another_circle,
 }

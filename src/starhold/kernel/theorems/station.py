@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ..loops import read, wired
-from ..numbers import Rows, demand
+from ..numbers import RefusedError, Rows, demand
 from ..points import STATE, PointLoop, Side
 from ..polynomials import Poly, dot, multiple, poly, var, variables
 from ..programs import single
@@ -144,8 +144,8 @@ def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[
         away = circle.inverse in asked(loop, side)
         u = [(circle.met(p) if away else p).at(put) for p in side.u]
         unit = [inverse * p for p in f[1:]] if away else []
-        known = [level - dot(circle.weights, [p * p for p in f])]
-        known += [circle.met(p).at(put) for p in side.known] if away else [w * w - wrong for w in widths(circle, side)]
+        known = [circle.met(p).at(put) for p in side.known] if away else [w * w - wrong for w in widths(circle, side)]
+        known.append(level - dot(circle.weights, [p * p for p in f]))
         relations = [f[0] - y * y - z * z + circle.square, *([dot(unit, unit) - 1] if away else [])]
         terms = [poly(1), y, z, *f, *unit]
         if norm is not None:
@@ -174,8 +174,7 @@ def comes_to_rest(claim: Claim) -> Proof:
         yield f"rest {k + 1}", Vanishes(p.at(at))
     flow: Rows = [[Fraction(k == i + 3) for k in range(6)] for i in range(3)]
     yield "returns", Contracts([*flow, *([p.slope(name).number for name in STATE] for p in motion)], flow=True)
-    clear = ["off-the-bodies"] if loop.ring.roots or loop.ring.divisors else []
-    return Statement("from everywhere the motion comes to rest", (*assumed(loop), "unlimited-control", *clear))
+    return Statement("from everywhere the motion comes to rest", (*assumed(loop), "unlimited-control", *bodies(loop)))
 
 
 def only_side(loop: PointLoop) -> list[Poly]:
@@ -237,6 +236,70 @@ def clipped(loop: PointLoop, limit: Fraction) -> Shown:
             yield f"limited {name} {k}", Squares(p, [poly(1)], 0, known)
 
 
+def needs_more_control(claim: Claim) -> Proof:
+    """The law asks for more than its limit at a place of the circle itself."""
+    loop, numbers = PointLoop(claim), claim.numbers
+    circle = yield from declared(loop)
+    y, z, control = numbers["y"], numbers["z"], numbers["control"]
+    norm, axis = numbers.get("limit.norm"), numbers.get("limit.axis")
+    demand((norm is None) != (axis is None), "there is not one limit")
+    at = {"x1": 0, "x2": y, "x3": z, "v1": 0, "v2": -circle.rate * z, "v3": circle.rate * y, circle.size: 0}
+    for k, p in enumerate(circle.errors):
+        yield f"on the circle {k + 1}", Vanishes(p.at(at))
+    here = [s for s in loop.sides if all((Poly(dict(p)).at(at).number > 0) == holds for p, holds in s.guards)]
+    demand(len(here) == 1, "the law has no side there")
+    squares = [p.at(at).number ** 2 for p in here[0].u]
+    yield "control", Exceeds(max(squares) if norm is None else sum(squares, Fraction(0)), control * control)
+    yield "more than the limit", Exceeds(control, norm if norm is not None else axis or 0)
+    return Statement(f"the circle itself asks for a control of {below(control)}, more than the limit", (*assumed(loop), "in-the-plane"))
+
+
+def does_not_return(claim: Claim) -> Proof:
+    """An axis moves on its own, as x'' = ax + bx' + c with a >= 0 or b >= 0: an eigenvalue is not on the left, and some
+    motions along it, as near as one likes to one that is wanted, stay away."""
+    loop = PointLoop(claim)
+    motions = [loop.acceleration(side) for side in loop.sides]
+    for i, (x, v) in enumerate(zip(loop.x, loop.v, strict=True)):
+        slopes = [motion[i].slope(name) for motion in motions for name in (f"x{i + 1}", f"v{i + 1}")]
+        if any(p.names for p in slopes) or max(slopes[0].number, slopes[1].number) < 0:
+            continue
+        a, b = slopes[0].number, slopes[1].number
+        c = motions[0][i].terms.get((), Fraction(0))
+        for k, motion in enumerate(motions):
+            yield f"an axis on its own {k}", Vanishes(motion[i] - a * x - b * v - c)
+        return Statement(f"along {'XYZ'[i]} some motions do not return", (*assumed(loop), "unlimited-control", *bodies(loop)))
+    raise RefusedError("every axis returns")
+
+
+def holds_another_circle(claim: Claim) -> Proof:
+    """A relay without a layer, which takes k (f2, f3)/|(f2, f3)| off, holds another circle: where f2 = f3 = 0 its Filippov
+    set has all of the size k and less, and to stay there takes g |f1| r."""
+    loop, numbers = PointLoop(claim), claim.numbers
+    circle = yield from declared(loop)
+    radius, needs, of = numbers["radius"], numbers["needs"], numbers["of"]
+    demand(len(loop.ring.roots) == 1 and not loop.ring.divisors, "there are more roots than that of a relay")
+    away = [side for side in loop.sides if circle.inverse in asked(loop, side)]
+    demand(len(away) == 1, "the law is no relay")
+    reaching = [multiple(p, var(circle.size)) for p in away[0].known]
+    demand(all(factor > 0 and offset >= 0 for factor, offset in reaching), "the relay has a layer")
+    motion, s, f1 = loop.acceleration(away[0]), var(circle.inverse), circle.errors[0]
+    yield "the plane is not left", Vanishes(motion[0].at({"x1": 0, "v1": 0}))
+    for k, (p, x) in enumerate(zip(circle.errors[1:], loop.x[1:], strict=True)):
+        slope = loop.along(p, motion)
+        drift = slope.at({circle.inverse: 0}).at({**circle.running, "x1": 0, "v1": 0})
+        size, pull = -multiple(slope.slope(circle.inverse), p)[0], multiple(drift, f1 * x)[0]
+        yield f"the relay {k}", Vanishes(slope - slope.at({circle.inverse: 0}) + size * s * p)
+        yield f"the drift {k}", Vanishes(drift - pull * f1 * x)
+        demand(size >= of >= needs >= abs(pull * (radius * radius - circle.square)) * radius, "the relay does not hold it")
+    yield "another circle", Exceeds(min((radius * radius - circle.square) ** 2, radius))
+    return Statement(f"the relay holds the circle of radius {below(radius)} too", (*assumed(loop), "unlimited-control"))
+
+
 def assumed(loop: PointLoop) -> Sequence[str]:
     """Return what every claim about such a loop assumes."""
     return "linear-field" if loop.linear else "whole-field", "circling-bodies", "exact-place", "continuous-control"
+
+
+def bodies(loop: PointLoop) -> Sequence[str]:
+    """Return what is assumed where the equations have no value everywhere."""
+    return ["off-the-bodies"] if loop.ring.roots or loop.ring.divisors else []
