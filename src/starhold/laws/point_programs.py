@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import isfinite
 from typing import Any
 
@@ -69,6 +70,7 @@ REFUTED = {
     "does not return": ("each axis returns", ()),
 }
 """What the theorems that refute a claim say is not so, and by which numbers."""
+_NUMBER = re.compile(r"( [+-]?\d+)+$")
 
 
 def told(proved: Proved, circle: bool) -> dict[str, Any]:
@@ -78,7 +80,9 @@ def told(proved: Proved, circle: bool) -> dict[str, Any]:
     limit = next((name for name in ("norm", "axis") if f"limit.{name}" in numbers), None)
     found: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
     found |= {name: numbers[name] for name in names}
-    outcome, shown = "proved", [(name, HOWS[rule], "proved", {}) for name, rule in proved.shown]
+    # Steps of one name are told of once.
+    steps = dict.fromkeys((_NUMBER.sub("", name), HOWS[rule]) for name, rule in proved.shown)
+    outcome, shown = "proved", [(*step, "proved", dict[str, float]()) for step in steps]
     if proved.claim.theorem in REFUTED:
         name, evidence = REFUTED[proved.claim.theorem]
         outcome = "refuted"

@@ -120,7 +120,7 @@ class Station:
         radius = sqrt(circle.square)
         radius += min(0.1 * radius, float(k) / (4.0 * float(pull) * radius * radius))
         needs = float(pull * abs(Fraction(radius) ** 2 - circle.square) * Fraction(radius))
-        self.show(self.claim(HELD, radius=radius, needs=nextafter(needs, inf), of=nextafter(float(k), 0.0)))
+        self.show(self.claim(HELD, radius=radius, needs=nextafter(needs, inf), of=float(k)))
 
     def show_limit(self, kind: str, limit: float) -> None:
         """Find the largest level on which the control stays within its limit, or that the circle asks for more."""
@@ -136,7 +136,9 @@ class Station:
         level = cap
         for _ in range(2):
             found = [highest(o, self.scales(level)) for o in limits]
-            level = min(cap, *(x or 0.0 for x in found))
+            level = max(min(cap, *(x or 0.0 for x in found)), 0.0)
+            if level == 0.0:
+                break
         for less in GIVEN_AWAY:
             if level > 0.0:
                 try:

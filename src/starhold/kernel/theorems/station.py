@@ -57,7 +57,7 @@ def ends_on_circle(claim: Claim) -> Proof:
     numbers = claim.numbers
     level, c, heavy = numbers["level"], circle.square, circle.weights[0]
     inner, outer, velocity = numbers["inner"], numbers["outer"], numbers["velocity"]
-    yield "level", Exceeds(level)
+    yield "the level is positive", Exceeds(level)
     yield "centre outside", Exceeds(heavy * c * c, level)
     yield from falls(loop, circle)
     yield from clear_of_bodies(loop, circle, level)
@@ -77,7 +77,7 @@ def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]
     square, rate = -errors[0].at({"x2": 0, "x3": 0}).number, errors[1].slope("x3").number
     (_, y, z), (_, v, w) = loop.x, loop.v
     for k, p in enumerate((y * y + z * z - square, v + rate * z, w - rate * y)):
-        yield f"error {k + 1}", Vanishes(errors[k] - p)
+        yield f"the errors are those of a circle {k + 1}", Vanishes(errors[k] - p)
     weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
     yield "V is a sum of squares", Vanishes(V - dot(weights, [p * p for p in errors]))
     yield "V is positive", Exceeds(min(weights))
@@ -126,8 +126,8 @@ def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
         yield "off the line of the bodies", Exceeds(min(square, circle.square - square))
         yield "off it on the whole set", Exceeds(circle.weights[0] * (circle.square - square) ** 2, level)
         apart = dot(loop.x[1:], loop.x[1:]) - square
-        for name, p in roots.items():
-            yield f"root {name}", Squares(Poly(dict(p)), [poly(1), loop.x[0]], 1, [apart])
+        for k, p in enumerate(roots.values()):
+            yield f"a root has a value {k}", Squares(Poly(dict(p)), [poly(1), loop.x[0]], 1, [apart])
     for b in loop.ring.divisors:
         demand(b.names <= roots.keys() and min(b.terms.values()) > 0, "a divisor may be zero")
 
@@ -171,7 +171,7 @@ def comes_to_rest(claim: Claim) -> Proof:
     loop = PointLoop(claim)
     motion, at = only_side(loop), resting(loop)
     for k, p in enumerate(motion):
-        yield f"rest {k + 1}", Vanishes(p.at(at))
+        yield f"rest is one {k + 1}", Vanishes(p.at(at))
     flow: Rows = [[Fraction(k == i + 3) for k in range(6)] for i in range(3)]
     yield "returns", Contracts([*flow, *([p.slope(name).number for name in STATE] for p in motion)], flow=True)
     return Statement("from everywhere the motion comes to rest", (*assumed(loop), "unlimited-control", *bodies(loop)))
