@@ -42,8 +42,7 @@ class Problem:
 def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts; None where none was found. scales: about how large variables become."""
     p, known, fixed = settled(o)
-    for count in counts(o):
-        ansatz = cofactors(o, p, count)
+    for count, ansatz in ((count, ansatz) for count in counts(o) for ansatz in ansatzes(o, p, known, count)):
         problem = posed(
             p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count]
         )
@@ -94,6 +93,18 @@ def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
             fixed[place] = max(p.terms.get(strange, Fraction(0)) / g.terms[strange], Fraction(0))
             p = p - g * fixed[place]
     return p, [g for place, g in enumerate(known) if place not in fixed], fixed
+
+
+def ansatzes(o: Squares, p: Poly, known: list[Poly], count: int) -> list[list[list[Poly]]]:
+    """Return what is tried for cofactors: first only what makes no monomial that nothing else has, so that all that rounding
+    leaves can be put on the matrix."""
+    whole = cofactors(o, p, count)
+    grams = [a * b for k, a in enumerate(o.z[:count]) for b in o.z[: k + 1]]
+    held = {m for q in (p, *known, *grams) for m in q.terms}
+    fitting = [
+        [c for c in parts if (c * relation).terms.keys() <= held] for relation, parts in zip(o.modulo, whole, strict=True)
+    ]
+    return [fitting, whole] if fitting != whole and any(fitting) else [whole]
 
 
 def cofactors(o: Squares, p: Poly, count: int) -> list[list[Poly]]:

@@ -142,7 +142,7 @@ def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[
     wrong, inverse = dot(f[1:], f[1:]), var(circle.inverse)
     for k, side in enumerate(loop.sides if norm is not None or axis is not None else ()):
         away = circle.inverse in asked(loop, side)
-        u = [(circle.met(p) if away else p).at(put) for p in side.u]
+        u = [on_circles((circle.met(p) if away else p).at(put), f[0] + circle.square - y * y) for p in side.u]
         unit = [inverse * p for p in f[1:]] if away else []
         known = [circle.met(p).at(put) for p in side.known] if away else [w * w - wrong for w in widths(circle, side)]
         known.append(level - dot(circle.weights, [p * p for p in f]))
@@ -157,6 +157,17 @@ def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[
                     yield f"control {sign * (i + 1):+d} {k}", Squares(axis - sign * p, terms, 0, known, relations)
     said = [f"{above(most)} {how}" for most, how in ((norm, "in norm"), (axis, "on every axis")) if most is not None]
     return f" with no more control than {enumerated(said)}" if said else ""
+
+
+def on_circles(p: Poly, square: Poly) -> Poly:
+    """Return p with z^2 = f1 + the circle's square - y^2 put in wherever z is squared."""
+    found = Poly({})
+    for m, c in p.terms.items():
+        term = Poly({tuple(sorted([*(n for n in m if n != "x3"), *["x3"] * (m.count("x3") % 2)])): c})
+        for _ in range(m.count("x3") // 2):
+            term = term * square
+        found = found + term
+    return found
 
 
 def widths(circle: Circle, side: Side) -> list[Fraction]:
