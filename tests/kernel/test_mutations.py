@@ -38,7 +38,8 @@ WORDS = ["outside torque", "moving target", "wheels", "shortest sign", "hysteres
 
 def of_program(r, content, claim):
     """An operation, operand, order, output, input or constant is another one."""
-    program = content["programs"][r.choice(sorted(claim["programs"].values()))]
+    programs = [content["programs"][name] for name in sorted(claim["programs"].values())]
+    program = r.choice([p for p in programs if any(s[0] != "constant" for s in p["steps"])])
     steps = [s for s in program["steps"] if s[0] != "constant"]
     constants = [s for s in program["steps"] if s[0] == "constant"]
     way = r.choice(["operation", "operand", "swap", "output", "fewer", "input", "twice", "constant"])

@@ -31,7 +31,15 @@ SLACK = 1e-6
 PERIOD = 1e-4
 """Control that is renewed so often counts as continuous (scaled)."""
 UNLIMITED, HELD = ASSUMPTIONS["unlimited-control"], ASSUMPTIONS["held-aside"]
-_NAMES = ("linear-field", "whole-field", "circling-bodies", "exact-place", "continuous-control", "off-the-bodies", "in-the-plane")
+_NAMES = (
+    "linear-field",
+    "whole-field",
+    "circling-bodies",
+    "exact-place",
+    "continuous-control",
+    "off-the-bodies",
+    "in-the-plane",
+)
 MET = tuple(ASSUMPTIONS[name] for name in _NAMES)
 """Assumptions that a flight meets, but for where `outside` or the simulation ends it."""
 FLOOR = 1e-6

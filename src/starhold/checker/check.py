@@ -115,8 +115,8 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
         yield Finding(name, "", "", "fails", fault)
         return
     if isinstance(subject, StationSubject):
-        found, fault = _guarded(partial(_of_station, subject, given))
-        yield from [Finding(name, *one) for one in found or []]
+        found, fault = _guarded(partial(_of_station, name, subject, given))
+        yield from found or []
         if fault:
             yield Finding(name, "", "", "fails", fault)
         elif not found:
@@ -151,13 +151,13 @@ def _of_unknown_body(given: Any) -> None:
     demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
 
 
-def _of_station(subject: StationSubject, given: Any) -> list[tuple[str, ...]]:
+def _of_station(name: str, subject: StationSubject, given: Any) -> list[Finding]:
     for claim in given["claims"]:
         shaped(claim, CLAIM, "the claim")
         for obligation in claim["obligations"]:
             shaped(obligation, OBLIGATION, "an obligation")
     absent = [f"without the {name}" for name in given["subject"]["assumed_away"]]
-    return list(station_findings(subject, given, absent))
+    return [Finding(name, *one) for one in station_findings(subject, given, absent)]
 
 
 def _subject(given: Any) -> LoopSubject | StationSubject:

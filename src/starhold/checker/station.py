@@ -52,11 +52,13 @@ def read_station(given: Mapping[str, Any]) -> StationSubject:
     for name in ("plant", "nominal"):
         demand(set(given[name]) == set(Libration._fields), f"the {name} has not the numbers of a libration point")
         points.append(Libration(**{key: float(x) for key, x in given[name].items()}))
-        _check_point(Libration(*map(Fraction, points[-1])))
+        exactly: Any = map(Fraction, points[-1])
+        _check_point(Libration(*exactly))
     limit = given["control_limit"]
     demand(limit is None or limit > 0, "the limit of the control is not positive")
     demand(given["control_period"] > 0 and given["lag"] >= 0, "the period is not positive, or the lag negative")
-    return StationSubject(law, gains, *points, given["model"] == "nonlinear", given["limit"], limit)
+    plant, nominal = points
+    return StationSubject(law, gains, plant, nominal, given["model"] == "nonlinear", given["limit"], limit)
 
 
 def _check_point(plant: Any) -> None:
@@ -80,7 +82,9 @@ def _near(one: Any, other: Any) -> bool:
     return bool(abs(one - other) <= CLOSE * abs(other))
 
 
-def station_findings(subject: StationSubject, given: Mapping[str, Any], absent: list[str]) -> Iterator[tuple[str, ...]]:
+def station_findings(
+    subject: StationSubject, given: Mapping[str, Any], absent: list[str]
+) -> Iterator[tuple[str, str, Verdict, str]]:
     """Yield claim, obligation, verdict and reason of all that a certificate claims; CheckError where it is not shown."""
     decided = [claim for claim in given["claims"] if claim["outcome"] != "undecided"]
     demand(("proof" in given) == bool(decided), "what is decided has no proof, or a proof decides nothing")
@@ -96,17 +100,18 @@ def station_findings(subject: StationSubject, given: Mapping[str, Any], absent: 
             continue
         one = next(shown)
         _flown(subject, one)
-        found = told(one, subject.circle) | {"witness": {}}
+        found: dict[str, Any] = told(one, subject.circle) | {"witness": {}}
         found["assumptions"] = [*found["assumptions"], *absent]
         for key, value in found.items():
             demand(claim[key] == value, f"the {key} of {claim['kind']} is not what the kernel proved")
         for obligation in claim["obligations"]:
-            verdict: Verdict = "holds" if claim["outcome"] == "proved" else "not claimed"
-            reason = obligation["how"] if verdict == "holds" else f"refuted: {one.statement.text}"
-            yield claim["kind"], obligation["name"], verdict, reason
+            if claim["outcome"] == "proved":
+                yield claim["kind"], obligation["name"], "holds", obligation["how"]
+            else:
+                yield claim["kind"], obligation["name"], "not claimed", f"refuted: {one.statement.text}"
 
 
-def _undecided(claim: Mapping[str, Any], absent: list[str]) -> Iterator[tuple[str, ...]]:
+def _undecided(claim: Mapping[str, Any], absent: list[str]) -> Iterator[tuple[str, str, Verdict, str]]:
     known = [*ASSUMPTIONS.values(), *absent]
     demand(all(text in known for text in claim["assumptions"]), "the assumptions are not those of such a claim")
     demand(all(text in claim["assumptions"] for text in absent), "the assumptions are not those of such a claim")

@@ -80,7 +80,10 @@ class PointLoop:
         self.claim, self.ring, self.x, self.v = claim, Asking(), variables("x"), variables("v")
         told = {"position": self.x, "velocity": self.v}
         self.told = {
-            name: p for word, value in told.items() for at in ("", "measurement.") for name, p in wired(at + word, value).items()
+            name: p
+            for word, value in told.items()
+            for at in ("", "measurement.")
+            for name, p in wired(at + word, value).items()
         }
         self.field = self.single("field", 3)
         demand(not claim.taken.content, "the loop is taken with nothing")

@@ -78,7 +78,7 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
 
 
 def in_proportion(o: rules.Solves) -> dict[str, Any] | None:
-    """Return the matrix that takes each of what is given to what is wanted in its place; None where they are no multiples."""
+    """Return the matrix that takes each of what is given to what is wanted in its place; None for no multiples."""
     if o.modulo or len(o.given) != len(o.wanted) or not all(p.terms for p in o.given):
         return None
     shares = [multiple(wanted, given) for given, wanted in zip(o.given, o.wanted, strict=True)]

@@ -42,7 +42,7 @@ class Problem:
 def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts; None where none was found. scales: about how large variables become."""
     p, known, fixed = settled(o)
-    for count, ansatz in ((count, ansatz) for count in counts(o) for ansatz in ansatzes(o, p, known, count)):
+    for count, ansatz in [(k, each) for k in counts(o) for each in ansatzes(o, p, known, k)]:
         problem = posed(
             p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count]
         )
@@ -61,7 +61,7 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
 
 
 def plainly(o: Squares) -> dict[str, Any] | None:
-    """Return evidence in which the matrix is what is left of p without relations; None where the kernel does not accept it."""
+    """Return evidence in which the matrix is what is left of p without relations; None where that is refused."""
     p, known, fixed = settled(o)
     problem = posed(p, known, [], o.z)
     if o.modulo or not p.terms.keys() <= {m for q in problem.columns for m in q.terms}:

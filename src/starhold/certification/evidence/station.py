@@ -86,7 +86,7 @@ class Station:
         return loop, ended(declared(loop))
 
     def contents(self, level: float) -> dict[str, float]:
-        """Return the numbers of a level: radii of the circles in the set, errors of the velocity, distance from the bodies."""
+        """Return the numbers of a level: radii of circles in the set, errors of the velocity, distance from the bodies."""
         loop, circle = self.circle
         spread = Fraction(level) / circle.weights[0]
         low, inside = Fraction(root(spread, 0.0)), circle.square - Fraction(root(spread, inf))
@@ -124,13 +124,15 @@ class Station:
 
     def show_limit(self, kind: str, limit: float) -> None:
         """Find the largest level on which the control stays within its limit, or that the circle asks for more."""
-        loop, circle = self.circle
+        _, circle = self.circle
         name = f"limit.{kind}"
         peak, place = self.peak(kind)
         if peak > (Fraction(limit) * (1 + ROUNDING)) ** 2:
             control = root(peak, 0.0)
             return self.show(self.claim(MORE, **{name: limit, "control": control}, **place))
-        wanted, _ = obligations(self.claim(CIRCLE, level=1.0, inner=1.0, outer=1.0, velocity=1.0, **{name: limit}), self.by_digest)
+        wanted, _ = obligations(
+            self.claim(CIRCLE, level=1.0, inner=1.0, outer=1.0, velocity=1.0, **{name: limit}), self.by_digest
+        )
         limits = [o for name, o in wanted.items() if isinstance(o, Squares) and name.startswith(("norm", "control "))]
         cap = float(circle.weights[0] * circle.square**2 * ALMOST)
         level = cap

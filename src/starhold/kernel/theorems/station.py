@@ -12,7 +12,6 @@ from ..loops import read, wired
 from ..numbers import RefusedError, Rows, demand
 from ..points import STATE, PointLoop, Side
 from ..polynomials import Poly, dot, multiple, poly, var, variables
-from ..programs import single
 from ..reading import Claim
 from ..rules import Contracts, Exceeds, Obligation, Shown, Solves, Squares, Vanishes
 from ..sentences import Statement, above, below, enumerated
@@ -23,7 +22,7 @@ Proof = Generator[tuple[str, Obligation], None, Statement]
 @dataclass(frozen=True)
 class Circle:
     """The circle y^2 + z^2 = square, y' = -rate z, z' = rate y, and V = weights.(f1^2, f2^2, f3^2) of the errors
-    f1 = y^2 + z^2 - square, f2 = y' + rate z, f3 = z' - rate y. `size` and `inverse` name |(f2, f3)| where it is asked for."""
+    f1 = y^2 + z^2 - square, f2 = y' + rate z, f3 = z' - rate y. `size` and `inverse` name |(f2, f3)| where that is asked."""
 
     errors: list[Poly]
     square: Fraction
@@ -48,10 +47,11 @@ def ends_on_circle(claim: Claim) -> Proof:
 
     V is a positive sum of squares of the errors, so that {V <= level} is compact in y, z, y', z'; x moves on its own and
     returns. On the one side of the law that holds (f2, f3) = 0 V' <= -c (f2^2 + f3^2); on each other one V' <= -c and the
-    law is bounded, for there |(f2, f3)| is above a positive number. Both hold of limits and of convex combinations too, and so
-    of every Filippov solution. By the invariance principle (LaSalle 1960; of discontinuous laws Shevitz and Paden 1994) motions
-    end where f2 = f3 = 0 for all time. That leaves f1 y = f1 z = 0: the circle, or y = z = 0, where V is above the level. The
-    set holds the circles between two radii, as V is convex in the square of the radius, and errors of the velocity."""
+    law is bounded, for there |(f2, f3)| is above a positive number. Both hold of limits and convex combinations too, and so
+    of every Filippov solution. By the invariance principle (LaSalle 1960; of discontinuous laws Shevitz and Paden 1994)
+    motions end where f2 = f3 = 0 for all time. That leaves f1 y = f1 z = 0: the circle, or y = z = 0, where V is above the
+    level. The set holds circles between two radii, as V is convex in the square of the radius, and errors of the velocity.
+    In the full problem the motion is clear of the bodies, which lie at y = z = 0."""
     loop = PointLoop(claim)
     circle = yield from declared(loop)
     numbers = claim.numbers
@@ -66,8 +66,8 @@ def ends_on_circle(claim: Claim) -> Proof:
     yield "outer circles", Exceeds(level, heavy * (outer * outer - c) ** 2)
     yield "errors of the velocity", Exceeds(level, max(circle.weights[1:]) * velocity * velocity)
     limited = yield from within_limit(loop, circle, level)
-    text = f"from {{V <= {below(level)}}}, which holds circles of radius {above(inner)} to {below(outer)} at the same rate and, "
-    text += f"on the circle, velocities off by {below(velocity)}, the motion ends on the circle{limited}"
+    text = f"from {{V <= {below(level)}}}, which holds circles of radius {above(inner)} to {below(outer)} at the same rate "
+    text += f"and, on the circle, velocities off by {below(velocity)}, the motion ends on the circle{limited}"
     return Statement(text, (*assumed(loop), "in-the-plane" if limited else "unlimited-control"))
 
 
@@ -206,8 +206,8 @@ def returns_with_limited_control(claim: Claim) -> Proof:
 
     x'' = p x - clip(kx + cx'), so s S' = p S - clip(c s S + e x) with e = k - s c, and x' = s (S - x). Let
     0 < M = max(|S|/width, |x|/reach) <= 1. Where M is the first, c s S + e x has the sign of S and at least M times the size
-    c s width - |e| reach, more than M p width, and so is what is left of it by the limit, which is above p width: |S| falls. Where
-    M is the second, |x| falls as reach > width. So M does, in proportion. Beyond, s S' >= p S - U > 0."""
+    c s width - |e| reach, more than M p width, and so has what the limit leaves of it, as that is above p width: |S| falls.
+    Where M is the second, |x| falls as reach > width. So M does, in proportion. Beyond, s S' >= p S - U > 0."""
     loop, numbers = PointLoop(claim), claim.numbers
     limit, width, reach, boundary = (numbers[name] for name in ("limit", "width", "reach", "boundary"))
     low, high, x, v = numbers["root.low"], numbers["root.high"], loop.x[0], loop.v[0]
@@ -262,7 +262,9 @@ def needs_more_control(claim: Claim) -> Proof:
     squares = [p.at(at).number ** 2 for p in here[0].u]
     yield "control", Exceeds(max(squares) if norm is None else sum(squares, Fraction(0)), control * control)
     yield "more than the limit", Exceeds(control, norm if norm is not None else axis or 0)
-    return Statement(f"the circle itself asks for a control of {below(control)}, more than the limit", (*assumed(loop), "in-the-plane"))
+    return Statement(
+        f"the circle itself asks for a control of {below(control)}, more than the limit", (*assumed(loop), "in-the-plane")
+    )
 
 
 def does_not_return(claim: Claim) -> Proof:
@@ -278,7 +280,9 @@ def does_not_return(claim: Claim) -> Proof:
         c = motions[0][i].terms.get((), Fraction(0))
         for k, motion in enumerate(motions):
             yield f"an axis on its own {k}", Vanishes(motion[i] - a * x - b * v - c)
-        return Statement(f"along {'XYZ'[i]} some motions do not return", (*assumed(loop), "unlimited-control", *bodies(loop)))
+        return Statement(
+            f"along {'XYZ'[i]} some motions do not return", (*assumed(loop), "unlimited-control", *bodies(loop))
+        )
     raise RefusedError("every axis returns")
 
 
