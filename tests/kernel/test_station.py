@@ -11,8 +11,8 @@ import pytest
 from starhold.kernel.check import check
 from starhold.kernel.numbers import RefusedError
 from tests.kernel.certificates import rekeyed, text
+from tests.kernel.mutations import WAYS, says
 from tests.kernel.stations import BEST, PLANT, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
-from tests.kernel.test_mutations import WAYS, says
 from tests.tiers import WHOLE
 
 ROUND = {"level": 0.49999952, "outer": 1.4142133, "velocity": 0.9999995}

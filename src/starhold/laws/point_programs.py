@@ -1,4 +1,4 @@
-"""What the kernel is told of a craft near a libration point under a law, and what certificates tell of what it proved."""
+"""The kernel is told programs and numbers of a craft near a libration point; certificates tell what it proved of them."""
 
 from __future__ import annotations
 

@@ -233,8 +233,8 @@ def returns_with_limited_control(claim: Claim) -> Proof:
 
 
 def clipped(loop: PointLoop, limit: Fraction) -> Shown:
-    """What acts along X is the nearest to what is asked of all between -limit and limit: (t - acts)(w - acts) <= 0 for
-    w = -limit and limit."""
+    """The limit lets act along X, of all between -limit and limit, what is nearest to what is asked, t: that has
+    (t - acts)(w - acts) <= 0 for w = -limit and limit."""
     t = variables("t")
     for k, case in enumerate(read(loop.claim, "limited", 3, loop.ring, wired("command", t), {"limit": poly(limit)})[0]):
         known, acts, asks = Side(case.guards, []).known, case.value, t[0]
