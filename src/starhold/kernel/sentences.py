@@ -28,6 +28,15 @@ ASSUMPTIONS = {
     "linear-motion": "the motion is linear, as it is near rest",
     "quaternion-as-fed": "the quaternion that is fed back never jumps",
     "sign-at-once": "the sign of the quaternion is chosen at once",
+    "linear-field": "linear motion near the point",
+    "whole-field": "motion exactly as modelled",
+    "circling-bodies": "circular motion of the two bodies",
+    "exact-place": "position and velocity exactly known",
+    "continuous-control": "control applied continuously, without lag",
+    "unlimited-control": "control not limited",
+    "in-the-plane": "starts in the plane x = 0 without a rate along X",
+    "held-aside": "held at rest along Y and Z, where no Coriolis acceleration acts along X",
+    "off-the-bodies": "never at the centre of one of the two bodies",
 }
 """What identifiers of assumptions say."""
 
