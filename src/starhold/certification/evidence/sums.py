@@ -16,16 +16,19 @@ from itertools import combinations, combinations_with_replacement
 from typing import Any, TypeAlias
 
 import numpy as np
-from flint import fmpq, fmpq_mat
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx
 
 from starhold.certification.evidence.squares import degree, interior_point, text
 from starhold.kernel.numbers import Account, RefusedError
-from starhold.kernel.polynomials import Monomial, Poly, dot, poly
+from starhold.kernel.polynomials import Monomial, Poly, dot, poly, read_poly
 from starhold.kernel.rules import Sum
 
 sparse: Any = import_module("scipy.sparse")
+linprog: Any = import_module("scipy.optimize").linprog
 MARGIN = 1e-7
 """The least eigenvalue, in scaled units, with which exact numbers are tried."""
+PAIRED = 10
+"""Known polynomials of which products are tried in an identity."""
 MOST = 60_000
 """Entries of the matrices, at most."""
 Terms: TypeAlias = dict[Monomial, Fraction]
@@ -87,9 +90,7 @@ class Guess:
         chosen = [(), *((k,) for k in used), *(p for p in pairs if p[0] in used and p[1] in used)]
         self.blocks = list[Block]()
         for places in chosen:
-            factor = poly(1)
-            for k in places:
-                factor = times(factor, self.known[k])
+            factor = product_of(self.known, places)
             room = top - degree(factor)
             if room >= 0:
                 self.blocks.append(Block(places, factor, self.z(names, room // 2, places)))
@@ -189,6 +190,17 @@ class Guess:
                 raise
             return None
         return None if x is None or not np.isfinite(x).all() or x[-1] < MARGIN else x
+
+    def freed(self, made: Mapping[Monomial, Poly]) -> Poly | None:
+        """Return a polynomial E for which p + E' is a sum, with the derivative of each monomial; None where there is none."""
+        self.loose.append([self.scaled(q) * -1 for q in made.values()])
+        first = len(self.strict) + sum(map(len, self.loose[:-1]))
+        x = self.floats()
+        self.loose.pop()
+        if x is None:
+            return None
+        found = {m: round(Fraction(float(v)) * self.size * 2**12) for m, v in zip(made, x[first:], strict=False)}
+        return Poly({m: Fraction(v, 2**12) for m, v in found.items()})
 
     def exactly(self, x: Any) -> dict[str, Any] | None:
         """Return evidence near floats that the kernel accepts; None where none was found."""
@@ -300,24 +312,52 @@ def identity(o: Sum) -> dict[str, Any] | None:
     if o.strict:
         return None
     names = sorted({x for q in (o.p, *o.modulo) for x in q.names})
-    loose = [monomials(names, max(degree(o.p) - degree(q), 0)) for q in o.modulo]
-    single = [q for q in o.known if set(q.terms) <= set(o.p.terms) | {m for r in o.modulo for m in r.terms} | {()}]
-    places = [k for k, q in enumerate(o.known) if any(q is s for s in single)]
-    every = [times(q, m) for q, own in zip(o.modulo, loose, strict=True) for m in own] + [o.known[k] for k in places]
-    y = solved(o.p, every)
-    if y is None:
+    top = max(degree(q) for q in (o.p, *o.modulo))
+    loose = [monomials(names, top - degree(q)) for q in o.modulo]
+    few = [k for k, q in enumerate(o.known) if degree(q) <= top]
+    places = [(), *((k,) for k in few), *combinations(few[:PAIRED], 2)]
+    made = {own: q for own in places if degree(q := product_of(o.known, own)) <= top}
+    free = [times(q, m) for q, own in zip(o.modulo, loose, strict=True) for m in own]
+    used = needed(o.p, free, made)
+    y = None if used is None else solved(o.p, [*free, *(made[own] for own in used)])
+    if used is None or y is None:
         return None
     cofactors, at = list[dict[str, str]](), 0
     for own in loose:
         cofactors.append(text(dot(y[at : at + len(own)], own)))
         at += len(own)
-    parts = [{"of": [k], "z": [""], "gram": [[str(c)]]} for k, c in zip(places, y[at:], strict=True) if c]
+    parts = [{"of": [*own], "z": [""], "gram": [[str(c)]]} for own, c in zip(used, y[at:], strict=True) if c]
     evidence = {"numbers": [], "cofactors": cofactors, "parts": parts}
     try:
         o.check(evidence)
     except RefusedError:
         return None
     return evidence
+
+
+def product_of(known: Sequence[Poly], places: Iterable[int]) -> Poly:
+    """Return the product of the known polynomials of some places."""
+    found = poly(1)
+    for k in places:
+        found = times(found, known[k])
+    return found
+
+
+def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list[tuple[int, ...]] | None:
+    """Return the places of products that p is made of with positive factors, and of free polynomials, in floats."""
+    every = [*free, *made.values()]
+    rows = {m: k for k, m in enumerate({m for q in (p, *every) for m in q.terms})}
+    A, b = np.zeros((len(rows), len(every))), np.zeros(len(rows))
+    for k, q in enumerate(every):
+        for m, c in q.terms.items():
+            A[rows[m], k] = float(c)
+    for m, c in p.terms.items():
+        b[rows[m]] = float(c)
+    if not p.terms:
+        return []
+    cost = np.r_[np.zeros(len(free)), np.ones(len(made))]
+    found = linprog(cost, A_eq=A, b_eq=b, bounds=[(None, None)] * len(free) + [(0, None)] * len(made))
+    return [own for own, v in zip(made, found.x[len(free) :], strict=True) if v > 1e-9] if found.status == 0 else None
 
 
 def solved(p: Poly, every: list[Poly]) -> list[Fraction] | None:
@@ -337,11 +377,46 @@ def solved(p: Poly, every: list[Poly]) -> list[Fraction] | None:
     return y
 
 
+def quotient(p: Poly, q: Poly) -> Poly | None:
+    """Return p / q, None where that is no polynomial."""
+    names = sorted(p.names | q.names)
+    ring = fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
+
+    def within(a: Poly) -> Any:
+        items = a.terms.items()
+        return ring.from_dict({tuple(m.count(x) for x in names): fmpq(c.numerator, c.denominator) for m, c in items})
+
+    found, rest = divmod(within(p), within(q))
+    if rest != 0:
+        return None
+    items = found.to_dict().items()
+    powers = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in items}
+    return Poly({m: Fraction(int(c.p), int(c.q)) for m, c in powers.items()})
+
+
+def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
+    """Return evidence where all that is asked has a factor that is known; None where that is not so."""
+    for k, q in enumerate(o.known if any(p.terms for p in o.strict) else ()):
+        parts = [quotient(p, q) for p in (o.p, *o.strict)] if q.names else [None]
+        if None not in parts:
+            p, *strict = (part for part in parts if part is not None)
+            found = find(Sum(p, o.known, o.modulo, strict), *more)
+            if found:
+                found["cofactors"] = [text(read_poly(c) * q) for c in found["cofactors"]]
+                for part in found["parts"]:
+                    part["of"].append(k)
+            if found is not None:
+                return found
+    return None
+
+
 def find(
     o: Sum, scales: Mapping[str, float], basis: Sequence[Poly] | None = None, degrees: Sequence[int] = (0, 2), exact: bool = True
 ) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts (exact False: that floats have some); None where none was found."""
     found = identity(o)
+    if found is None:
+        found = divided(o, scales, basis, degrees, exact)
     if found is not None:
         return found
     least = max(degree(q) for q in (o.p, *o.strict))

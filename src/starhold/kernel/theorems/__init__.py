@@ -24,5 +24,5 @@ THEOREMS: dict[str, Theorem] = {
     "is stable": invariant.stays,
     "is unstable": invariant.leaves,
     "avoids": invariant.avoids,
-    "does not fall": invariant.rises,
+    "fails": invariant.fails,
 }

@@ -269,9 +269,13 @@ class Function:
         chosen = {(system.surfaces[m], i) for m, i, _ in across}
         every = [(i, i, None, poly(0)) for i in system.cells]
         every += [(i, j, system.surfaces[m], read_poly(c)) for m, i, c in across for j in system.cells]
+        never = read_list(self.hint("never") or [])
+        for i in never:
+            demand(system.are_cells([i]), "there are no such cells")
+            yield f"never {self.place} {i}", system.sum(-self.V(i), (i,))
         for i, j, surface, c in every:
             V, rates, m = self.V(i), system.all[j].rates, Poly(dict(surface or ()))
-            if not V.terms or not system.meet(i, j):
+            if i in never or not system.meet(i, j):
                 continue
             rise = system.slope(V, rates) - c * system.slope(m, rates)
             room = [V] if self.level is None else [V, self.level - V]
@@ -285,7 +289,7 @@ class Function:
                 yield f"{name} escapes", system.sum(grows, (i, j), [*room, rise], self.positive("powers", i), zero)
         for j, k in combinations(system.cells, 2):
             one, other = system.all[j], system.all[k]
-            if one.rates == other.rates or not system.meet(j, k):
+            if one.rates == other.rates or not system.meet(j, k) or j in never or k in never:
                 continue
             if not any(one.on(surface, other) for surface, i in chosen if i in (j, k)):
                 for n, (a, b) in enumerate(zip(one.rates, other.rates, strict=True)):
@@ -304,7 +308,7 @@ class Function:
 
 def stated(text: str, system: System) -> Statement:
     """Return a statement about a system with what it assumes."""
-    jumps = any(cell.rates != system.all[0].rates for cell in system.all)
+    jumps = any(name.startswith("across") for name in system.claim.evidence.content)
     whatever = ", whatever the parameters in their intervals" if system.parameters else ""
     return Statement(text + whatever, ("equations-as-given", *(["filippov"] if jumps else [])))
 
@@ -387,13 +391,27 @@ def avoids(claim: Claim) -> Shows:
     return stated(f"no motion that starts in {{start >= 0}} comes to {{unsafe >= 0}}{within}", system)
 
 
-def rises(claim: Claim) -> Shows:
-    """V does not fall (sense -1: grow) at a state where it is positive, so that no level above its value is possible."""
-    system, sense = System(claim, "V"), -1 if claim.taken.get("unstable") else 1
-    yield from system.sound()
+def fails(claim: Claim) -> Shows:
+    """V is not as one of the theorems needs it, at a state. What of it is the word that the claim is taken with."""
+    system = System(claim, "V")
     cell, state = system.state("state")
     at = {surface: Poly(dict(surface)).at(state).number for surface in system.surfaces}
-    demand(all(x for x in at.values()), "a state is on a surface")
+    around = [c for c in system.all if all(at[m] * sign >= 0 if sign else at[m] == 0 for m, sign in c.signs.items())]
     V, slope = cell.V[0].at(state).number, system.slope(cell.V[0], cell.rates).at(state).number
-    demand(V > 0 and slope * sense >= 0, "V changes at the state as it has to")
-    return stated(f"V {'does not fall' if sense > 0 else 'does not grow'} at a state where it is {below(V)}", system)
+    inside = V > 0 and all(at.values())
+    away = system.at_point and any(state[x] for x in system.names)
+    border = any(state[x] in system.box.get(x, ()) for x in system.names)
+    still = slope == 0 and not any(rate.at(state).number for rate in cell.rates)
+    ways = {
+        "does not fall": (inside and (slope > 0 or still), f"V rises, or the state is an equilibrium, where it is {below(V)}"),
+        "does not grow": (inside and slope <= 0, f"V does not grow at a state where it is {below(V)}"),
+        "reaches the border": (border, f"V is {below(V)} on the border of the box"),
+        "is not positive": (away and V <= 0, "V is not positive at a state that is not the equilibrium"),
+        "jumps": (any(c.V[0].at(state).number != V for c in around), "V jumps at a state"),
+    }
+    for word, (holds, text) in ways.items():
+        if claim.taken.get(word):
+            demand(holds, f"V is not shown to fail: {word}")
+            return stated(text, system)
+    raise RefusedError("it is not told how V fails")
+    yield  # pragma: no cover
