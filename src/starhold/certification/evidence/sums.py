@@ -20,7 +20,7 @@ from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx
 
 from starhold.certification.evidence.squares import degree, interior_point, text
 from starhold.kernel.numbers import Account, RefusedError
-from starhold.kernel.polynomials import Monomial, Poly, dot, poly, read_poly
+from starhold.kernel.polynomials import Monomial, Poly, apply, dot, poly, read_poly
 from starhold.kernel.rules import Sum
 
 sparse: Any = import_module("scipy.sparse")
@@ -209,15 +209,16 @@ class Guess:
         for digits in (10, 20, 34):
             step = unit(margin) / 2**digits
             y = [round(Fraction(float(v)) / step) * step for v in x[:-1]]
-            rest = Counter(self.p)
-            for v, q in zip(y, [*single, *grams], strict=True):
-                if v:
-                    for m, c in q.terms.items():
-                        rest[m] = rest.get(m, Fraction(0)) - v * c
-            rest = {m: c for m, c in rest.items() if c}
-            fixed = self.shared(y, rest, len(single)) if self.basis is None else self.projected(y, rest, [*single, *grams])
+            covered = self.covered(len(single))
+            rest = self.amiss(y)
+            alone = {m: c for m, c in rest.items() if m not in covered}
+            fixed = self.projected(y, alone, covered) if alone else y
             if fixed is None:
                 return None
+            for m, c in self.amiss(fixed).items():
+                whole = sum((next(iter(grams[k - len(single)].terms.values())) for k in covered[m]), Fraction(0))
+                for k in covered[m]:
+                    fixed[k] += c / whole
             evidence = self.written(fixed)
             try:
                 self.o.check(evidence)
@@ -226,29 +227,35 @@ class Guess:
             return evidence
         return None
 
-    def shared(self, y: list[Fraction], rest: Terms, head: int) -> list[Fraction] | None:
-        """Put what is amiss of each monomial on the entries that have it of the matrix without a factor."""
+    def amiss(self, y: list[Fraction]) -> Terms:
+        """Return what is missing of p."""
+        single, grams = self.columns
+        rest = dict(self.p.terms)
+        for v, q in zip(y, [*single, *grams], strict=True):
+            for m, c in q.terms.items() if v else ():
+                rest[m] = rest.get(m, Fraction(0)) - v * c
+        return {m: c for m, c in rest.items() if c}
+
+    def covered(self, head: int) -> dict[Monomial, list[int]]:
+        """Return for each monomial the entries of the matrix without a factor that have it alone."""
         places: dict[Monomial, list[int]] = defaultdict(list)
         for k, column in enumerate(self.blocks[0].columns(), head):
-            places[next(iter(column.terms))].append(k)
-        grams = self.columns[1]
-        for m, c in rest.items():
-            if m not in places:
-                return None
-            whole = sum((next(iter(grams[k - head].terms.values())) for k in places[m]), Fraction(0))
-            for k in places[m]:
-                y[k] += c / whole
-        return y
+            if self.basis is None:
+                places[next(iter(column.terms))].append(k)
+        return dict(places)
 
-    def projected(self, y: list[Fraction], rest: Terms, every: list[Poly]) -> list[Fraction] | None:
-        """Put what is amiss on all numbers, as little as can be (least squares, exactly)."""
-        rows = {m: k for k, m in enumerate(sorted({m for q in every for m in q.terms}))}
+    def projected(self, y: list[Fraction], rest: Terms, covered: Mapping[Monomial, Any]) -> list[Fraction] | None:
+        """Put what is amiss of monomials that are not covered on all numbers, as little as can be (least squares, exactly)."""
+        single, grams = self.columns
+        every = [*single, *grams]
+        rows = {m: k for k, m in enumerate(sorted({m for q in every for m in q.terms if m not in covered}))}
         if not set(rest) <= set(rows):
             return None
         A = fmpq_mat(len(rows), len(every))
         for k, q in enumerate(every):
             for m, c in q.terms.items():
-                A[rows[m], k] = fmpq(c.numerator, c.denominator)
+                if m in rows:
+                    A[rows[m], k] = fmpq(c.numerator, c.denominator)
         echelon, rank = A.transpose().rref()
         kept = [next(c for c in range(len(rows)) if echelon[r, c] != 0) for r in range(rank)]
         names = list(rows)
@@ -295,11 +302,6 @@ class Guess:
                 c = c / self.scale[x]
             found[m] = c
         return Poly(found)
-
-
-def Counter(p: Poly) -> Terms:
-    """Return the terms of a polynomial to be changed."""
-    return dict(p.terms)
 
 
 def largest(q: Poly) -> float:
@@ -410,6 +412,27 @@ def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
     return None
 
 
+def eliminated(o: Sum, q: Poly, x: str, *more: Any) -> dict[str, Any] | None:
+    """Return evidence by that without a variable, which a relation tells; its cofactor is what is then amiss, divided by it."""
+    instead = {x: Poly({(x,): Fraction(1)}) - q * (1 / q.terms[(x,)])}
+    others = [r for r in o.modulo if r is not q]
+    found = find(Sum(o.p.at(instead), *([r.at(instead) for r in own] for own in (o.known, others, o.strict))), *more)
+    if not found:
+        return found
+    cofactors = [read_poly(c) for c in found["cofactors"]]
+    rest = o.p - dot([Fraction(v) for v in found["numbers"]], o.strict) - dot(cofactors, others)
+    for part in found["parts"]:
+        z = [read_poly({name: "1"} if isinstance(name, str) else name) for name in part["z"]]
+        form = dot(z, apply([[Fraction(v) for v in row] for row in part["gram"]], z))
+        rest = rest - form * product_of(o.known, part["of"])
+    own = quotient(rest, q)
+    if own is None:
+        return None
+    loose = iter(cofactors)
+    found["cofactors"] = [text(own if r is q else next(loose)) for r in o.modulo]
+    return found
+
+
 def find(
     o: Sum, scales: Mapping[str, float], basis: Sequence[Poly] | None = None, degrees: Sequence[int] = (0, 2), exact: bool = True
 ) -> dict[str, Any] | None:
@@ -419,6 +442,10 @@ def find(
         found = divided(o, scales, basis, degrees, exact)
     if found is not None:
         return found
+    for q in o.modulo:
+        alone = [x for x in q.names if (x,) in q.terms and sum(x in m for m in q.terms) == 1]
+        if alone:
+            return eliminated(o, q, alone[0], scales, basis, degrees, exact)
     least = max(degree(q) for q in (o.p, *o.strict))
     least += least % 2
     sides = [k for k, q in enumerate(o.known) if degree(q) == 1]
@@ -426,7 +453,7 @@ def find(
     few += [(0, 1)] if len(o.known) > 1 else []
     many = list(combinations(range(min(len(o.known), 12)), 2))
     for more in degrees:
-        for pairs in (few, many) if more else (few,):
+        for pairs in (few, many) if more and len(o.p.names) < 4 else (few,):
             guess = Guess(o, scales, least + more, pairs, basis)
             x = guess.floats()
             if x is not None:

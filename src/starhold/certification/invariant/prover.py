@@ -83,9 +83,15 @@ class Attempt:
                 found[name] = self._done[key]
         return lacking, found
 
+    def holds(self, surface: int) -> bool:
+        """Tell whether there is evidence of what has to be shown on a surface that is crossed."""
+        return all(self.shown(o) for name, o in self.obligations().items() if f" on {surface}" in name)
+
     def shown(self, o: Sum, exact: bool = True) -> dict[str, Any] | None:
         """Return evidence for a sum, None where none was found."""
-        return find(o, self.scales, self.basis, exact=exact)
+        names = {x for q in (o.p, *o.strict) for x in q.names}
+        basis = self.basis if self.basis and all(q.names <= names for q in self.basis) else None
+        return find(o, self.scales, basis, exact=exact)
 
 
 def proved(attempt: Attempt, top: float, escape: Poly | None) -> dict[str, Any] | str:
@@ -133,7 +139,7 @@ def largest(attempt: Attempt, low: float, top: float) -> float:
         middle = 0.5 * (low + high)
         attempt.numbers["level"] = written(middle)
         low, high = (low, middle) if attempt.missing()[0] else (middle, high)
-        if high - low < 1e-4 * high:
+        if high - low < 5e-4 * high:
             break
     return low
 
@@ -143,7 +149,7 @@ def hinted(attempt: Attempt, escape: Poly | None) -> str:
     system, role = attempt.system, list(attempt.programs)[-1]
     V = Function(system, len(system.roles) - 1, None)
     never = [i for i in system.cells if not V.V(i).terms]
-    if not V.at_point:
+    if not V.at_point or attempt.theorem == "is unstable":
         never += [i for i in system.cells if i not in never and attempt.shown(system.sum(-V.V(i), (i,)))]
     given = {f"never of {role}": never} if never else {}
     if V.at_point and attempt.theorem != "is unstable":
@@ -153,6 +159,8 @@ def hinted(attempt: Attempt, escape: Poly | None) -> str:
         attempt.hints = dict(given)
         if powers is not None:
             attempt.hints[f"powers of {role}"] = powers
+        if attempt.basis and escape is not None:
+            weakened(attempt, role, [f"changes 0 {i} {i}" for i in system.cells], escape)
         lacking = completed(attempt, role, escape)
         if not lacking:
             return ""
@@ -198,10 +206,10 @@ def completed(attempt: Attempt, role: str, escape: Poly | None) -> list[str]:
         if len(agree) + len(falls) < len(lacking) or not lacking:
             return lacking
         changed = False
-        if agree:
-            changed = crossed(attempt, role, agree[0], escape)
-        elif falls and attempt.theorem == "attracts":
+        if falls and attempt.theorem == "attracts":
             changed = weakened(attempt, role, falls, escape)
+        elif agree:
+            changed = crossed(attempt, role, agree[0])
         if not changed:
             return lacking
     return lacking
@@ -247,25 +255,20 @@ def escaping(attempt: Attempt, role: str, own: list[int]) -> Poly | None:
     return None
 
 
-def crossed(attempt: Attempt, role: str, name: str, escape: Poly | None) -> bool:
+def crossed(attempt: Attempt, role: str, name: str) -> bool:
     """Find a surface on which V falls for all means of the rates; whether there is one."""
-    system, told = attempt.system, f"across of {role}"
+    system, across, weakly = attempt.system, f"across of {role}", f"weakly of {role}"
     j, k = pair(name)
-    before, known = list(attempt.hints.get(told, [])), deepcopy(attempt.hints)
-    first = len([n for n in attempt.missing(every=True)[0] if n.startswith("changes")])
-    for m, surface in enumerate(system.surfaces):
-        if not system.all[j].on(surface, system.all[k]):
-            continue
-        for i in (j, k):
-            for c in SLOPES:
-                attempt.hints = deepcopy(known)
-                attempt.hints[told] = [*before, [m, i, {"": str(c)} if c else {}]]
-                lacking = [n for n in attempt.missing(every=True)[0] if n.startswith("changes")]
-                if len(lacking) > first and attempt.theorem == "attracts" and not c:
-                    fresh = [n for n in lacking if not n.endswith("escapes")]
-                    if fresh and weakened(attempt, role, fresh, escape):
-                        lacking = [n for n in attempt.missing(every=True)[0] if n.startswith("changes")]
-                if len(lacking) <= first:
+    known = deepcopy(attempt.hints)
+    for c in SLOPES:
+        for m, i in ((m, i) for m, s in enumerate(system.surfaces) if system.all[j].on(s, system.all[k]) for i in (j, k)):
+            attempt.hints = deepcopy(known)
+            attempt.hints[across] = [*known.get(across, []), [m, i, {"": str(c)} if c else {}]]
+            if attempt.holds(m):
+                return True
+            if weakly in known:
+                attempt.hints[weakly] = [*known[weakly], *([i, n] for n in system.cells if [i, n] not in known[weakly])]
+                if attempt.holds(m):
                     return True
     attempt.hints = known
     return False

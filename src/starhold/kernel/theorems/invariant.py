@@ -275,7 +275,7 @@ class Function:
             yield f"never {self.place} {i}", system.sum(-self.V(i), (i,))
         for i, j, surface, c in every:
             V, rates, m = self.V(i), system.all[j].rates, Poly(dict(surface or ()))
-            if i in never or not system.meet(i, j):
+            if i in never or j in never or not system.meet(i, j):
                 continue
             rise = system.slope(V, rates) - c * system.slope(m, rates)
             room = [V] if self.level is None else [V, self.level - V]
