@@ -24,6 +24,7 @@ from starhold.kernel.polynomials import Monomial, Poly, apply, dot, poly, read_p
 from starhold.kernel.rules import Sum
 
 sparse: Any = import_module("scipy.sparse")
+pivoted: Any = import_module("scipy.linalg").qr
 linprog: Any = import_module("scipy.optimize").linprog
 MARGIN = 1e-7
 """The least eigenvalue, in scaled units, with which exact numbers are tried."""
@@ -102,7 +103,7 @@ class Guess:
         if self.basis is None or 0 in places:
             return monomials(names, top)
         own = [self.scaled(q) for q in self.basis]
-        return [times(q, m) for q in own for m in monomials(names, max(top - degree(q), 0)) if degree(q) <= top]
+        return independent([times(q, m) for q in own for m in monomials(names, max(top - degree(q), 0)) if degree(q) <= top])
 
     def scaled(self, q: Poly) -> Poly:
         """Return a polynomial in scaled units."""
@@ -161,6 +162,12 @@ class Guess:
         b = np.zeros(len(rows))
         for m, c in self.p.terms.items():
             b[rows[m]] = float(c)
+        if self.basis is not None:
+            # Equations that follow from others would stop the interior point.
+            _, triangle, order = pivoted(A.toarray().T, mode="economic", pivoting=True)
+            sizes = np.abs(np.diag(triangle))
+            kept = np.sort(order[: int((sizes > 1e-10 * sizes[0]).sum())])
+            A, b = A[kept], b[kept]
         parts, right, at = [A], [b], len(single)
         top = len(every)
         signs = sparse.csc_matrix(
@@ -183,7 +190,7 @@ class Guess:
         cost = np.r_[np.zeros(top), -1.0]
         try:
             x = interior_point(
-                cost, sparse.vstack(parts), np.concatenate(right), len(rows), signed + 1, [len(b.z) for b in self.blocks]
+                cost, sparse.vstack(parts), np.concatenate(right), len(b), signed + 1, [len(block.z) for block in self.blocks]
             )
         except BaseException as fault:  # a panic of the solver is one
             if isinstance(fault, (KeyboardInterrupt, SystemExit)):
@@ -302,6 +309,17 @@ class Guess:
                 c = c / self.scale[x]
             found[m] = c
         return Poly(found)
+
+
+def independent(given: list[Poly]) -> list[Poly]:
+    """Return polynomials without those that others before them make."""
+    rows = {m: k for k, m in enumerate({m for q in given for m in q.terms})}
+    A = fmpq_mat(max(len(rows), 1), max(len(given), 1))
+    for k, q in enumerate(given):
+        for m, c in q.terms.items():
+            A[rows[m], k] = fmpq(c.numerator, c.denominator)
+    echelon, rank = A.rref()
+    return [given[next(k for k in range(len(given)) if echelon[r, k] != 0)] for r in range(rank)]
 
 
 def largest(q: Poly) -> float:
