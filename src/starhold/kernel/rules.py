@@ -65,10 +65,10 @@ class Squares:
 @dataclass(frozen=True)
 class Sum:
     """p >= the sum of the `strict`, each times a positive number, wherever the known are not negative and the relations are
-    zero (Schmuedgen's form of Positivstellensatz, of which the easy half is used).
+    zero (the easy half of Schmuedgen's Positivstellensatz).
 
-    Evidence: those numbers; the relations' cofactors; parts, each the places of known polynomials, whose product it has for a
-    factor, and a sum of squares z'Gz: p = numbers.strict + cofactors.relations + the sum of parts."""
+    Evidence: those numbers; the relations' cofactors; parts, each the places of known polynomials, whose product it has
+    for a factor, and a sum of squares z'Gz: p = numbers.strict + cofactors.relations + the sum of parts."""
 
     p: Poly
     known: Sequence[Poly] = ()

@@ -20,7 +20,7 @@ from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx
 
 from starhold.certification.evidence.squares import degree, interior_point, text
 from starhold.kernel.numbers import Account, RefusedError
-from starhold.kernel.polynomials import Monomial, Poly, apply, dot, poly, read_poly
+from starhold.kernel.polynomials import Monomial, Poly, apply, dot, poly, read_poly, total
 from starhold.kernel.rules import Sum
 
 sparse: Any = import_module("scipy.sparse")
@@ -95,7 +95,8 @@ class Guess:
             room = top - degree(factor)
             if room >= 0:
                 self.blocks.append(Block(places, factor, self.z(names, room // 2, places)))
-        self.loose = [[times(q, m) for m in monomials(names, top - degree(q))] if top >= degree(q) else [] for q in self.modulo]
+        self.cofactors = [monomials(names, top - degree(q)) for q in self.modulo]
+        self.loose = [[times(q, m) for m in own] for q, own in zip(self.modulo, self.cofactors, strict=True)]
         self.reduce()
 
     def z(self, names: Sequence[str], top: int, places: tuple[int, ...]) -> list[Poly]:
@@ -124,10 +125,8 @@ class Guess:
                     squares[m].append((-1, -1, c > 0))
             for b, block in enumerate(self.blocks):
                 for column, (i, k) in zip(block.columns(), block.pairs, strict=True):
-                    if i != k or len(column.terms) > 1:
-                        # A product of many terms may have either sign, but at its own ends.
-                        ends = set(column.terms) if i != k else set()
-                        free |= ends
+                    if i != k:
+                        free |= set(column.terms)
                     for m, c in column.terms.items() if i == k else ():
                         squares[m].append((b, i, c > 0))
             gone = {
@@ -156,22 +155,26 @@ class Guess:
             return None
         rows = {m: k for k, m in enumerate(sorted({m for q in (self.p, *every) for m in q.terms}))}
         entries = [(rows[m], k, float(c)) for k, q in enumerate(every) for m, c in q.terms.items()]
-        A = sparse.csc_matrix(
-            ([c for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])), (len(rows), len(every) + 1)
+        equal = sparse.csc_matrix(
+            ([c for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])),
+            (len(rows), len(every) + 1),
         )
         b = np.zeros(len(rows))
         for m, c in self.p.terms.items():
             b[rows[m]] = float(c)
         if self.basis is not None:
             # Equations that follow from others would stop the interior point.
-            _, triangle, order = pivoted(A.toarray().T, mode="economic", pivoting=True)
+            _, triangle, order = pivoted(equal.toarray().T, mode="economic", pivoting=True)
             sizes = np.abs(np.diag(triangle))
             kept = np.sort(order[: int((sizes > 1e-10 * sizes[0]).sum())])
-            A, b = A[kept], b[kept]
-        parts, right, at = [A], [b], len(single)
+            equal, b = equal[kept], b[kept]
+        parts, right, at = [equal], [b], len(single)
         top = len(every)
         signs = sparse.csc_matrix(
-            ([*([-1.0] * signed), *([1.0] * signed), 1.0], ([*range(signed)] * 2 + [signed], [*range(signed), *([top] * signed), top])),
+            (
+                [*([-1.0] * signed), *([1.0] * signed), 1.0],
+                ([*range(signed)] * 2 + [signed], [*range(signed), *([top] * signed), top]),
+            ),
             (signed + 1, top + 1),
         )
         parts.append(signs)
@@ -181,7 +184,10 @@ class Guess:
             half = [1.0 if i == k else np.sqrt(2.0) for i, k in block.pairs]
             spots = range(count)
             cone = sparse.csc_matrix(
-                ([-h for h in half] + [float(i == k) for i, k in block.pairs], ([*spots, *spots], [*range(at, at + count), *([top] * count)])),
+                (
+                    [-h for h in half] + [float(i == k) for i, k in block.pairs],
+                    ([*spots, *spots], [*range(at, at + count), *([top] * count)]),
+                ),
                 (count, top + 1),
             )
             parts.append(cone)
@@ -190,7 +196,12 @@ class Guess:
         cost = np.r_[np.zeros(top), -1.0]
         try:
             x = interior_point(
-                cost, sparse.vstack(parts), np.concatenate(right), len(b), signed + 1, [len(block.z) for block in self.blocks]
+                cost,
+                sparse.vstack(parts),
+                np.concatenate(right),
+                len(b),
+                signed + 1,
+                [len(block.z) for block in self.blocks],
             )
         except BaseException as fault:  # a panic of the solver is one
             if isinstance(fault, (KeyboardInterrupt, SystemExit)):
@@ -199,7 +210,7 @@ class Guess:
         return None if x is None or not np.isfinite(x).all() or x[-1] < MARGIN else x
 
     def freed(self, made: Mapping[Monomial, Poly]) -> Poly | None:
-        """Return a polynomial E for which p + E' is a sum, with the derivative of each monomial; None where there is none."""
+        """Return a polynomial E for which p + E' is a sum, by the derivatives of monomials; None without one."""
         self.loose.append([self.scaled(q) * -1 for q in made.values()])
         first = len(self.strict) + sum(map(len, self.loose[:-1]))
         x = self.floats()
@@ -252,7 +263,7 @@ class Guess:
         return dict(places)
 
     def projected(self, y: list[Fraction], rest: Terms, covered: Mapping[Monomial, Any]) -> list[Fraction] | None:
-        """Put what is amiss of monomials that are not covered on all numbers, as little as can be (least squares, exactly)."""
+        """Put what is amiss of monomials that are not covered on all numbers: exact least squares."""
         single, grams = self.columns
         every = [*single, *grams]
         rows = {m: k for k, m in enumerate(sorted({m for q in every for m in q.terms if m not in covered}))}
@@ -277,12 +288,10 @@ class Guess:
         at, size = len(self.strict), self.size
         numbers = [str(v * size) for v in y[:at]]
         cofactors: list[dict[str, str]] = []
-        for q, own in zip(self.o.modulo, self.loose, strict=True):
-            names = [m for m in monomials(sorted(self.scale), degree(self.p) + 8)[: len(own)]] if own else []
-            found = [self.unscaled(m) * (v * size) for m, v in zip(names, y[at : at + len(own)], strict=True)]
-            cofactors.append(text(dot(found, [poly(1)] * len(found)) if found else poly(0)))
+        for own in self.cofactors:
+            found = [self.unscaled(m) * (v * size) for m, v in zip(own, y[at : at + len(own)], strict=True)]
+            cofactors.append(text(total(found)))
             at += len(own)
-            del q
         parts: list[dict[str, Any]] = []
         for block in self.blocks:
             count, factor = len(block.z), Fraction(1)
@@ -328,7 +337,7 @@ def largest(q: Poly) -> float:
 
 
 def identity(o: Sum) -> dict[str, Any] | None:
-    """Return evidence without squares: p as a combination of what is known, with factors, and of relations, with cofactors."""
+    """Return evidence without squares: p as a combination of what is known and of relations."""
     if o.strict:
         return None
     names = sorted({x for q in (o.p, *o.modulo) for x in q.names})
@@ -336,7 +345,7 @@ def identity(o: Sum) -> dict[str, Any] | None:
     loose = [monomials(names, top - degree(q)) for q in o.modulo]
     few = [k for k, q in enumerate(o.known) if degree(q) <= top]
     places = [(), *((k,) for k in few), *combinations(few[:PAIRED], 2)]
-    made = {own: q for own in places if degree(q := product_of(o.known, own)) <= top}
+    made: dict[tuple[int, ...], Poly] = {own: q for own in places if degree(q := product_of(o.known, own)) <= top}
     free = [times(q, m) for q, own in zip(o.modulo, loose, strict=True) for m in own]
     used = needed(o.p, free, made)
     y = None if used is None else solved(o.p, [*free, *(made[own] for own in used)])
@@ -431,7 +440,7 @@ def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
 
 
 def eliminated(o: Sum, q: Poly, x: str, *more: Any) -> dict[str, Any] | None:
-    """Return evidence by that without a variable, which a relation tells; its cofactor is what is then amiss, divided by it."""
+    """Return evidence by that without a variable, which a relation tells."""
     instead = {x: Poly({(x,): Fraction(1)}) - q * (1 / q.terms[(x,)])}
     others = [r for r in o.modulo if r is not q]
     found = find(Sum(o.p.at(instead), *([r.at(instead) for r in own] for own in (o.known, others, o.strict))), *more)
@@ -452,7 +461,11 @@ def eliminated(o: Sum, q: Poly, x: str, *more: Any) -> dict[str, Any] | None:
 
 
 def find(
-    o: Sum, scales: Mapping[str, float], basis: Sequence[Poly] | None = None, degrees: Sequence[int] = (0, 2), exact: bool = True
+    o: Sum,
+    scales: Mapping[str, float],
+    basis: Sequence[Poly] | None = None,
+    degrees: Sequence[int] = (0, 2),
+    exact: bool = True,
 ) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts (exact False: that floats have some); None where none was found."""
     found = identity(o)

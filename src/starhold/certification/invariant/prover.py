@@ -10,6 +10,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 from starhold.certification.evidence.squares import text
@@ -63,9 +64,9 @@ class Attempt:
         """The system with its functions, cut into cells."""
         return System(self.read(), *(role for role in self.programs if role != "rates"))
 
-    def obligations(self) -> dict[str, Sum]:
+    def obligations(self) -> Mapping[str, Sum]:
         """Return what has to be shown; RefusedError where the claim is none."""
-        return dict(THEOREMS[self.theorem](self.read()))  # pyright: ignore[reportArgumentType]
+        return dict(THEOREMS[self.theorem](self.read()))  # pyright: ignore[reportReturnType]
 
     def missing(self, exact: bool = False, every: bool = False) -> tuple[list[str], dict[str, Any]]:
         """Return the names of obligations without evidence (the first, or every one), and the evidence of the others."""
@@ -112,6 +113,7 @@ def proved(attempt: Attempt, top: float, escape: Poly | None) -> dict[str, Any] 
         if not levelled:
             lacking, found = attempt.missing(exact=True)
             return f"no exact evidence was found: {lacking[0]}" if lacking else attempt.claim(found)
+        lacking: list[str] = []
         best = largest(attempt, float(rational(attempt.numbers["level"])), top)
         for less in LESS:
             attempt.numbers["level"] = written(best * (1.0 - less))
@@ -148,12 +150,15 @@ def hinted(attempt: Attempt, escape: Poly | None) -> str:
     """Find hints with which floats have evidence for all obligations; return why there are none, or nothing."""
     system, role = attempt.system, list(attempt.programs)[-1]
     V = Function(system, len(system.roles) - 1, None)
-    never = [i for i in system.cells if not V.V(i).terms]
+    never = [i for i in system.cells if not V.on(i).terms]
+    if attempt.theorem in ("avoids", "fails"):
+        lacking, _ = attempt.missing()
+        return f"no evidence was found: {lacking[0]}" if lacking else ""
     if not V.at_point or attempt.theorem == "is unstable":
-        never += [i for i in system.cells if i not in never and attempt.shown(system.sum(-V.V(i), (i,)))]
+        never += [i for i in system.cells if i not in never and attempt.shown(system.sum(-V.on(i), (i,)))]
     given = {f"never of {role}": never} if never else {}
     if V.at_point and attempt.theorem != "is unstable":
-        given[f"shape of {role}"] = shape([V.V(i) for i in system.cells], system.names)
+        given[f"shape of {role}"] = shape([V.on(i) for i in system.cells], system.names)
     reason = ""
     for powers in candidates(attempt, V):
         attempt.hints = dict(given)
@@ -177,7 +182,7 @@ def candidates(attempt: Attempt, V: Function) -> Iterator[Any]:
         return
     system = V.system
     if V.at_point and attempt.theorem == "attracts":
-        slopes = [-system.slope(V.V(i), system.all[i].rates) for i in system.cells]
+        slopes = [-system.slope(V.on(i), system.all[i].rates) for i in system.cells]
         own = shape(slopes, system.names)
         yield own
         yield 1
@@ -199,6 +204,7 @@ def shape(functions: Sequence[Poly], names: Sequence[str]) -> list[int]:
 
 def completed(attempt: Attempt, role: str, escape: Poly | None) -> list[str]:
     """Add hints about pairs of cells where V does not fall strictly, and where rates jump; return what is not shown."""
+    lacking: list[str] = []
     for _ in range(6):
         lacking, _ = attempt.missing(every=True)
         agree = [name for name in lacking if name.startswith("agree")]
@@ -242,7 +248,7 @@ def weakened(attempt: Attempt, role: str, names: list[str], escape: Poly | None)
 
 
 def escaping(attempt: Attempt, role: str, own: list[int]) -> Poly | None:
-    """Return a function that grows where V' vanishes, of low degree, in floats that are rounded; None where none was found."""
+    """Return a function of low degree that grows where V' vanishes; None where none was found."""
     attempt.hints[f"escape of {role}"] = {}
     name = next(n for n in attempt.obligations() if n.endswith("escapes") and pair(n) == own)
     o, system = attempt.obligations()[name], attempt.system
@@ -261,7 +267,8 @@ def crossed(attempt: Attempt, role: str, name: str) -> bool:
     j, k = pair(name)
     known = deepcopy(attempt.hints)
     for c in SLOPES:
-        for m, i in ((m, i) for m, s in enumerate(system.surfaces) if system.all[j].on(s, system.all[k]) for i in (j, k)):
+        places = [m for m, surface in enumerate(system.surfaces) if system.all[j].on(surface, system.all[k])]
+        for m, i in product(places, (j, k)):
             attempt.hints = deepcopy(known)
             attempt.hints[across] = [*known.get(across, []), [m, i, {"": str(c)} if c else {}]]
             if attempt.holds(m):
@@ -277,4 +284,3 @@ def crossed(attempt: Attempt, role: str, name: str) -> bool:
 def scales(box: Mapping[str, tuple[float, float]], point: Mapping[str, float]) -> dict[str, float]:
     """Return about how large variables become, counted from the equilibrium."""
     return {x: max(abs(low - point.get(x, 0.0)), abs(high - point.get(x, 0.0))) for x, (low, high) in box.items()}
-

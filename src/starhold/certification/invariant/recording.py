@@ -76,6 +76,6 @@ def recorded(equation: Callable[..., Any], names: Sequence[str]) -> dict[str, An
     """Return an equation of the named numbers as a program: its value, or several."""
     line = Line(names)
     found = equation(*(line.variable(name) for name in names))
-    values = found if isinstance(found, (tuple, list)) else (found,)
-    terms: list[Term] = [x if isinstance(x, Term) else line.number(x) for x in values]  # pyright: ignore
+    values: list[Any] = [*found] if isinstance(found, (tuple, list)) else [found]  # pyright: ignore[reportUnknownVariableType]
+    terms = [x if isinstance(x, Term) else line.number(x) for x in values]
     return {"inputs": line.names, "steps": line.steps, "outputs": [x.place for x in terms]}

@@ -1,8 +1,9 @@
 """The theorems on invariant sets of a small system x' = f(x), by functions V. Proofs: docs/kernel.md, 7.
 
-Rates f and V are piecewise polynomials, each piece (cell) taken with its border. Where f jumps, motions are those in the sense
-of Filippov, and more: x' is any mean of what the cells have there. M is {V <= 0}, or an equilibrium. A variable x may come with
-its sine and cosine, inputs `sin.x` and `cos.x`; parameters are inputs that stay, and have all values of their intervals.
+Rates f and V are piecewise polynomials, each piece (cell) taken with its border. Where f jumps, motions are those in
+the sense of Filippov, and more: x' is any mean of what the cells have there. M is {V <= 0}, or an equilibrium. A
+variable x may come with its sine and cosine, inputs `sin.x` and `cos.x`; parameters are inputs that stay, and have all
+values of their intervals.
 """
 
 from __future__ import annotations
@@ -67,6 +68,8 @@ class System:
                 demand(low < high, "an interval is empty")
                 self.box[name] = low, high
         given = {name: known(var(name) + self.shift.get(name, 0)) for name in {*rates.inputs, *turning}}
+        # Of a cosine what it lacks to one is the variable, so that all variables vanish at the equilibrium.
+        given |= {f"cos.{x}": known(1 - var(f"cos.{x}")) for x in self.angles}
         outputs = rates.run(given, Exactly(), count)
         for role in roles:
             demand(set(claim.programs[role].inputs) <= set(given), "a function depends on more than the state")
@@ -81,15 +84,16 @@ class System:
 
     @cached_property
     def facts(self) -> list[Poly]:
-        """What is negative nowhere: the sides of the box, and of an angle what Taylor's series leave, times x for the sine.
-        (Each is the integral of the one before, and so they alternate for x > 0.)"""
+        """Return what is negative nowhere: the sides of the box, and of an angle what Taylor's series leave, times
+        x for the sine. (Each is the integral of the one before, and so they alternate for x > 0.)"""
         found = [side for name, (low, high) in self.box.items() for side in (var(name) - low, high - var(name))]
         for name in self.angles:
             series, term = {"cos": poly(0), "sin": poly(0)}, poly(1)
             for n in range(TAYLOR):
                 f, sign = ("cos", "sin")[n % 2], (1, 1, -1, -1)[n % 4]
                 series[f], term = series[f] + term * Fraction(sign, factorial(n)), term * var(name)
-                left = (series[f] - var(f"{f}.{name}")) * sign
+                turned = 1 - var(f"cos.{name}") if f == "cos" else var(f"sin.{name}")
+                left = (series[f] - turned) * sign
                 found.append(left * var(name) if f == "sin" else left)
         return found
 
@@ -99,7 +103,7 @@ class System:
         for name, rate in zip(self.names, rates, strict=True):
             if name in self.angles:
                 s, c = f"sin.{name}", f"cos.{name}"
-                found = found + (V.slope(s) * var(c) - V.slope(c) * var(s)) * rate
+                found = found + (V.slope(s) * (1 - var(c)) + V.slope(c) * var(s)) * rate
         return found
 
     def sum(
@@ -112,7 +116,8 @@ class System:
         for k in cells:
             for surface, sign in self.all[k].signs.items():
                 sides[surface] = sign if sides.get(surface, sign) == sign else 0
-        circles = [var(f"sin.{x}") * var(f"sin.{x}") + var(f"cos.{x}") * var(f"cos.{x}") - 1 for x in self.angles]
+        turned = [(var(f"sin.{x}"), 1 - var(f"cos.{x}")) for x in self.angles]
+        circles = [s * s + c * c - 1 for s, c in turned]
         parts = (
             [*more, *(Poly(dict(surface)) * sign for surface, sign in sides.items() if sign), *self.facts],
             [*zero, *(Poly(dict(surface)) for surface, sign in sides.items() if not sign), *circles],
@@ -124,7 +129,7 @@ class System:
 
     @cached_property
     def apart(self) -> list[tuple[int, ...]]:
-        """The cells that are told to be empty, and the pairs that are told not to meet."""
+        """Return the cells that are told to be empty, and the pairs that are told not to meet."""
         told = self.claim.evidence.get("apart")
         found = [tuple(read_list(own)) for own in read_list(told or [])]
         demand(all(len(own) in (1, 2) and self.are_cells(own) for own in found), "there are no such cells")
@@ -136,7 +141,7 @@ class System:
 
     @cached_property
     def cells(self) -> list[int]:
-        """The places of the cells that are not empty."""
+        """Return the places of the cells that are not empty."""
         return [k for k in range(len(self.all)) if (k,) not in self.apart]
 
     def meet(self, i: int, j: int) -> bool:
@@ -154,9 +159,9 @@ class System:
 
     @property
     def origin(self) -> State:
-        """The equilibrium in place of the state."""
-        turned = {f"{f}.{x}": Fraction(f == "cos") for x in self.angles for f in ("sin", "cos")}
-        return dict.fromkeys(self.names, Fraction(0)) | turned
+        """Return the equilibrium in place of the state."""
+        turned = [f"{f}.{x}" for x in self.angles for f in ("sin", "cos")]
+        return dict.fromkeys((*self.names, *turned), Fraction(0))
 
     def around_point(self) -> Iterator[tuple[Cell, bool]]:
         """Yield the cells that may hold the equilibrium, and whether they do for all parameters."""
@@ -222,15 +227,15 @@ class Function:
         """Tell whether M is the equilibrium."""
         return self.system.at_point and self.place == len(self.system.roles) - 1
 
-    def V(self, i: int) -> Poly:
+    def on(self, i: int) -> Poly:
         """Return the function in a cell."""
         return self.system.all[i].V[self.place]
 
     def positive(self, name: str, i: int) -> list[Poly]:
-        """Return what is positive together where V is, but at the equilibrium: even powers of all variables, or a power of V."""
+        """Return what is positive together where V is: even powers of all variables, or a power of V."""
         told = self.hint(name)
         if name != "shape" and type(told) is int:
-            return [power(self.V(i), told)]
+            return [power(self.on(i), told)]
         demand(self.at_point and 0 not in read_list(told, len(self.system.names)), "a power is not told")
         return [power(var(x) * var(x), n) for x, n in zip(self.system.names, told, strict=True)]
 
@@ -242,7 +247,7 @@ class Function:
         if self.at_point:
             demand(all(not cell.V[self.place].at(system.origin).terms for cell, _ in system.around_point()), "V is not zero")
             for i in system.cells:
-                yield f"positive {self.place} {i}", system.sum(self.V(i), (i,), strict=self.positive("shape", i))
+                yield f"positive {self.place} {i}", system.sum(self.on(i), (i,), strict=self.positive("shape", i))
         else:
             demand(all(x in system.box for x in system.names), "a variable has no bounds")
             cell, state = system.state("member")
@@ -251,30 +256,31 @@ class Function:
             for k, end in enumerate(system.box[x]):
                 demand(self.level is not None, "V has no level, but the box has a border")
                 for i in system.cells:
-                    above = system.sum(self.V(i) - (self.level or 0), (i,), face={x: end})
+                    above = system.sum(self.on(i) - (self.level or 0), (i,), face={x: end})
                     yield f"border {self.place} {i} {x} {k}", above
 
     def changes(self, strictly: bool = True) -> Shown:
         """V falls all the time where 0 < V < level, or (not strictly) does not grow there.
 
-        Almost always V' = grad V_i.v for every cell i that holds the state, with a mean v of the rates of all that do, and v
-        is along each surface m that does. So it is enough that (grad V_i - c grad m).f_j < 0 for one i and every j, whatever c
-        is. Where it is only <= 0, E is to grow where it vanishes: then E - LV does for a large L on {l <= V}, for any l > 0."""
+        Almost always V' = grad V_i.v for every cell i that holds the state, with a mean v of the rates of all that do,
+        and v is along each surface m that does. So it is enough that (grad V_i - c grad m).f_j < 0 for one i and every j,
+        whatever c is. Where it is only <= 0, E is to grow where it vanishes: then E - LV does for a large L on {l <= V},
+        for any l > 0."""
         system, escape = self.system, self.hint("escape")
         E = None if escape is None else read_poly(escape)
         weakly = [tuple(read_list(pair, 2)) for pair in read_list(self.hint("weakly") or [])]
         across = [tuple(read_list(entry, 3)) for entry in read_list(self.hint("across") or [])]
         demand(all(system.are_cells((i,)) and type(m) is int for m, i, _ in across), "there are no such cells")
         demand(all(0 <= m < len(system.surfaces) for m, _, _ in across), "there are no such surfaces")
-        chosen = {(system.surfaces[m], i) for m, i, _ in across}
+        chosen: set[tuple[Condition, int]] = {(system.surfaces[m], i) for m, i, _ in across}
         every = [(i, i, None, poly(0)) for i in system.cells]
         every += [(i, j, system.surfaces[m], read_poly(c)) for m, i, c in across for j in system.cells]
         never = read_list(self.hint("never") or [])
         for i in never:
             demand(system.are_cells([i]), "there are no such cells")
-            yield f"never {self.place} {i}", system.sum(-self.V(i), (i,))
+            yield f"never {self.place} {i}", system.sum(-self.on(i), (i,))
         for i, j, surface, c in every:
-            V, rates, m = self.V(i), system.all[j].rates, Poly(dict(surface or ()))
+            V, rates, m = self.on(i), system.all[j].rates, Poly(dict(surface or ()))
             if i in never or j in never or not system.meet(i, j):
                 continue
             rise = system.slope(V, rates) - c * system.slope(m, rates)
@@ -301,7 +307,7 @@ class Function:
         inside = "" if not self.system.box else " of the box"
         return "everywhere" if self.level is None else f"{{{self.system.roles[self.place]} < {below(self.level)}}}{inside}"
 
-    def M(self) -> str:
+    def limit(self) -> str:
         """Write the set that motions come to."""
         return "the equilibrium" if self.at_point else f"{{{self.system.roles[self.place]} <= 0}}"
 
@@ -327,7 +333,7 @@ def attracts(claim: Claim) -> Shows:
     for i in system.cells if core else ():
         outer, inner = system.all[i].V
         yield f"inside {i}", system.sum(claim.numbers["core.level"] - inner, (i,), [-outer], [poly(1)])
-    return stated(f"all motions that start in {functions[0].where()} stay there and come to {functions[-1].M()}", system)
+    return stated(f"all motions that start in {functions[0].where()} stay there and come to {functions[-1].limit()}", system)
 
 
 def stays(claim: Claim) -> Shows:
@@ -337,7 +343,7 @@ def stays(claim: Claim) -> Shows:
     V = Function(system, 0, claim.numbers["level"])
     yield from V.confined()
     yield from V.changes(strictly=False)
-    return stated(f"{V.M()} is stable: no motion leaves {V.where()}, nor any smaller such set", system)
+    return stated(f"{V.limit()} is stable: no motion leaves {V.where()}, nor any smaller such set", system)
 
 
 def leaves(claim: Claim) -> Shows:
@@ -367,9 +373,9 @@ def leaves(claim: Claim) -> Shows:
         for x in system.names:
             for k, end in enumerate(system.box[x]):
                 for i in system.cells:
-                    yield f"border 0 {i} {x} {k}", system.sum(V.V(i), (i,), (), [poly(1)], face={x: end})
+                    yield f"border 0 {i} {x} {k}", system.sum(V.on(i), (i,), (), [poly(1)], face={x: end})
     yield from V.changes()
-    return stated(f"{V.M()} is unstable: every motion that starts in the box where V > 0 leaves the box", system)
+    return stated(f"{V.limit()} is unstable: every motion that starts in the box where V > 0 leaves the box", system)
 
 
 def avoids(claim: Claim) -> Shows:
@@ -403,7 +409,10 @@ def fails(claim: Claim) -> Shows:
     border = any(state[x] in system.box.get(x, ()) for x in system.names)
     still = slope == 0 and not any(rate.at(state).number for rate in cell.rates)
     ways = {
-        "does not fall": (inside and (slope > 0 or still), f"V rises, or the state is an equilibrium, where it is {below(V)}"),
+        "does not fall": (
+            inside and (slope > 0 or still),
+            f"V rises, or the state is an equilibrium, where it is {below(V)}",
+        ),
         "does not grow": (inside and slope <= 0, f"V does not grow at a state where it is {below(V)}"),
         "reaches the border": (border, f"V is {below(V)} on the border of the box"),
         "is not positive": (away and V <= 0, "V is not positive at a state that is not the equilibrium"),
