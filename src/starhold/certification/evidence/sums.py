@@ -101,10 +101,14 @@ class Guess:
 
     def z(self, names: Sequence[str], top: int, places: tuple[int, ...]) -> list[Poly]:
         """Return what the squares of a block are made of."""
-        if self.basis is None or 0 in places:
+        if self.basis is None:
             return monomials(names, top)
         own = [self.scaled(q) for q in self.basis]
-        return independent([times(q, m) for q in own for m in monomials(names, max(top - degree(q), 0)) if degree(q) <= top])
+        made = [times(q, m) for q in own for m in monomials(names, min(max(top - degree(q), 0), 2)) if degree(q) <= top]
+        # A factor may vanish with the basis: then its squares are of anything.
+        if any(solved(self.known[k], multiples(own, self.known[k])) is not None for k in places):
+            return monomials(names, min(top, 2))
+        return independent(made)
 
     def scaled(self, q: Poly) -> Poly:
         """Return a polynomial in scaled units."""
@@ -263,25 +267,11 @@ class Guess:
         return dict(places)
 
     def projected(self, y: list[Fraction], rest: Terms, covered: Mapping[Monomial, Any]) -> list[Fraction] | None:
-        """Put what is amiss of monomials that are not covered on all numbers: exact least squares."""
+        """Put what is amiss of monomials that are not covered on as few numbers as it takes."""
         single, grams = self.columns
-        every = [*single, *grams]
-        rows = {m: k for k, m in enumerate(sorted({m for q in every for m in q.terms if m not in covered}))}
-        if not set(rest) <= set(rows):
-            return None
-        A = fmpq_mat(len(rows), len(every))
-        for k, q in enumerate(every):
-            for m, c in q.terms.items():
-                if m in rows:
-                    A[rows[m], k] = fmpq(c.numerator, c.denominator)
-        echelon, rank = A.transpose().rref()
-        kept = [next(c for c in range(len(rows)) if echelon[r, c] != 0) for r in range(rank)]
-        names = list(rows)
-        own = fmpq_mat(rank, len(every), [A[r, k] for r in kept for k in range(len(every))])
-        b = [rest.get(names[r], Fraction(0)) for r in kept]
-        right = fmpq_mat(rank, 1, [fmpq(c.numerator, c.denominator) for c in b])
-        step = own.transpose() * (own * own.transpose()).solve(right)
-        return [v + Fraction(int(step[k, 0].p), int(step[k, 0].q)) for k, v in enumerate(y)]
+        every = [Poly({m: c for m, c in q.terms.items() if m not in covered}) for q in (*single, *grams)]
+        step = solved(Poly(rest), every)
+        return None if step is None else [v + s for v, s in zip(y, step, strict=True)]
 
     def written(self, y: list[Fraction]) -> dict[str, Any]:
         """Return the evidence in the units of the sum."""
@@ -329,6 +319,12 @@ def independent(given: list[Poly]) -> list[Poly]:
             A[rows[m], k] = fmpq(c.numerator, c.denominator)
     echelon, rank = A.rref()
     return [given[next(k for k in range(len(given)) if echelon[r, k] != 0)] for r in range(rank)]
+
+
+def multiples(basis: Sequence[Poly], p: Poly) -> list[Poly]:
+    """Return the multiples of some polynomials that are of no higher degree than another."""
+    names = sorted(p.names)
+    return [times(q, m) for q in basis for m in monomials(names, degree(p) - degree(q))]
 
 
 def largest(q: Poly) -> float:
