@@ -6,11 +6,18 @@ from functools import cache
 
 from starhold.algebra.scalar import clip, less, maximum, sign, where
 from starhold.certification.invariant.prover import Attempt, proved, scales
-from starhold.certification.invariant.recording import recorded
+from starhold.algebra.polynomial import Polynomial
+from starhold.certification.invariant.recording import program
 from starhold.kernel.programs import digest
 
 SQUARE = {"x": (-2, 2), "y": (-2, 2)}
 ORIGIN = {"equilibrium.x": 0, "equilibrium.y": 0}
+
+
+def recorded(equation, names):
+    """Return an equation as a program of the kernel."""
+    found = equation(*map(Polynomial.variable, names))
+    return program(found if isinstance(found, tuple) else (found,), names)
 
 
 def attempt(theorem, rates, functions, box, numbers, names=("x", "y"), **more):

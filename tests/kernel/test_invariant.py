@@ -58,7 +58,7 @@ def test_no_larger_level_is_accepted(name):
 @pytest.mark.parametrize(
     ("name", "change", "said"),
     [
-        ("cycle", {"numbers": {"member.x": "0"}}, "V is positive at the member"),
+        ("cycle", {"numbers": {"member.x": "0"}}, "V is too large at the member"),
         ("cycle", {"numbers": {"member.x": "3"}}, "outside of the box"),
         ("van der Pol", {"numbers": {"equilibrium.x": "1/10"}}, "V is not zero"),
         ("van der Pol", {"numbers": {"level": "-1"}}, "a level is not positive"),

@@ -87,7 +87,7 @@ class Guess:
         self.known = [self.scaled(q) * (1 / u) for q, u in zip(o.known, self.units, strict=True)]
         self.modulo = [self.scaled(q) for q in o.modulo]
         self.p = self.p * (1 / self.size)
-        used = [k for k, q in enumerate(self.known) if q.names and degree(q) <= top]
+        used = [k for k, q in enumerate(self.known) if degree(q) > (basis is not None) and degree(q) <= top]
         chosen = [(), *((k,) for k in used), *(p for p in pairs if p[0] in used and p[1] in used)]
         self.blocks = list[Block]()
         for places in chosen:

@@ -23,9 +23,11 @@ from starhold.kernel.rules import Sum
 from starhold.kernel.theorems import THEOREMS
 from starhold.kernel.theorems.invariant import Function, System
 
-LESS = (1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1)
+LESS = (1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1)
 """How far below the largest level that floats find exact evidence is tried."""
-HALVINGS = 14
+HALVINGS = 18
+CLOSE, FAR = 1e-5, 5e-4
+"""How close floats come to the largest level, of one cell and of more."""
 SLOPES = (0, 1, -1, 8, -8, 64, -64)
 """Multiples of a surface by which V is bent where it is crossed."""
 
@@ -134,14 +136,15 @@ def written(x: float) -> str:
 def largest(attempt: Attempt, low: float, top: float) -> float:
     """Return about the largest level for which floats have evidence."""
     high = top
-    attempt.numbers["level"] = written(top * (1.0 - LESS[0]))
+    attempt.numbers["level"] = written(top * (1.0 - LESS[1]))
     if not attempt.missing()[0]:
         return top
+    close = CLOSE if attempt.basis is None and len(attempt.system.cells) == 1 else FAR
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         attempt.numbers["level"] = written(middle)
         low, high = (low, middle) if attempt.missing()[0] else (middle, high)
-        if high - low < 5e-4 * high:
+        if high - low < close * high:
             break
     return low
 

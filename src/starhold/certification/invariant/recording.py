@@ -1,10 +1,12 @@
-"""Records an equation as a program of the proof kernel, its numbers exactly as they are written."""
+"""Writes piecewise polynomials as a program of the proof kernel, their numbers exactly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import Any
+
+from starhold.algebra.polynomial import Case, Polynomial, pieces
 
 
 class Line:
@@ -14,68 +16,46 @@ class Line:
         self.names, self.steps = list(names), list[list[Any]]()
         self._places: dict[Any, int] = {}
 
-    def variable(self, name: str) -> Term:
-        """Return an input."""
-        return Term(self, self.names.index(name))
-
-    def number(self, x: Any) -> Term:
-        """Return a constant; floats count as their exact values."""
-        return Term(self, self._step("constant", str(Fraction(x))), Fraction(x))
-
-    def apply(self, operation: str, values: Sequence[Any]) -> Term:
-        """Return the value of an operation; numbers alone are worked out."""
-        terms = [x if isinstance(x, Term) else self.number(x) for x in values]
-        return Term(self, self._step(operation, *(x.place for x in terms)))
-
-    def _step(self, *parts: Any) -> int:
+    def step(self, *parts: Any) -> int:
+        """Return the place of a step's value."""
         if parts not in self._places:
             self.steps.append([*parts])
             self._places[parts] = len(self.names) + len(self.steps) - 1
         return self._places[parts]
 
+    def polynomial(self, p: Polynomial) -> int:
+        """Return the place of a polynomial's value."""
+        total: int | None = None
+        for monomial, c in sorted(p.terms.items()):
+            text = str(Fraction(int(c.p), int(c.q)))
+            term = None if text == "1" and monomial else self.step("constant", text)
+            for name in monomial:
+                place = self.names.index(name)
+                term = place if term is None else self.step("product", term, place)
+            total = term if total is None else self.step("plus", total, term)
+        return self.step("constant", "0") if total is None else total
 
-class Term:
-    """A recorded value; `number`: what it is where it does not depend on inputs."""
-
-    reader: ClassVar[str] = "dual"
-    __slots__ = ("line", "number", "place")
-
-    def __init__(self, line: Line, place: int, number: Fraction | None = None) -> None:
-        self.line, self.place, self.number = line, place, number
-
-    def read(self, entry: Any, values: tuple[Any, ...]) -> Term:
-        """Record an operation of equations."""
-        return self.line.apply(entry.name, values)
-
-    def __add__(self, other: Any) -> Term:
-        return self.line.apply("plus", (self, other))
-
-    def __radd__(self, other: Any) -> Term:
-        return self.line.apply("plus", (other, self))
-
-    def __sub__(self, other: Any) -> Term:
-        return self.line.apply("minus", (self, other))
-
-    def __rsub__(self, other: Any) -> Term:
-        return self.line.apply("minus", (other, self))
-
-    def __mul__(self, other: Any) -> Term:
-        return self.line.apply("product", (self, other))
-
-    def __rmul__(self, other: Any) -> Term:
-        return self.line.apply("product", (other, self))
-
-    def __truediv__(self, other: Any) -> Term:
-        return self.line.apply("divide", (self, other))
-
-    def __neg__(self) -> Term:
-        return self.line.apply("negative", (self,))
+    def value(self, cases: Sequence[Case]) -> int:
+        """Return the place of a piecewise polynomial's value: a choice by one of its conditions, and so on."""
+        condition = next((condition for case in cases for condition, _ in case.truths), None)
+        if condition is None:
+            return self.polynomial(cases[0].value)
+        truth = self.step("less", self.step("constant", "0"), self.polynomial(condition.positive))
+        return self.step("select", truth, *(self.value(_where(cases, condition, side)) for side in (True, False)))
 
 
-def recorded(equation: Callable[..., Any], names: Sequence[str]) -> dict[str, Any]:
-    """Return an equation of the named numbers as a program: its value, or several."""
+def _where(cases: Sequence[Case], condition: Any, side: bool) -> list[Case]:
+    """Return the cases where a condition has one truth, without it."""
+    found: list[Case] = []
+    for case in cases:
+        others = tuple(truth for truth in case.truths if truth[0].key != condition.key)
+        if not any(c.key == condition.key and truth != side for c, truth in case.truths):
+            found.append(Case(others, case.value))
+    return found
+
+
+def program(values: Sequence[Any], names: Sequence[str]) -> dict[str, Any]:
+    """Return piecewise polynomials of the named numbers as one program."""
     line = Line(names)
-    found = equation(*(line.variable(name) for name in names))
-    values: list[Any] = [*found] if isinstance(found, (tuple, list)) else [found]  # pyright: ignore[reportUnknownVariableType]
-    terms = [x if isinstance(x, Term) else line.number(x) for x in values]
-    return {"inputs": line.names, "steps": line.steps, "outputs": [x.place for x in terms]}
+    outputs = [line.value(pieces(value)) for value in values]
+    return {"inputs": line.names, "steps": line.steps, "outputs": outputs}

@@ -239,9 +239,10 @@ class Function:
         demand(self.at_point and 0 not in read_list(told, len(self.system.names)), "a power is not told")
         return [power(var(x) * var(x), n) for x, n in zip(self.system.names, told, strict=True)]
 
-    def confined(self) -> Shown:
-        """{V <= l} is compact and inside of the box for each l < level, and M is as told and not empty: V >= level all over
-        the border, and where there is none V is larger than even powers."""
+    def confined(self, most: Fraction | int = 0) -> Shown:
+        """{V <= l} is compact and inside of the box for each l < level, and M is as told and not empty: V >= level all
+        over the border, and where there is none V is larger than even powers. Where V falls as long as it is positive,
+        M is not empty if any state has V < level: it has what the least V is reached at."""
         system = self.system
         demand(self.level is None or self.level > 0, "a level is not positive")
         if self.at_point:
@@ -251,7 +252,8 @@ class Function:
         else:
             demand(all(x in system.box for x in system.names), "a variable has no bounds")
             cell, state = system.state("member")
-            demand(cell.V[self.place].at(state).number <= 0, "V is positive at the member of M")
+            least = cell.V[self.place].at(state).number
+            demand(least <= 0 or least < most, "V is too large at the member of M")
         for x in (name for name in system.names if name in system.box):
             for k, end in enumerate(system.box[x]):
                 demand(self.level is not None, "V has no level, but the box has a border")
@@ -328,7 +330,7 @@ def attracts(claim: Claim) -> Shows:
     functions = [Function(system, 0, claim.numbers.get("level"))]
     functions += [Function(system, 1, claim.numbers["core.level"])] if core else []
     for V in functions:
-        yield from V.confined()
+        yield from V.confined(V.level or 0)
         yield from V.changes()
     for i in system.cells if core else ():
         outer, inner = system.all[i].V
