@@ -115,6 +115,7 @@ class _Proof:
         if wanted.level is not None and not self.unstable:
             self.numbers["level"] = wanted.level
         self.witness: dict[str, Any] = {"name": wanted.name, "box": [list(side) for side in wanted.box]}
+        self.witness["equilibrium"] = wanted.equilibrium is not None
 
     def shown(self) -> Shown:
         """Return the claim with its outcome."""
