@@ -94,13 +94,7 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
     # Of what is left, all of which some motions start from.
     sign = -1.0 if wanted.theorem == "unstable" else 1.0
     V = (values.V if flat else sign * _least(what, points, len(problem.system.variables), sign)).reshape(shape)
-    marks = [
-        o.evidence[key]
-        for o in claim.obligations
-        if o.outcome == "refuted"
-        for key in ("state",)
-        if key in o.evidence
-    ]
+    marks = [o.evidence["state"] for o in claim.obligations if o.outcome == "refuted"]
     orbit = None if start is None or len(problem.system.variables) != 2 else _orbit(what, np.array(start))
     marked = tuple((mark[names[0]], mark[names[1]]) for mark in marks)
     equilibrium = None if wanted.equilibrium is None else (float(wanted.equilibrium[0]), float(wanted.equilibrium[1]))
