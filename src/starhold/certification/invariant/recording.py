@@ -40,8 +40,12 @@ class Line:
         condition = next((condition for case in cases for condition, _ in case.truths), None)
         if condition is None:
             return self.polynomial(cases[0].value)
+        sides = [_where(cases, condition, side) for side in (True, False)]
+        if not all(sides):
+            # Whatever else holds there contradicts one side.
+            return self.value(sides[0] or sides[1])
         truth = self.step("less", self.step("constant", "0"), self.polynomial(condition.positive))
-        return self.step("select", truth, *(self.value(_where(cases, condition, side)) for side in (True, False)))
+        return self.step("select", truth, *map(self.value, sides))
 
 
 def _where(cases: Sequence[Case], condition: Any, side: bool) -> list[Case]:
