@@ -87,6 +87,8 @@ def test_what_a_theorem_needs_is_needed(name, change, said):
         ("attracts", lambda x, y: (-x, -y), lambda x, y: x * x - y * y, SQUARE, ORIGIN, 1),
         ("attracts", lambda x, y: (-x, -y), round_, SQUARE, ORIGIN, 5),
         ("attracts", lambda x, y: (-x, y - y), round_, SQUARE, ORIGIN, 1),
+        # What attracts everything, though no polynomial shows it (Ahmadi, Krstic and Parrilo).
+        ("attracts", lambda x, y: (-x + x * y, -y), round_, {}, ORIGIN, None),
         # A parameter of either sign; M that is not invariant; a stable node, which is not unstable.
         ("is stable", lambda x, y: (x, -y), round_, SQUARE, ORIGIN, 1),
         ("attracts", lambda x, y: (1 - 0 * x, -y), lambda x, y: round_(x, y) - 1, SQUARE, {"member.x": 0, "member.y": 0}, 1),
@@ -168,7 +170,7 @@ def test_mutations_say_nothing_false(name):
 
 
 def mutated(content, rng):
-    """Return the content with one change: of a step or an output of a program, a number, a side or a part of the evidence."""
+    """Return the content with one change: of a step of a program, a number, a side or a part of the evidence."""
     content = copy.deepcopy(content)
     claim = claimed(content)
     where = rng.choice(["program", "program", "numbers", "subject", "evidence"])
