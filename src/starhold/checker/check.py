@@ -15,8 +15,6 @@ from flint import ctx
 
 from starhold.checker.claims import CLAIMS, UNLIMITED
 from starhold.checker.exact import CheckError, Obligation, Verdict, demand, limited
-from starhold.checker.invariant import FORMAT as INVARIANT
-from starhold.checker.invariant import invariant_findings
 from starhold.checker.reading import read_file, shallow
 from starhold.checker.refutation import refutation
 from starhold.checker.shapes import (
@@ -36,9 +34,12 @@ from starhold.checker.shapes import (
 from starhold.checker.station import StationSubject, read_station, station_findings
 from starhold.checker.subject import LoopSubject, read_subject
 from starhold.checker.torque import never_beyond
+from starhold.kernel.check import check as kernel_check
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.reading import FORMAT as KERNEL
 
 FORMAT = "starhold certificate 2"
-FORMER = ("starhold certificate 1", "starhold invariant certificate 1")
+FORMER = ("starhold certificate 1", "starhold invariant certificate 1", "starhold invariant certificate 2")
 """Formats of earlier versions, whose keys had other names."""
 ENDS = (
     "convergence",
@@ -78,6 +79,12 @@ def passed(findings: Sequence[Finding]) -> bool:
 def check_file(path: Path | str) -> list[Finding]:
     """The findings about a certificate file; InputError where there is none that can be read."""
     content, faults = read_file(path)
+    if isinstance(content, Mapping) and content.get("format") == KERNEL:  # pyright: ignore[reportUnknownMemberType]
+        try:
+            proved = kernel_check(Path(path).read_text(encoding="utf-8"))
+        except RefusedError as reason:
+            return [Finding("", "", "", "fails", str(reason))]
+        return [Finding("", one.claim.theorem, one.statement.written(), "holds", "") for one in proved]
     return [*(Finding("", "", "", "fails", fault) for fault in faults), *check(content)]
 
 
@@ -90,16 +97,10 @@ def check(content: Any) -> list[Finding]:
             shaped(content, FILE, "the file")
             former = content["format"] in FORMER
             demand(not former, f"the format is {content['format']!r}, of an earlier version: certify again")
-            demand(content["format"] in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
+            demand(content["format"] == FORMAT, f"the format is not {FORMAT!r}, nor the kernel's")
             demand(len(content["certificates"]) > 0, "there are no certificates")
         except CheckError as fault:
             return [Finding("", "", "", "fails", str(fault))]
-        if content["format"] == INVARIANT:
-            return [
-                Finding(str(given.get("name", "")), *found)
-                for given in content["certificates"]
-                for found in invariant_findings(given)
-            ]
         return [finding for given in content["certificates"] for finding in _certificate(given)]
 
 

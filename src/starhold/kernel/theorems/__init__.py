@@ -8,7 +8,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, sampling, sliding, station
+from . import attitude, invariant, sampling, sliding, station
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -26,4 +26,9 @@ THEOREMS: dict[str, Theorem] = {
     "needs more control on the circle": station.needs_more_control,
     "does not return": station.does_not_return,
     "holds another circle": station.holds_another_circle,
+    "attracts": invariant.attracts,
+    "is stable": invariant.stays,
+    "is unstable": invariant.leaves,
+    "avoids": invariant.avoids,
+    "fails": invariant.fails,
 }
