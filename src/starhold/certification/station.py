@@ -17,7 +17,7 @@ from starhold.certification.openness import assumed_away, named
 from starhold.certification.subject import described_gains
 from starhold.kernel.check import check
 from starhold.kernel.sentences import ASSUMPTIONS
-from starhold.laws.point_programs import told
+from starhold.laws.point_programs import claim_of
 from starhold.loop.closed_loop import ClosedLoop
 
 SURE = ("circling-bodies", "exact-place", "continuous-control")
@@ -38,7 +38,7 @@ def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
             claims = _rest(station)
     proof = certificate(list(station.programs.values()), station.claims) if station.claims else None
     shown = iter(check(json.dumps(proof)) if proof else ())
-    found = [_as_told(told(next(shown), circle)) if claim is None else claim for claim in claims]
+    found = [_as_told(claim_of(next(shown), circle)) if claim is None else claim for claim in claims]
     return Certificate(name or law.name, described_station(loop), named(found, loop), proof)
 
 

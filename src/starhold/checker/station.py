@@ -15,7 +15,7 @@ from starhold.kernel.numbers import RefusedError
 from starhold.kernel.programs import digest
 from starhold.kernel.sentences import ASSUMPTIONS
 from starhold.laws.catalogue import Law, catalogue
-from starhold.laws.point_programs import point_programs, point_subject, told
+from starhold.laws.point_programs import claim_of, point_programs, point_subject
 from starhold.parts.bodies.libration_point import Libration
 
 CLOSE = Fraction(1, 10**9)
@@ -100,7 +100,7 @@ def station_findings(
             continue
         one = next(shown)
         _flown(subject, one)
-        found: dict[str, Any] = told(one, subject.circle) | {"witness": {}}
+        found: dict[str, Any] = claim_of(one, subject.circle) | {"witness": {}}
         found["assumptions"] = [*found["assumptions"], *absent]
         for key, value in found.items():
             demand(claim[key] == value, f"the {key} of {claim['kind']} is not what the kernel proved")

@@ -27,18 +27,18 @@ def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: st
     def control(measurement: PointMeasurement, gains: Any, craft: Any) -> Any:
         return law.command(measurement, gains, craft, memory)[0]
 
-    found = {
+    programs = {
         "field": straight_line(nonlinear if full else linear, position=ZERO, velocity=ZERO, plant=craft),
         "law": straight_line(control, measurement=ASKED, gains=gains, craft=craft),
         "limited": straight_line(LIMITS[limit], command=ZERO, limit=0.0),
     }
     if errors := law.hook("errors"):
-        found["errors"] = straight_line(errors, measurement=ASKED, gains=gains)
+        programs["errors"] = straight_line(errors, measurement=ASKED, gains=gains)
     if law.lyapunov is not None:
-        found["lyapunov"] = straight_line(law.lyapunov, measurement=ASKED, gains=gains, craft=craft)
+        programs["lyapunov"] = straight_line(law.lyapunov, measurement=ASKED, gains=gains, craft=craft)
     if rest := law.hook("rest"):
-        found["rest"] = straight_line(rest, gains=gains)
-    return found
+        programs["rest"] = straight_line(rest, gains=gains)
+    return programs
 
 
 def point_subject(gains: Any, craft: Libration, known: Libration) -> dict[str, str]:
@@ -73,13 +73,13 @@ REFUTED = {
 _NUMBER = re.compile(r"( [+-]?\d+)+$")
 
 
-def told(proved: Proved, circle: bool) -> dict[str, Any]:
+def claim_of(proved: Proved, circle: bool) -> dict[str, Any]:
     """Return what a certificate tells of a proved claim; circle: the law is for one."""
     numbers = {name: float(x) for name, x in proved.claim.numbers.content.items()}
     kind, names = TOLD[proved.claim.theorem]
     limit = next((name for name in ("norm", "axis") if f"limit.{name}" in numbers), None)
-    found: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
-    found |= {name: numbers[name] for name in names}
+    claimed: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
+    claimed |= {name: numbers[name] for name in names}
     # Steps of one name are told of once.
     steps = dict.fromkeys((_NUMBER.sub("", name), HOWS[rule]) for name, rule in proved.shown)
     outcome, shown = "proved", [(*step, "proved", dict[str, float]()) for step in steps]
@@ -92,7 +92,7 @@ def told(proved: Proved, circle: bool) -> dict[str, Any]:
     return {
         "kind": "control-limit" if limit else kind,
         "outcome": outcome,
-        "numbers": found,
+        "numbers": claimed,
         "assumptions": [ASSUMPTIONS[name] for name in proved.statement.assumptions],
         "obligations": [dict(zip(("name", "how", "outcome", "evidence"), one, strict=True)) for one in shown],
     }
