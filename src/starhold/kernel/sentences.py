@@ -29,7 +29,7 @@ ASSUMPTIONS = {
     "quaternion-as-fed": "the quaternion that is fed back never jumps",
     "sign-at-once": "the sign of the quaternion is chosen at once",
 }
-"""What identifiers of assumptions say."""
+"""The assumption in words, by its identifier."""
 
 
 @dataclass(frozen=True)
