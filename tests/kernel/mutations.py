@@ -94,7 +94,7 @@ def of_evidence(r, content, claim):
     elif claim["evidence"]:
         part = claim["evidence"].pop(r.choice(sorted(claim["evidence"])))
         if way == "moved":
-            claim["evidence"][r.choice(["V falls", "inertia", "more", "step"])] = part
+            claim["evidence"][r.choice(["V is non-increasing", "inertia", "more", "step"])] = part
 
 
 WAYS = [of_program, of_program, of_program, of_number("numbers"), of_number("subject"), of_words, of_evidence]

@@ -102,7 +102,7 @@ CASES = {
     "turning": case(turning=faster),
     "inertia": case(feedback(-C, -K), positive, J=(-1.0,) * 3),
     "V is least on target": case(feedback(-C, -K), energy(-1.0)),
-    "V falls": case(feedback(-C)),
+    "V is non-increasing": case(feedback(-C)),
     "only equilibrium": case(hilly, hills, taken=["hysteresis"], hysteresis=0.75),
     "the other equilibrium is outside": case(level=0.5),
     "rates": case(level=0.1, fastest=0.4),

@@ -101,7 +101,7 @@ def test_false_claims_have_no_evidence(theorem, rates, V, box, numbers, level):
 
 
 def test_v_that_rises_between_two_sides_is_not_proved():
-    """V falls on both sides of x = 0, where x' jumps, but not for all means of the rates."""
+    """V decreases on both sides of x = 0, where x' jumps, but not for all means of the rates."""
 
     def rates(x, y):
         from starhold.algebra.scalar import sign

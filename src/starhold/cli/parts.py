@@ -118,13 +118,14 @@ def _find(given: str) -> Part:
     from starhold.conformance.suite import find_law
     from starhold.parts import catalogue as installed
 
-    law = any(given in group for group in _laws().values())
     if Path(given).is_file():
         try:
             law = installed.role_of(installed.read_module(Path(given))) == "law"
         except (OSError, ValueError):
             # Told by whoever reads it for good.
             law = True
+    else:
+        law = any(given in group for group in _laws().values())
     return find_law(given) if law else find_part(given)
 
 

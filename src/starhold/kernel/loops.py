@@ -23,7 +23,7 @@ from .rules import Definite, Shown, Vanishes
 
 AXES = range(3)
 OUTSIDE, MOVING, WHEELS = "outside torque", "moving target", "wheels"
-"""What a loop may be taken with: otherwise there is none."""
+"""A loop has these only where the claim takes it with them."""
 SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
 """How the sign of the quaternion that is fed back is chosen: otherwise it never changes."""
 NONE = [Poly({})] * 3

@@ -211,4 +211,4 @@ class Local:
 
 Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Definite | Exceeds | OnCells | Local
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
-"""What has to be shown, each with its name, under which the evidence stands."""
+"""Obligations, each with the name under which its evidence stands."""

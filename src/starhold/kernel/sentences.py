@@ -40,7 +40,7 @@ ASSUMPTIONS = {
     "held-aside": "held at rest along Y and Z, where no Coriolis acceleration acts along X",
     "off-the-bodies": "never at the centre of one of the two bodies",
 }
-"""What identifiers of assumptions say."""
+"""The assumption in words, by its identifier."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ body, `dice` random numbers of the part's own, `step` the number of the control 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import Scalar, Truth
@@ -158,6 +158,14 @@ class Effector(Protocol):
     def inertia_change(self, state: Any, params: Any, /) -> Matrix:
         """The inertia (3, 3; kg m2) that the whole has beyond the body's numbers as its shape changes; times the body's
         rate it belongs to the momentum."""
+        ...
+
+    def sure_torque(self, params: Any, kind: Literal["axis", "norm"], /) -> float:
+        """The torque (N m) that it surely gives on the body, in norm or about each axis at once."""
+        ...
+
+    def gives_allocated_torque(self, params: Any, /) -> bool:
+        """Whether, within its limits, the torque on the body is the one allocated to it; true where it is absent."""
         ...
 
     def record(self, state: Any, command: Any, body: State, params: Any, /) -> Any:

@@ -277,18 +277,15 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
         if value is None and f"{name}.{key}" in shared:
             value, given = shared[f"{name}.{key}"], ", by default"
         if isinstance(value, BaseModel):
-            inner = {f"{key}.{one}": getattr(value, one) for one in type(value).model_fields}
             texts = written.get(key, {})
-            for one, inner_value in inner.items():
-                if inner_value is not None:
-                    rows.append(
-                        _row(one, with_units(texts.get(one.partition(".")[2]), inner_value) or _value(inner_value), "")
-                    )
+            for name_within in type(value).model_fields:
+                if (number := getattr(value, name_within)) is not None:
+                    text = with_units(texts.get(name_within), number) or _value(number)
+                    rows.append(_row(f"{key}.{name_within}", text, ""))
         elif value is not None:
             meaning = str(properties.get(key, {}).get("description", "")).replace("^2", "²").replace("^3", "³")
             rows.append(_row(key, (with_units(written.get(key), value) or _value(value)) + given, meaning))
-    title = name.replace("_", " ")
-    return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
+    return _section(name.replace("_", " "), rows)
 
 
 def with_units(written: Any, value: Any) -> str:
@@ -308,7 +305,10 @@ def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -
         text = item.gain.choices[value] if item.gain.choices else _value(value)
         unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
         rows.append(_row(item.name, with_units(written.get(item.name), value) or text + unit, item.gain.text))
-    title = f"{fitted.part.role} {fitted.called}"
+    return _section(f"{fitted.part.role} {fitted.called}", rows)
+
+
+def _section(title: str, rows: Sequence[str]) -> str:
     return f'<section><h3>{escape(title)}</h3><table class="text"><tbody>{"".join(rows)}</tbody></table></section>'
 
 

@@ -8,6 +8,7 @@ alone, to the last bit: so a campaign may be cut into chunks anywhere.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeAlias, get_args
 
@@ -57,9 +58,9 @@ class Distribution(Table):
         return " or ".join(name for name, kind in DISTRIBUTIONS.items() if getattr(kind, flag))
 
     @property
+    @abstractmethod
     def dims(self) -> int:
-        """Uniforms that a draw takes."""
-        raise NotImplementedError
+        """The number of uniforms that a draw takes."""
 
     @property
     def bounded(self) -> bool:
@@ -73,7 +74,7 @@ class Distribution(Table):
 
     @property
     def shares(self) -> bool:
-        """Whether what is drawn are shares of what the file has."""
+        """Whether the drawn numbers are shares of the file's value."""
         return getattr(self, "relative", False)
 
     def read(self, keys: Sequence[KeyReading]) -> Self:
@@ -84,9 +85,9 @@ class Distribution(Table):
         """The numbers by parameter."""
         return {}
 
+    @abstractmethod
     def draw(self, u: Array) -> NDArray[Any]:
-        """Values (width, n) for uniforms (dims, n)."""
-        raise NotImplementedError
+        """Return values (width, n) for uniforms (dims, n)."""
 
     def size(self, rows: Sequence[Array]) -> tuple[str, Array] | None:
         """A name and a function of the drawn numbers (n,), which may matter more than they do; None where there is none."""

@@ -223,7 +223,7 @@ class Loop:
     def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
         """Return what has to be shown of V'."""
         claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
-        found = obligations(claim, self.by_digest)[0]["V falls"]
+        found = obligations(claim, self.by_digest)[0]["V is non-increasing"]
         assert isinstance(found, Squares)
         return found
 

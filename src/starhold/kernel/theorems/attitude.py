@@ -31,28 +31,28 @@ def converges(claim: Claim) -> Proof:
     Wimmer 1973), so that only a set of measure zero ends there (centre-stable manifold: Kelley 1967)."""
     loop = AttitudeLoop(claim)
     yield from least_on_target(loop)
-    said = yield from falls(loop, _damped(loop), 3)
+    said = yield from is_non_increasing(loop, _damped(loop), 3)
     yield from only_equilibrium(loop)
     return (yield from concluded(loop, said))
 
 
 def converges_strictly(claim: Claim) -> Proof:
-    """Motions end as in `converges` by a V, of whatever origin, with V' <= -c (|w|^2 + |q|^2): it falls wherever the body is
-    not at rest at q = 0 (Lyapunov)."""
+    """Motions end as in `converges` by a V, of whatever origin, with V' <= -c (|w|^2 + |q|^2): it decreases but at rest
+    at q = 0 (Lyapunov)."""
     loop = AttitudeLoop(claim)
     yield from least_on_target(loop)
     w = loop.w
     more = [*(q * x for q in loop.q for x in w), *(w[i] * w[k] for i in range(3) for k in range(i, 3))]
-    said = yield from falls(loop, [*w, *loop.q[1:], *more], 6)
+    said = yield from is_non_increasing(loop, [*w, *loop.q[1:], *more], 6)
     return (yield from concluded(loop, said, strictly=True))
 
 
 def converges_whatever_the_inertia(claim: Claim) -> Proof:
-    """Motions end as in `converges` for every inertia of the body, whatever the law is told of it: V is the kinetic energy,
-    of whatever inertia, and a function of the attitude."""
+    """Motions end as in `converges` for every inertia of the body, while the law's own numbers stay: V is the kinetic energy
+    of that inertia and a function of the attitude."""
     loop = AttitudeLoop(claim, any_inertia=True)
     yield from least_on_target(loop)
-    said = yield from falls(loop, _damped(loop), 3)
+    said = yield from is_non_increasing(loop, _damped(loop), 3)
     yield from only_equilibrium(loop)
     return (yield from concluded(loop, said))
 
@@ -65,14 +65,14 @@ def converges_evenly(claim: Claim) -> Proof:
 
 
 def converges_evenly_whatever_the_inertia(claim: Claim) -> Proof:
-    """Motions end as in `converges_evenly` for every inertia of the body, whatever the law is told of it."""
+    """Motions end as in `converges_evenly` for every inertia of the body, while the law's own numbers stay."""
     return (yield from _evenly(AttitudeLoop(claim, any_inertia=True)))
 
 
 def _evenly(loop: AttitudeLoop) -> Proof:
     own, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), loop.claim.numbers.get("level")
     yield from least_on_target(loop, own)
-    said = yield from falls(loop, _damped(loop), 3)
+    said = yield from is_non_increasing(loop, _damped(loop), 3)
     pull = -dot(own, loop.balance(loop.u)).at(loop.still)
     yield "rests at half turns only", Squares(pull.over("q0"), own, 3, modulo=[loop.sphere])
     demand(all(len(m) == 2 and "q0" not in m for m in resting.terms), "V at rest is no form of q1, q2, q3")
@@ -103,7 +103,7 @@ def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
         yield "V is least on target", Squares(loop.lyapunov, z, len(z), modulo=[loop.sphere])
 
 
-def falls(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
+def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
     """V' <= -c times the squares of the first of z, everywhere or, with a level, on {V <= level}, which is then not left; if
     `fastest` is told, there the rate is at most that."""
     numbers, V = loop.claim.numbers, loop.lyapunov
@@ -124,7 +124,7 @@ def falls(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
         slope = loop.slopes_along(V, NOTHING) + dot(loop.w, motion)
     else:
         slope = loop.slopes_along(V, loop.acceleration)
-    yield "V falls", Squares(-slope, z, least, known, [loop.sphere])
+    yield "V is non-increasing", Squares(-slope, z, least, known, [loop.sphere])
     return said
 
 

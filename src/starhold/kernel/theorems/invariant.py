@@ -57,7 +57,7 @@ class Function:
 
     def confined(self, most: Fraction | int = 0) -> Shown:
         """{V <= l} is compact and inside of the box for each l < level, and M is as told and not empty: V >= level all
-        over the border, and where there is none V is larger than even powers. Where V falls as long as it is positive,
+        over the border, and where there is none V is larger than even powers. Where V decreases as long as it is positive,
         M is not empty if any state has V < level: it has what the least V is reached at."""
         system = self.system
         demand(self.level is None or self.level > 0, "a level is not positive")
@@ -78,7 +78,7 @@ class Function:
                     yield f"border {self.place} {i} {x} {k}", above
 
     def changes(self, strictly: bool = True) -> Shown:
-        """V falls all the time where 0 < V < level, or (not strictly) does not grow there.
+        """V decreases all the time where 0 < V < level, or (not strictly) does not grow there.
 
         Almost always V' = grad V_i.v for every cell i that holds the state, with a mean v of the rates of all that do,
         and v is along each surface m that does. So it is enough that (grad V_i - c grad m).f_j < 0 for one i and every j,

@@ -87,7 +87,7 @@ def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]
 
 
 def falls(loop: PointLoop, circle: Circle) -> Shown:
-    """V falls on every side of the law, as `ends_on_circle` says, and x returns."""
+    """V decreases on every side of the law, as `ends_on_circle` says, and x returns."""
     V, wrong = dot(circle.weights, [p * p for p in circle.errors]), circle.errors[1:]
     near = [side for side in loop.sides if circle.inverse not in asked(loop, side)]
     demand(len(near) == 1, "not one side of the law holds the circle")
@@ -101,7 +101,7 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
             demand(far(circle, side) > 0, "the law may have no bound on a side")
         slope = -circle.met(loop.along(V, motion)) if away else -loop.along(V, motion)
         z, known = ([poly(1)], [circle.met(p) for p in side.known]) if away else (wrong, [])
-        yield f"V falls {k}", Squares(slope, z, len(z), known)
+        yield f"V decreases {k}", Squares(slope, z, len(z), known)
     stays = [loop.along(p, loop.acceleration(near[0])).at(circle.running) for p in wrong]
     yield "only the circle", Solves(stays, [circle.errors[0] * p for p in loop.x[1:]])
     yield "x returns", Contracts([[Fraction(0), Fraction(1)], [a, b]], flow=True)

@@ -69,7 +69,7 @@ class Heading(NamedTuple):
 
 
 Block: TypeAlias = Table | Heading | str
-"""What is shown as a whole; "" is an empty line."""
+"""A block is shown as a whole; "" is an empty line."""
 
 
 class Result(NamedTuple):
