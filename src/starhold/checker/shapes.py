@@ -94,6 +94,10 @@ FILE: dict[str, Test] = {
     "versions": lambda x: _object(x) and all(map(_text, x.values())),
     "certificates": _list(_object),
 }
+PROVED_FILE: dict[str, Test] = {**FILE, "note": _text, "programs": _object, "claims": _list(_object)}
+"""A file that may hold proofs."""
+PROVED: dict[str, Test] = {"kind": _text, "outcome": _one("proved"), "proof": lambda x: type(x) is int and x >= 0}
+"""A claim that the file has a proof of, by its place."""
 CERTIFICATE: dict[str, Test] = {
     "name": lambda x: _text(x) and len(x) <= 1_000,
     "outcome": _OUTCOME,

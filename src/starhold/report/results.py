@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from starhold.certification.certificate import FILE as CERTIFICATES
+from starhold.certification.certificate import KERNEL
 from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished
@@ -29,7 +30,7 @@ SUMMARY, PAGE = "summary.json", "report.html"
 INDEX = "index.html"
 EXPORT = "export.json"
 STUDIED = tuple(f"{name}.{kind}" for name in commands.names() for kind in ("csv", "png"))
-MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, "invariant.png", *STUDIED)
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, "invariant.png", *STUDIED)
 """A folder with one of these holds results."""
 
 
@@ -122,10 +123,15 @@ def write_result(result: commands.Result, name: str, scenario: Scenario, law: st
 
 
 def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:
-    """Certificates as one file of a folder; returns its path."""
+    """Certificates as one file of a folder, and beside it the kernel that checks those with proofs; returns its path."""
+    from starhold.certification.evidence.bundle import kernel_bundle
+
     path = folder / CERTIFICATES
     with atomic_write(path) as hidden:
         write_certificates(certificates, name, hidden)
+    if any(claim.proof for certificate in certificates for claim in certificate.claims):
+        with atomic_write(folder / KERNEL) as hidden:
+            hidden.write_bytes(kernel_bundle())
     return path
 
 

@@ -11,6 +11,8 @@ from ..polynomials import Poly, dot, poly, variables
 from ..rules import Exceeds, Obligation, Squares
 from ..sentences import Statement, above, below, enumerated
 
+TORQUE = "torque-limit"
+
 
 def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, Statement]:
     """On {V <= level}, with everything from outside at most as told: each component of the torque is at most `limit` in size
@@ -53,7 +55,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     told = f"with {enumerated(bounds)} " if bounds else ""
     assumptions = ("bounded-momentum",) if loop.wheels else ()
     if not motors:
-        return Statement(told + enumerated(said), (*assumptions, *(["unlimited-wheels"] if loop.wheels else [])))
+        return Statement(told + enumerated(said), (*assumptions, *(["unlimited-wheels"] if loop.wheels else [])), TORQUE)
     shares, held = allocated(loop)
     for k, (share, own) in enumerate(zip(shares, held, strict=True)):
         for name, load, most in (
@@ -61,26 +63,30 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
             # The rotor's momentum changes by share.(torque), the wheels' together by its negative.
             ("wheel", own - dot(share, loop.stored), numbers[f"stored.{k}"]),
         ):
+            if name == "motor" and not any(share):
+                continue
             yield f"limit of {name} {k}", Exceeds(most)
             for sign in (1, -1):
                 yield f"{name} {sign * (k + 1):+d}", Squares(most - sign * load, z, 0, known, [loop.sphere])
     torques, momenta = (", ".join(above(numbers[f"{n}.{k}"]) for k in range(len(shares))) for n in ("motors", "stored"))
     said.append(f"motors give no more than {torques} N m and wheels store no more than {momenta} N m s")
-    return Statement(told + enumerated(said), assumptions)
+    return Statement(told + enumerated(said), assumptions, "wheels")
 
 
 def allocated(loop: AttitudeLoop) -> tuple[list[list[Fraction]], list[Fraction]]:
     """Return for each wheel its share of the body's torque, and the momentum that it keeps whatever the body does.
 
     With the axes as columns of A the shares are the rows of L = -A'(AA')^-1, which give the torque, -ALu = u, with the
-    least sum of squares. As the rotors' momenta have p' = Lu and together h = Ap, p + Lh does not change."""
-    subject = loop.claim.subject
+    least sum of squares. As the rotors' momenta have p' = Lu and together h = Ap, p + Lh does not change. A motor that is
+    told to give nothing has no share, and its wheel keeps what it stores."""
+    subject, numbers = loop.claim.subject, loop.claim.numbers
     demand(loop.wheels, "the loop is taken without wheels")
     count = next(k for k in range(1000) if f"wheel.{k}.axis.0" not in subject)
     axes = [[subject[f"wheel.{k}.axis.{i}"] for i in range(3)] for k in range(count)]
-    square = times(transpose(axes), axes) if axes else [[Fraction(0)] * 3] * 3
+    driven = [axis if numbers[f"motors.{k}"] != 0 else [Fraction(0)] * 3 for k, axis in enumerate(axes)]
+    square = times(transpose(driven), driven) if axes else [[Fraction(0)] * 3] * 3
     demand(definite(square), "the wheels do not act about three axes")
-    shares = [[-x for x in row] for row in times(axes, inverse(square))]
+    shares = [[-x for x in row] for row in times(driven, inverse(square))]
     begun = [subject[f"wheel.{k}.momentum"] for k in range(count)]
     stored = [sum((a[i] * p for a, p in zip(axes, begun, strict=True)), Fraction(0)) for i in range(3)]
     return shares, [

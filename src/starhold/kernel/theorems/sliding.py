@@ -13,6 +13,7 @@ from ..programs import Case
 from ..reading import Claim
 from ..rules import Definite, Exceeds, Obligation, Shown, Squares, Vanishes
 from ..sentences import Statement, above, below
+from .attitude import contents
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,8 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
             "the sign never changes",
             Exceeds(low * k * k, max(2 * level, numbers["inertia.high"] * squares if squares else 0)),
         )
-        begun = f"{{s.Js/2 <= {below(level)}}}"
+        held = yield from contents(loop, dot(s, apply(loop.J, s)) * Fraction(1, 2))
+        begun = " ".join([f"{{s.Js/2 <= {below(level)}}}", *(f"({part})" for part in held)])
     text = f"from {begun} the motion {said} the law's surface and {ending}"
     torque = "bounded-outside-torque" if loop.outside else "no-outside-torque"
     target = "known-target" if loop.moving else "target-at-rest"
@@ -72,6 +74,7 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     return Statement(
         text,
         (*assumptions, "unlimited-torque", torque, target, "no-wheels", "sign-at-once" if signed else "quaternion-as-fed"),
+        "sliding",
     )
 
 
@@ -141,7 +144,7 @@ def ending_in_the_layer(loop: AttitudeLoop, squares: Fraction, K: Rows) -> Gener
     """Show where motions end in a boundary layer."""
     numbers = loop.claim.numbers
     low, high, k, steep = (numbers[name] for name in ("inertia.low", "inertia.high", "surface.low", "surface.high"))
-    size, angle, rate = numbers["surface"], numbers["angle"], numbers["rate"]
+    size, angle, rate = numbers["surface"], numbers["end.angle"], numbers["end.rate"]
     demand(min(high, steep, size, angle, 3 - angle) > 0, "a bound is not positive, or an angle too large")
     yield from bounded(loop, K)
     J: Rows = [[poly(x).number for x in row] for row in loop.J]
