@@ -39,6 +39,8 @@ CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "c
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 WRITTEN: dict[str, float | None] = {"stiffness": None, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
 """The numbers of a V that is the law's own."""
+NEAR = 1.1
+"""How many times the least level those of other limits may be, to be looked at again."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
 """Shares of a largest level that are given away, for at the largest the matrices are singular."""
 
@@ -310,9 +312,12 @@ class Loop:
         for _ in range(3):
             scales = self.scales(V, level if isfinite(level) else None)
             found = [highest(o, scales) for o in limits]
-            if any(x is None or x <= 0.0 for x in found):
+            known = [x for x in found if x is not None and x > 0.0]
+            if len(known) < len(found):
                 return None
-            level = min(cap, *(x for x in found if x is not None)) if found else cap
+            level = min(cap, *known) if found else cap
+            # Scales change what is found by little: the others stay higher.
+            limits = [o for o, x in zip(limits, known, strict=True) if x < NEAR * level]
         return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from importlib import import_module
 from itertools import combinations_with_replacement
 from typing import Any
@@ -99,9 +100,15 @@ def degree(p: Poly) -> int:
 
 def posed(p: Poly, known: list[Poly], others: list[Poly], z: Sequence[Poly]) -> Problem:
     """Return the problem of finding multipliers of what is known, factors of the others and a Gram matrix."""
-    pairs = [(i, k) for k in range(len(z)) for i in range(k + 1)]
-    grams = [z[i] * z[k] * (1 if i == k else 2) for i, k in pairs]
+    pairs, grams = products(tuple(tuple(sorted(p.terms.items())) for p in z))
     return Problem(p, [*known, *others, *grams], len(known), pairs, z)
+
+
+@cache
+def products(z: tuple[tuple[tuple[Monomial, Fraction], ...], ...]) -> tuple[list[tuple[int, int]], list[Poly]]:
+    """Return the places of a Gram matrix's upper triangle, and what its entries stand before."""
+    parts, pairs = [Poly(dict(terms)) for terms in z], [(i, k) for k in range(len(z)) for i in range(k + 1)]
+    return pairs, [parts[i] * parts[k] * (1 if i == k else 2) for i, k in pairs]
 
 
 def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly] = ()) -> tuple[Any, Any, Any]:

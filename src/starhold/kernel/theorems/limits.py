@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from fractions import Fraction
 
 from ..loops import AttitudeLoop
@@ -24,7 +24,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     motors = "motors.0" in numbers or "stored.0" in numbers
     if limit is None and norm is None and not motors:
         return Statement("", ("unlimited-torque", *(["unlimited-wheels"] if loop.wheels else [])))
-    known, z = list[Poly](), [poly(1), *loop.q, *loop.w]
+    known, z, bounded = list[Poly](), [poly(1), *loop.q, *loop.w], list[Poly]()
     if loop.outside:
         outside = [numbers[f"outside.{k}"] for k in range(3)]
         demand(min(outside) >= 0, "a bound is negative")
@@ -38,19 +38,25 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         if taken:
             most = numbers[name]
             demand(most >= 0, "a bound is negative")
-            known, z = [*known, most * most - dot(vector, vector)], [*z, *vector]
+            known, bounded = [*known, most * most - dot(vector, vector)], [*bounded, *vector]
             bounds.append(text.format(below(most)))
     known.append(numbers["level"] - loop.lyapunov)
+
+    def within(limit: Fraction, load: Poly, more: Sequence[Poly] = (), units: Sequence[Poly] = ()) -> Squares:
+        # Of what is bounded from outside only what the load depends on.
+        own = [x for x in bounded if x.names <= load.names]
+        return Squares(limit - load, [*z, *own, *more], 0, known, [loop.sphere, *units])
+
     if limit is not None:
         for axis, u in enumerate(loop.u):
             for sign in (1, -1):
-                yield f"torque {sign * (axis + 1):+d}", Squares(limit - sign * u, z, 0, known, [loop.sphere])
+                yield f"torque {sign * (axis + 1):+d}", within(limit, sign * u)
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if norm is not None:
         # |u| <= limit where d.u <= limit for every unit vector d.
         d = variables("d")
-        wide = [*z, *d, *(x * w for x in d for w in loop.w)]
-        yield "norm of the torque", Squares(norm - dot(d, loop.u), wide, 0, known, [loop.sphere, dot(d, d) - 1])
+        more = [*d, *(x * w for x in d for w in loop.w)]
+        yield "norm of the torque", within(norm, dot(d, loop.u), more, [dot(d, d) - 1])
         said.append(f"the law asks for a torque of no more than {above(norm)} N m")
     told = f"with {enumerated(bounds)} " if bounds else ""
     assumptions = ("bounded-momentum",) if loop.wheels else ()
@@ -67,7 +73,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
                 continue
             yield f"limit of {name} {k}", Exceeds(most)
             for sign in (1, -1):
-                yield f"{name} {sign * (k + 1):+d}", Squares(most - sign * load, z, 0, known, [loop.sphere])
+                yield f"{name} {sign * (k + 1):+d}", within(most, sign * load)
     torques, momenta = (", ".join(above(numbers[f"{n}.{k}"]) for k in range(len(shares))) for n in ("motors", "stored"))
     said.append(f"motors give no more than {torques} N m and wheels store no more than {momenta} N m s")
     return Statement(told + enumerated(said), assumptions, "wheels")

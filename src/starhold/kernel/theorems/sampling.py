@@ -68,5 +68,5 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
         yield "another step", Contracts(step(other))
         said += f", and it is stable for a period of {below(other)} s"
     demand(not claim.taken.content, "the loop is taken with nothing")
-    assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators", "unlimited-torque")
+    assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
     return Statement(said, (*assumptions, "no-outside-torque", "target-at-rest", "no-wheels", "linear-motion"), "sampling")
