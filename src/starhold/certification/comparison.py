@@ -36,7 +36,7 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     exactly = {"period": loop.period, "hysteresis": loop.hysteresis_width}
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
-    most: dict[str, float] = dict.fromkeys(("limit", "limit.norm"), loop.craft.torque_limit)
+    most = {"limit": float(loop.craft.torque_limit), "limit.norm": float(loop.craft.torque_limit)}
     if wheels is not None:
         most |= {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit)}
         most |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit)}

@@ -27,7 +27,6 @@ from starhold.checker.shapes import (
     NUMBERS,
     OBLIGATION,
     PROVED,
-    PROVED_FILE,
     STATION,
     SUBJECT,
     UNKNOWN_BODY,
@@ -95,28 +94,35 @@ def check(content: Any) -> list[Finding]:
     with ctx.workprec(BITS), np.errstate(all="ignore"):
         try:
             shallow(content)
-            shaped(content, PROVED_FILE if isinstance(content, Mapping) and "claims" in content else FILE, "the file")
-            kind = content["format"]
-            demand(kind not in FORMER, f"the format is {kind!r}, of an earlier version: certify again")
-            demand(kind in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
-            demand((kind == FORMAT) == ("claims" in content), f"a file of the format {kind!r} has other keys")
-            demand(len(content["certificates"]) > 0, "there are no certificates")
-            if kind == INVARIANT:
-                return [
-                    Finding(str(given.get("name", "")), *found)
-                    for given in content["certificates"]
-                    for found in invariant_findings(given)
-                ]
-            proofs = _proofs(content)
+            kind = _kind(content)
+            proofs = [] if kind == INVARIANT else _proofs(content)
         except CheckError as fault:
             return [Finding("", "", "", "fails", str(fault))]
+        if kind == INVARIANT:
+            return [
+                Finding(str(given.get("name", "")), *found)
+                for given in content["certificates"]
+                for found in invariant_findings(given)
+            ]
         return [finding for given in content["certificates"] for finding in _certificate(given, proofs)]
 
 
-def _proofs(content: Mapping[str, Any]) -> list[Proved]:
+def _kind(content: Any) -> str:
+    """The format of a file, which has what one of that format has."""
+    given: Any = content["format"] if isinstance(content, Mapping) and "format" in content else None
+    demand(given not in FORMER, f"the format is {given!r}, of an earlier version: certify again")
+    shaped(content, FILE, "the file")
+    demand(given in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
+    demand(len(content["certificates"]) > 0, "there are no certificates")
+    return given
+
+
+def _proofs(content: Any) -> list[Proved]:
     """What the kernel proves of a file, each claim of which has to be told of once, in order."""
-    listed = [given["claims"] for given in content["certificates"] if isinstance(given.get("claims"), list)]
-    told = [claim["proof"] for claims in listed for claim in claims if isinstance(claim, Mapping) and "proof" in claim]
+    listed: list[Any] = [given["claims"] for given in content["certificates"] if isinstance(given.get("claims"), list)]
+    told: list[Any] = [
+        claim["proof"] for claims in listed for claim in claims if isinstance(claim, dict) and "proof" in claim
+    ]
     demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
     if not told:
         demand(not content["programs"], "there are programs without a proof")
@@ -190,7 +196,7 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
 def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, str]]:
     """What the kernel found of a claim with a proof; numbers and assumptions are those of the proof alone."""
     shaped(claim, PROVED, "the claim")
-    proved = proofs[claim["proof"]]
+    proved = proofs[int(claim["proof"])]
     demand(proved.statement.label == claim["kind"], f"the proof is of another kind of claim: {proved.statement.label}")
     names = dict.fromkeys(name.rstrip("+-0123456789 ") for name, _ in proved.shown)
     return [(name, "holds", BY_THE_KERNEL) for name in names]

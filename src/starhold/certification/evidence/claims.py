@@ -73,7 +73,8 @@ def find_sampled(loop: Loop) -> None:
 
 def longest_stable(J: Any, C: Any, K: Any, period: float) -> float:
     """Return a period near the longest, from a stable one on, that floats find all stable up to."""
-    pull, one, none = np.linalg.solve(J, np.hstack([C, K])), np.eye(3), np.zeros((3, 3))
+    pull: Any = np.linalg.solve(J, np.hstack([C, K]))
+    one, none = np.eye(3), np.zeros((3, 3))
 
     def stable(h: float) -> bool:
         step = np.block([[one, none], [0.5 * h * one, one]]) - np.vstack([h * pull, 0.25 * h * h * pull])
