@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from flint import ctx
@@ -109,12 +109,13 @@ def check(content: Any) -> list[Finding]:
 
 def _kind(content: Any) -> str:
     """The format of a file, which has what one of that format has."""
-    given: Any = content["format"] if isinstance(content, Mapping) and "format" in content else None
+    table = cast(dict[str, Any], content if isinstance(content, dict) else {})
+    given: Any = table.get("format")
     demand(given not in FORMER, f"the format is {given!r}, of an earlier version: certify again")
     shaped(content, FILE, "the file")
     demand(given in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
-    demand(len(content["certificates"]) > 0, "there are no certificates")
-    return given
+    demand(len(table["certificates"]) > 0, "there are no certificates")
+    return str(given)
 
 
 def _proofs(content: Any) -> list[Proved]:

@@ -14,7 +14,7 @@ from .programs import Program
 FORMAT = "starhold certificate 3"
 ASIDE = {"certificates", "note", "scenario", "versions"}
 """What a certificate may hold beside proofs, and the kernel does not read."""
-BYTES, CLAIMS, NUMBERS = 8_000_000, 50, 2_000
+BYTES, CLAIMS, NUMBERS = 8_000_000, 500, 2_000
 _T = TypeVar("_T")
 
 
@@ -93,9 +93,15 @@ def _claim(given: Any, programs: Told[Program]) -> Claim:
         Told("words", dict.fromkeys(taken, True)),
         Told("programs", _table(roles, lambda name: programs[name if isinstance(name, str) else ""])),
         Told("subject", _table(subject, rational)),
-        Told("numbers", _table(numbers, rational)),
+        Told("numbers", _table(numbers, _bound)),
         Told("evidence", _table(evidence, lambda part: part)),
     )
+
+
+def _bound(given: Any) -> Fraction:
+    found = rational(given)
+    demand(found >= 0, "a number of a claim is negative")
+    return found
 
 
 def _table(given: Any, read: Callable[[Any], _T]) -> dict[str, _T]:

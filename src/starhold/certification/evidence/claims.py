@@ -71,9 +71,9 @@ def find_sampled(loop: Loop) -> None:
     loop.try_to_show(loop.claim(SAMPLED, [], None, **told), {})
 
 
-def longest_stable(J: Any, C: Any, K: Any, period: float) -> float:
+def longest_stable(J: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64], period: float) -> float:
     """Return a period near the longest, from a stable one on, that floats find all stable up to."""
-    pull: Any = np.linalg.solve(J, np.hstack([C, K]))
+    pull = np.asarray(np.linalg.solve(J, np.hstack([C, K])), dtype=np.float64)
     one, none = np.eye(3), np.zeros((3, 3))
 
     def stable(h: float) -> bool:

@@ -26,9 +26,7 @@ Part: TypeAlias = Generator[tuple[str, Obligation], None, list[str]]
 def converges(claim: Claim) -> Proof:
     """Every motion comes to rest on target, or, almost never, on the other quaternion of the same attitude.
 
-    V is least on target and proper; V' <= -c |w|^2; at rest the law's torque vanishes with q alone (LaSalle 1960). Around
-    q0 = -1 the linear motion has an unstable direction, for V is at its highest at rest there (inertia theorem: Chen and
-    Wimmer 1973), so that only a set of measure zero ends there (centre-stable manifold: Kelley 1967)."""
+    V' <= -c |w|^2 (LaSalle 1960); the other rest is unstable, for V at rest is highest there (Chen and Wimmer 1973)."""
     loop = AttitudeLoop(claim)
     yield from least_on_target(loop)
     said = yield from falls(loop, _damped(loop), 3)
@@ -58,9 +56,7 @@ def converges_whatever_the_inertia(claim: Claim) -> Proof:
 
 
 def converges_evenly(claim: Claim) -> Proof:
-    """Every motion comes to rest on target, on either quaternion, or at a half turn, each of which is unstable: V at rest is
-    a quadratic form of q1, q2, q3, and -q.(torque at rest) is q0 times another, both positive definite. So the body rests
-    where q = 0 or q0 = 0; and turned from a half turn towards the target V is lower, so that the motion does not return."""
+    """Every motion comes to rest on target, on either quaternion, or at a half turn, each of which is unstable."""
     return (yield from _evenly(AttitudeLoop(claim)))
 
 
@@ -114,7 +110,6 @@ def falls(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
     if fastest is not None:
-        demand(fastest > 0, "a rate is not positive")
         slow = fastest * fastest - dot(loop.w, loop.w)
         yield "rates", Squares(slow, [poly(1), *loop.q, *loop.w], 0, [numbers["level"] - V], [loop.sphere])
         known = [slow * w * w for w in loop.w]
@@ -198,7 +193,6 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part:
         return [loop.q[0] - cosine, *([loop.q[0] * loop.q[0] - cosine * cosine] if cosine >= 0 else [])]
 
     def slow(rate: Fraction) -> list[Poly]:
-        demand(rate >= 0, "a rate is negative")
         return [rate * rate - dot(loop.w, loop.w)]
 
     if level is None:

@@ -27,7 +27,6 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     known, z, bounded = list[Poly](), [poly(1), *loop.q, *loop.w], list[Poly]()
     if loop.outside:
         outside = [numbers[f"outside.{k}"] for k in range(3)]
-        demand(min(outside) >= 0, "a bound is negative")
         known += [most - sign * e for most, e in zip(outside, loop.e, strict=True) for sign in (1, -1)]
         bounds.append(f"a torque from outside of up to {', '.join(map(below, outside))} N m about the axes")
     for name, taken, vector, text in (
@@ -37,7 +36,6 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     ):
         if taken:
             most = numbers[name]
-            demand(most >= 0, "a bound is negative")
             known, bounded = [*known, most * most - dot(vector, vector)], [*bounded, *vector]
             bounds.append(text.format(below(most)))
     known.append(numbers["level"] - loop.lyapunov)

@@ -46,7 +46,6 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     push = [[poly(x).number for x in row] for row in loop.J_inverse]
     h, radius = claim.numbers["period"], claim.numbers["radius"]
     longest, other = claim.numbers.get("longest"), claim.numbers.get("other")
-    demand(min(h, radius, h if other is None else other) > 0, "a period or a radius is not positive")
     held = times(push, [[*a, *b] for a, b in zip(C, K, strict=True)])
 
     def step(h: Fraction) -> Rows:
