@@ -5,7 +5,7 @@ from pathlib import Path
 
 import starhold.checker
 
-ALLOWED = tuple(f"starhold.{part}" for part in ("checker.", "algebra.", "laws.", "parts.", "errors"))
+ALLOWED = tuple(f"starhold.{part}" for part in ("checker.", "algebra.", "laws.", "parts.", "kernel.", "errors"))
 
 
 def modules_of(path):

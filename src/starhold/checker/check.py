@@ -4,11 +4,12 @@ number and condition anew from the law's and the models' equations, by other met
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from flint import ctx
@@ -25,6 +26,7 @@ from starhold.checker.shapes import (
     HOWS,
     NUMBERS,
     OBLIGATION,
+    PROVED,
     STATION,
     SUBJECT,
     UNKNOWN_BODY,
@@ -36,9 +38,12 @@ from starhold.checker.shapes import (
 from starhold.checker.station import STATION_CLAIMS, StationSubject, read_station, station_refutation
 from starhold.checker.subject import LoopSubject, read_subject
 from starhold.checker.torque import never_beyond
+from starhold.kernel.check import Proved
+from starhold.kernel.check import check as prove_all
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.reading import FORMAT
 
-FORMAT = "starhold certificate 2"
-FORMER = ("starhold certificate 1", "starhold invariant certificate 1")
+FORMER = ("starhold certificate 1", "starhold certificate 2", "starhold invariant certificate 1")
 """Formats of earlier versions, whose keys had other names."""
 ENDS = (
     "convergence",
@@ -53,6 +58,8 @@ ENDS = (
     "hand-over",
 )
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
+BY_THE_KERNEL = "proved by the kernel"
+"""The reason of findings about claims with a proof."""
 READ_BY = {"disturbance": {"disturbance", "sliding"}, "switch": {"hand-over"}}
 """Entries of a subject that are allowed only beside a claim of one of these kinds, which alone read them."""
 BITS = 192
@@ -87,23 +94,47 @@ def check(content: Any) -> list[Finding]:
     with ctx.workprec(BITS), np.errstate(all="ignore"):
         try:
             shallow(content)
-            shaped(content, FILE, "the file")
-            former = content["format"] in FORMER
-            demand(not former, f"the format is {content['format']!r}, of an earlier version: certify again")
-            demand(content["format"] in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
-            demand(len(content["certificates"]) > 0, "there are no certificates")
+            kind = _kind(content)
+            proofs = [] if kind == INVARIANT else _proofs(content)
         except CheckError as fault:
             return [Finding("", "", "", "fails", str(fault))]
-        if content["format"] == INVARIANT:
+        if kind == INVARIANT:
             return [
                 Finding(str(given.get("name", "")), *found)
                 for given in content["certificates"]
                 for found in invariant_findings(given)
             ]
-        return [finding for given in content["certificates"] for finding in _certificate(given)]
+        return [finding for given in content["certificates"] for finding in _certificate(given, proofs)]
 
 
-def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
+def _kind(content: Any) -> str:
+    """The format of a file, which has what one of that format has."""
+    table = cast(dict[str, Any], content if isinstance(content, dict) else {})
+    given: Any = table.get("format")
+    demand(given not in FORMER, f"the format is {given!r}, of an earlier version: certify again")
+    shaped(content, FILE, "the file")
+    demand(given in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
+    demand(len(table["certificates"]) > 0, "there are no certificates")
+    return str(given)
+
+
+def _proofs(content: Any) -> list[Proved]:
+    """What the kernel proves of a file, each claim of which has to be told of once, in order."""
+    listed: list[Any] = [given["claims"] for given in content["certificates"] if isinstance(given.get("claims"), list)]
+    told: list[Any] = [
+        claim["proof"] for claims in listed for claim in claims if isinstance(claim, dict) and "proof" in claim
+    ]
+    demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
+    if not told:
+        demand(not content["programs"], "there are programs without a proof")
+        return []
+    try:
+        return prove_all(json.dumps(content))
+    except RefusedError as fault:
+        raise CheckError(f"refused by the kernel: {fault}") from None
+
+
+def _certificate(given: Mapping[str, Any], proofs: Sequence[Proved]) -> Iterator[Finding]:
     name = str(given.get("name", ""))
     about = given.get("subject")
     if isinstance(about, Mapping) and "body" in about:
@@ -116,11 +147,12 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
         return
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
-        proofs, fault = _guarded(partial(_claim, subject, _absent(given["subject"], claim), claim))
-        if proofs is None:
+        work = partial(_proved, proofs, claim) if "proof" in claim else partial(_claim, subject, given["subject"], claim)
+        found, fault = _guarded(work)
+        if found is None:
             yield Finding(name, kind, "", "fails", fault)
             continue
-        for obligation, verdict, reason in proofs:
+        for obligation, verdict, reason in found:
             yield Finding(name, kind, obligation, verdict, reason)
     if not given["claims"]:
         yield Finding(name, "", "", "not claimed", "there are no claims")
@@ -162,15 +194,25 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
     return (read_station if station else read_subject)(given["subject"])
 
 
+def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, str]]:
+    """What the kernel found of a claim with a proof; numbers and assumptions are those of the proof alone."""
+    shaped(claim, PROVED, "the claim")
+    proved = proofs[int(claim["proof"])]
+    demand(proved.statement.label == claim["kind"], f"the proof is of another kind of claim: {proved.statement.label}")
+    names = dict.fromkeys(name.rstrip("+-0123456789 ") for name, _ in proved.shown)
+    return [(name, "holds", BY_THE_KERNEL) for name in names]
+
+
 def _absent(subject: Mapping[str, Any], claim: Any) -> list[str]:
     """The parts of the loop that a claim is not about; torques with a bound are among them where it is not about such."""
     bounded: list[str] = [] if claim.get("kind") == "disturbance" else subject.get("bounded_away", [])
     return [*subject["assumed_away"], *bounded]
 
 
-def _claim(subject: LoopSubject | StationSubject, absent: Sequence[str], claim: Any) -> list[tuple[str, Verdict, str]]:
-    """Verdict and reason for each obligation of a claim."""
+def _claim(subject: LoopSubject | StationSubject, about: Mapping[str, Any], claim: Any) -> list[tuple[str, Verdict, str]]:
+    """Verdict and reason for each obligation of a claim without a proof, about a subject as the file tells it."""
     shaped(claim, CLAIM, "the claim")
+    absent = _absent(about, claim)
     kinds = STATION_CLAIMS if isinstance(subject, StationSubject) else CLAIMS
     demand(claim["kind"] in kinds, f"there is no kind of claim {claim['kind']} about such a loop")
     for obligation in claim["obligations"]:

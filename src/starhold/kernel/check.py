@@ -10,35 +10,39 @@ from .reading import BYTES, Claim, read_certificate
 from .sentences import Statement
 from .theorems import THEOREMS
 
+UNREAD = "The programs were not compared with those of a scenario; what stands under 'certificates' was not read."
+
 
 @dataclass(frozen=True)
 class Proved:
-    """A claim that is proved, and what it says."""
+    """A claim that is proved, what it says, and the obligations that were checked, each with the name of its rule."""
 
     claim: Claim
     statement: Statement
+    shown: tuple[tuple[str, str], ...]
 
 
 def check(text: str) -> list[Proved]:
     """Return what a certificate proves; RefusedError where any of its claims is not proved."""
     Account.open()
-    return [Proved(claim, prove(claim)) for claim in read_certificate(text)]
+    return [prove(claim) for claim in read_certificate(text)]
 
 
-def prove(claim: Claim) -> Statement:
-    """Check each obligation of a claim's theorem, and return what the theorem then says."""
+def prove(claim: Claim) -> Proved:
+    """Check each obligation of a claim's theorem; RefusedError where one is not shown."""
     demand(claim.theorem in THEOREMS, "there is no such theorem")
-    shown = THEOREMS[claim.theorem](claim)
+    needed, shown = THEOREMS[claim.theorem](claim), list[tuple[str, str]]()
     while True:
         try:
-            name, obligation = next(shown)
+            name, obligation = next(needed)
         except StopIteration as end:
             claim.close()
-            return end.value
+            return Proved(claim, end.value, tuple(shown))
         try:
             obligation.check(claim.evidence.get(name))
         except RefusedError as fault:
             raise RefusedError(f"{claim.theorem}, {name}: {fault}") from None
+        shown.append((name, type(obligation).__name__))
 
 
 def main(arguments: list[str]) -> int:
@@ -50,7 +54,7 @@ def main(arguments: list[str]) -> int:
     except (RefusedError, OSError, UnicodeDecodeError, RecursionError, MemoryError) as fault:
         print(f"refused: {' '.join(str(fault).split()) or type(fault).__name__}")
         return 1
-    print("The programs were not compared with those of a scenario.", *lines, sep="\n")
+    print(UNREAD, *lines, sep="\n")
     return 0
 
 
