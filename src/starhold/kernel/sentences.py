@@ -27,6 +27,8 @@ ASSUMPTIONS = {
     "bounded-momentum": "body and wheels have no more momentum together than told",
     "linear-motion": "the motion is linear, as it is near rest",
     "quaternion-as-fed": "the quaternion that is fed back never jumps",
+    "equations-as-given": "the equations are exactly as given",
+    "filippov": "motions are those in the sense of Filippov where the right-hand side jumps",
     "sign-at-once": "the sign of the quaternion is chosen at once",
 }
 """What identifiers of assumptions say."""

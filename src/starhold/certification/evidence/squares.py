@@ -22,6 +22,9 @@ from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
 sparse: Any = import_module("scipy.sparse")
+TOLERANCE = 1e-11
+LIMIT = 30.0
+"""Seconds that the interior point may take."""
 DIGITS = (12, 14, 9, 16)
 DEFINITE = -1e-8
 """The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
@@ -143,8 +146,8 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
     clarabel: Any = import_module("clarabel")
     cones = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(signed), *map(clarabel.PSDTriangleConeT, sides)]
     settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    settings.verbose, settings.time_limit = False, LIMIT
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     solver = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, sparse.csc_matrix(A), b, cones, settings)
     found = solver.solve()
     return np.array(found.x) if "Solved" in str(found.status) or "Insufficient" in str(found.status) else None

@@ -8,7 +8,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, sampling, sliding
+from . import attitude, invariant, sampling, sliding
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -20,4 +20,9 @@ THEOREMS: dict[str, Theorem] = {
     "converges from both quaternions whatever the inertia": attitude.converges_evenly_whatever_the_inertia,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
+    "attracts": invariant.attracts,
+    "is stable": invariant.stays,
+    "is unstable": invariant.leaves,
+    "avoids": invariant.avoids,
+    "fails": invariant.fails,
 }
