@@ -196,7 +196,7 @@ BROKEN = {
     "a reading of two numbers": ("sensor", "Reading(add(add(state.rate, params.bias), dice.vector(0, params.noise)))",
                                  "Reading((0.0, 0.0))", "rate formed as that of the body's state"),
     "no pair": ("sensor", ", memory\n", "\n", "a pair of a Reading and the memory"),
-    "another effector's rates": ("effector", "return State(own.speed, ", "return (", "numbers formed as"),
+    "another effector's rates": ("effector", "return State(state.speed, ", "return (", "numbers formed as"),
     "a goal of three": ("target", "Goal(params.attitude, ZERO, ZERO)", "(params.attitude, ZERO, ZERO)", "a Goal of four"),
     "an undeclared record": ("effector", 'Annotated[Scalar, Quantity("kg^0.5 m", "deflection of the panel\'s mode")]', "int",
                              "annotated with a Quantity"),

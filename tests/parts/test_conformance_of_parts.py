@@ -84,10 +84,10 @@ BROKEN = {
     "no title": ("target", {'title="Mine"': 'title=""'}, {"declares_itself"}),
     "an example of another shape": ("effector", {"(0.3, 0.0, 0.1)": "[0.3, 0.0, 0.1]"}, {"declares_itself"}),
     "a reaction of the wrong sign": (
-        "effector", {"subtract(scale(spring(own, params)": "subtract(scale(-spring(own, params)"}, {"keeps_momentum"}
+        "effector", {"subtract(scale(spring(state, params)": "subtract(scale(-spring(state, params)"}, {"keeps_momentum"}
     ),
     "no gyroscopic torque of its momentum": (
-        "effector", {"cross(body.rate, momentum(own, params))": "(0.0, 0.0, 0.0)"}, {"keeps_momentum"}
+        "effector", {"cross(body.rate, momentum(state, params))": "(0.0, 0.0, 0.0)"}, {"keeps_momentum"}
     ),
     "no inertia": ("effector", {"def inertia": "def inertia_of"}, {"keeps_momentum"}),
     "the same numbers in every run": (
