@@ -4,9 +4,9 @@ import json
 from fractions import Fraction
 from functools import cache
 
+from starhold.algebra.polynomial import Polynomial
 from starhold.algebra.scalar import clip, less, maximum, sign, where
 from starhold.certification.invariant.prover import Attempt, proved, scales
-from starhold.algebra.polynomial import Polynomial
 from starhold.certification.invariant.recording import program
 from starhold.kernel.programs import digest
 

@@ -87,11 +87,13 @@ BESIDE = ("sampling", "control-limit", "saturated-axis")
 
 @dataclass(frozen=True, repr=False)
 class Certificate:
-    """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names."""
+    """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names. `proof`: what
+    the kernel is given, of claims that it decides."""
 
     name: str
     subject: dict[str, Any]
     claims: tuple[Claim, ...]
+    proof: dict[str, Any] | None = None
 
     def __repr__(self) -> str:
         claims = ", ".join(f"{claim.kind} {claim.outcome}" for claim in self.claims)
@@ -140,4 +142,5 @@ def _plain(certificate: Certificate, places: Iterator[int]) -> dict[str, Any]:
             claims.append(shown | {part: value for part, value in asdict(claim).items() if part != "proof"})
     kinds = [claim["kind"] for claim in claims]
     about = {"outcome": certificate.outcome, "subject": certificate.subject, "kinds": kinds}
-    return {"name": certificate.name, **about, "claims": claims}
+    proof = {} if certificate.proof is None else {"proof": certificate.proof}
+    return {"name": certificate.name, **about, "claims": claims, **proof}

@@ -35,7 +35,7 @@ from starhold.checker.shapes import (
     outcome_of,
     shaped,
 )
-from starhold.checker.station import STATION_CLAIMS, StationSubject, read_station, station_refutation
+from starhold.checker.station import StationSubject, read_station, station_findings
 from starhold.checker.subject import LoopSubject, read_subject
 from starhold.checker.torque import never_beyond
 from starhold.kernel.check import Proved
@@ -145,6 +145,14 @@ def _certificate(given: Mapping[str, Any], proofs: Sequence[Proved]) -> Iterator
     if subject is None:
         yield Finding(name, "", "", "fails", fault)
         return
+    if isinstance(subject, StationSubject):
+        found, fault = _guarded(partial(_of_station, name, subject, given))
+        yield from found or []
+        if fault:
+            yield Finding(name, "", "", "fails", fault)
+        elif not found:
+            yield Finding(name, "", "", "not claimed", "there are no claims")
+        return
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
         work = partial(_proved, proofs, claim) if "proof" in claim else partial(_claim, subject, given["subject"], claim)
@@ -173,6 +181,15 @@ def _of_unknown_body(given: Any) -> None:
     certificate_shaped(given)
     shaped(given["subject"], UNKNOWN_BODY, "the subject")
     demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
+
+
+def _of_station(name: str, subject: StationSubject, given: Any) -> list[Finding]:
+    for claim in given["claims"]:
+        shaped(claim, CLAIM, "the claim")
+        for obligation in claim["obligations"]:
+            shaped(obligation, OBLIGATION, "an obligation")
+    absent = [f"without the {name}" for name in given["subject"]["assumed_away"]]
+    return [Finding(name, *one) for one in station_findings(subject, given, absent)]
 
 
 def _subject(given: Any) -> LoopSubject | StationSubject:
@@ -209,12 +226,11 @@ def _absent(subject: Mapping[str, Any], claim: Any) -> list[str]:
     return [*subject["assumed_away"], *bounded]
 
 
-def _claim(subject: LoopSubject | StationSubject, about: Mapping[str, Any], claim: Any) -> list[tuple[str, Verdict, str]]:
+def _claim(subject: LoopSubject, about: Mapping[str, Any], claim: Any) -> list[tuple[str, Verdict, str]]:
     """Verdict and reason for each obligation of a claim without a proof, about a subject as the file tells it."""
     shaped(claim, CLAIM, "the claim")
     absent = _absent(about, claim)
-    kinds = STATION_CLAIMS if isinstance(subject, StationSubject) else CLAIMS
-    demand(claim["kind"] in kinds, f"there is no kind of claim {claim['kind']} about such a loop")
+    demand(claim["kind"] in CLAIMS, f"there is no kind of claim {claim['kind']} about such a loop")
     for obligation in claim["obligations"]:
         shaped(obligation, OBLIGATION, "an obligation")
     outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
@@ -235,11 +251,8 @@ def _claim(subject: LoopSubject | StationSubject, about: Mapping[str, Any], clai
     return [_verdict(proof) for proof in shown]
 
 
-def _obliges(subject: LoopSubject | StationSubject, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
+def _obliges(subject: LoopSubject, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
     """The assumptions of a claim, and what makes the list of what has to be shown."""
-    if isinstance(subject, StationSubject):
-        about = STATION_CLAIMS[claim["kind"]]
-        return about.assumptions(subject), partial(about.proofs, subject, claim)
     kind, wheels = CLAIMS[claim["kind"]], subject.wheels is not None
     demand(kind.wheels is None or kind.wheels == wheels, f"such a claim is {'not ' if wheels else ''}for loops with wheels")
     assumed = kind.assumptions(claim["numbers"], wheels)
@@ -255,7 +268,7 @@ def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
     return (name if how else "", "fails", fault) if reason is None else (name if how else "", "holds", reason)
 
 
-def _unproved(subject: LoopSubject | StationSubject, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
+def _unproved(subject: LoopSubject, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
     """Nothing of such a claim counts as proved; a refutation must be one."""
     for part, shapes in (("numbers", NUMBERS), ("witness", WITNESS)):
         shape, given = shapes[claim["kind"]], claim[part]
@@ -271,13 +284,7 @@ def _unproved(subject: LoopSubject | StationSubject, claim: Mapping[str, Any]) -
     for obligation in claim["obligations"]:
         name, verdict, reason = obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"
         if obligation["outcome"] == "refuted":
-            shown, fault = _guarded(partial(_refutes, subject, claim, obligation))
+            shown, fault = _guarded(partial(refutation, subject, claim, obligation))
             verdict, reason = ("fails", f"not refuted: {fault}") if shown is None else ("not claimed", f"refuted: {shown}")
         found.append((name, verdict, reason))
     return found
-
-
-def _refutes(subject: LoopSubject | StationSubject, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
-    if isinstance(subject, StationSubject):
-        return station_refutation(subject, claim, obligation)
-    return refutation(subject, claim, obligation)

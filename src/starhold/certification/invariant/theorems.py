@@ -186,7 +186,9 @@ class _Proof:
         """Return what may refute the claim: the names of what is needed and of how V fails, and a search for a state."""
         what, level = self.what, self.wanted.level
         sense, word = (-1, "does not grow") if self.unstable else (1, "does not fall")
-        found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = [("continuous", "jumps", lambda: search.jump(what))]
+        found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = [
+            ("continuous", "jumps", lambda: search.jump(what))
+        ]
         if what.equilibrium is not None and not self.unstable:
             found.append(("positive", "is not positive", lambda: search.not_positive(what)))
         if not self.unstable or what.equilibrium is None:
@@ -232,7 +234,7 @@ class _Proof:
             # In the middles of equal parts of the box.
             count = search.POINTS[len(what.box)]
             parts = [(low + (high - low) / count / 2.0, high - (high - low) / count / 2.0) for low, high in what.box]
-            inside = search.Values(what, search.grid(parts)).V <= numbers["level"]
+            inside = numbers["level"] >= search.Values(what, search.grid(parts)).V
             numbers["size"] = float(inside.mean() * math.prod(high - low for low, high in what.box))
             if self.wanted.known is not None:
                 numbers["known"] = self.wanted.known
