@@ -36,6 +36,8 @@ GIVEN_AWAY = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """Shares of a largest level that are given away, for at the largest the matrices are singular."""
 SHARE, FAR = Fraction(0.999), Fraction(1000)
 """The part that is claimed of the bound beyond which nothing returns, and |x| up to which it is, as a multiple of it."""
+BEYOND = Fraction(1, 10**15)
+"""By this share the boundary that is claimed is beyond that bound."""
 ROUNDING = Fraction(1, 10**12)
 """By this share a control may exceed its limit and be taken for one that meets it."""
 _T = TypeVar("_T")
@@ -193,9 +195,9 @@ class Station:
             self.claim(
                 LIMITED,
                 limit=limit,
-                width=float(bound * SHARE),
+                width=nextafter(float(bound * SHARE), 0.0),
                 reach=float(bound * FAR),
-                boundary=nextafter(nextafter(float(bound), inf), inf),
+                boundary=float(bound * (1 + BEYOND)),
                 root_low=nextafter(steep, 0.0),
                 root_high=nextafter(steep, inf),
             )
