@@ -10,11 +10,11 @@ import pytest
 from flint import fmpq
 from hypothesis import given
 from hypothesis import strategies as st
+from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial
 
 from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.invariant import System, load, parse
-from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial
 from starhold.certification.invariant.system import split
 from starhold.certification.invariant.text import ExpressionError, as_written, read
 from starhold.errors import InputError

@@ -6,10 +6,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from starhold.certification.invariant.descent import Candidate, jumps, switches
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.invariant import InvariantProblem, System, WantedSet, certify, enclosure, parse, write
-from starhold.certification.invariant.descent import Candidate, jumps, switches
 from starhold.certification.invariant.search import closed_cells
 from starhold.checker import check, covering, passed
 from tests.certification.invariants import ORIGIN as AT_ORIGIN

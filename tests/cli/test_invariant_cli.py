@@ -3,8 +3,7 @@
 import json
 
 import starhold as sh
-from starhold.certification.invariant import enclosure
-from starhold.certification.invariant.problem import FORMAT
+from starhold.kernel.reading import FORMAT
 from tests.certification.invariants import ORIGIN, file
 from tests.refusals import complains
 from tests.running import starhold

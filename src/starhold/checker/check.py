@@ -16,8 +16,6 @@ from flint import ctx
 
 from starhold.checker.claims import CLAIMS, UNLIMITED
 from starhold.checker.exact import CheckError, Obligation, Verdict, demand, limited
-from starhold.checker.invariant import FORMAT as INVARIANT
-from starhold.checker.invariant import invariant_findings
 from starhold.checker.reading import read_file, shallow
 from starhold.checker.refutation import refutation
 from starhold.checker.shapes import (
@@ -43,7 +41,12 @@ from starhold.kernel.check import check as prove_all
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.reading import FORMAT
 
-FORMER = ("starhold certificate 1", "starhold certificate 2", "starhold invariant certificate 1")
+FORMER = (
+    "starhold certificate 1",
+    "starhold certificate 2",
+    "starhold invariant certificate 1",
+    "starhold invariant certificate 2",
+)
 """Formats of earlier versions, whose keys had other names."""
 ENDS = (
     "convergence",
@@ -85,6 +88,12 @@ def passed(findings: Sequence[Finding]) -> bool:
 def check_file(path: Path | str) -> list[Finding]:
     """The findings about a certificate file; InputError where there is none that can be read."""
     content, faults = read_file(path)
+    if isinstance(content, dict) and content.get("format") == FORMAT and "certificates" not in content:  # pyright: ignore
+        try:
+            proved = prove_all(Path(path).read_text(encoding="utf-8"))
+        except RefusedError as reason:
+            return [Finding("", "", "", "fails", str(reason))]
+        return [Finding("", one.claim.theorem, one.statement.written(), "holds", "") for one in proved]
     return [*(Finding("", "", "", "fails", fault) for fault in faults), *check(content)]
 
 
@@ -94,28 +103,21 @@ def check(content: Any) -> list[Finding]:
     with ctx.workprec(BITS), np.errstate(all="ignore"):
         try:
             shallow(content)
-            kind = _kind(content)
-            proofs = [] if kind == INVARIANT else _proofs(content)
+            _known(content)
+            proofs = _proofs(content)
         except CheckError as fault:
             return [Finding("", "", "", "fails", str(fault))]
-        if kind == INVARIANT:
-            return [
-                Finding(str(given.get("name", "")), *found)
-                for given in content["certificates"]
-                for found in invariant_findings(given)
-            ]
         return [finding for given in content["certificates"] for finding in _certificate(given, proofs)]
 
 
-def _kind(content: Any) -> str:
-    """The format of a file, which has what one of that format has."""
+def _known(content: Any) -> None:
+    """Refuse a file of another format, or one that lacks what a file of this format has."""
     table = cast(dict[str, Any], content if isinstance(content, dict) else {})
     given: Any = table.get("format")
     demand(given not in FORMER, f"the format is {given!r}, of an earlier version: certify again")
     shaped(content, FILE, "the file")
-    demand(given in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
+    demand(given == FORMAT, f"the format is not {FORMAT!r}")
     demand(len(table["certificates"]) > 0, "there are no certificates")
-    return str(given)
 
 
 def _proofs(content: Any) -> list[Proved]:

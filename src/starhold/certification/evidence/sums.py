@@ -87,6 +87,9 @@ class Guess:
         self.known = [self.scaled(q) * (1 / u) for q, u in zip(o.known, self.units, strict=True)]
         self.modulo = [self.scaled(q) for q in o.modulo]
         self.p = self.p * (1 / self.size)
+        # Where all that is asked vanishes with some variables, whatever the others (parameters) are.
+        moving = {x for q in o.strict for x in q.names}
+        self.moving = moving if all(moving.intersection(m) for q in (o.p, *o.strict) for m in q.terms) else set[str]()
         used = [k for k, q in enumerate(self.known) if degree(q) > (basis is not None) and degree(q) <= top]
         chosen = [(), *((k,) for k in used), *(p for p in pairs if p[0] in used and p[1] in used)]
         self.blocks = list[Block]()
@@ -102,7 +105,9 @@ class Guess:
     def z(self, names: Sequence[str], top: int, places: tuple[int, ...]) -> list[Poly]:
         """Return what the squares of a block are made of."""
         if self.basis is None:
-            return monomials(names, top)
+            stays = any(not self.moving.intersection(m) for m in product_of(self.known, places).terms)
+            every = monomials(names, top)
+            return [z for z in every if self.moving.intersection(*z.terms)] if self.moving and stays else every
         own = [self.scaled(q) for q in self.basis]
         made = [times(q, m) for q in own for m in monomials(names, min(max(top - degree(q), 0), 2)) if degree(q) <= top]
         # A factor may vanish with the basis: then its squares are of anything.

@@ -76,7 +76,7 @@ class Attempt:
         for name, o in self.obligations().items():
             key = (exact, name, str(o))
             if key not in self._done:
-                evidence = None if not exact and self._done.get((True, *key[1:]), 0) is None else self.shown(o, exact)
+                evidence = None if not exact and self._done.get((True, *key[1:]), 0) is None else self.shown(o, exact, name)
                 self._done[key] = evidence
             if self._done[key] is None:
                 lacking.append(name)
@@ -88,13 +88,11 @@ class Attempt:
 
     def holds(self, surface: int) -> bool:
         """Tell whether there is evidence of what has to be shown on a surface that is crossed."""
-        return all(self.shown(o) for name, o in self.obligations().items() if f" on {surface}" in name)
+        return all(self.shown(o, name=name) for name, o in self.obligations().items() if f" on {surface}" in name)
 
-    def shown(self, o: Sum, exact: bool = True) -> dict[str, Any] | None:
+    def shown(self, o: Sum, exact: bool = True, name: str = "") -> dict[str, Any] | None:
         """Return evidence for a sum, None where none was found."""
-        names = {x for q in (o.p, *o.strict) for x in q.names}
-        basis = self.basis if self.basis and all(q.names <= names for q in self.basis) else None
-        return find(o, self.scales, basis, exact=exact)
+        return find(o, self.scales, self.basis if name.startswith("changes") else None, exact=exact)
 
 
 def proved(attempt: Attempt, top: float, escape: Poly | None) -> dict[str, Any] | str:

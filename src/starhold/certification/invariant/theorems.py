@@ -115,16 +115,17 @@ class _Proof:
         if wanted.level is not None and not self.unstable:
             self.numbers["level"] = wanted.level
         self.witness: dict[str, Any] = {"name": wanted.name, "box": [list(side) for side in wanted.box]}
+        self.witness["equilibrium"] = wanted.equilibrium is not None
 
     def shown(self) -> Shown:
         """Return the claim with its outcome."""
         kernel = self.proof()
         if not isinstance(kernel, str):
-            statement = kernel_proves(claim_of(kernel, self.programs))
+            proved = kernel_proves(claim_of(kernel, self.programs))
             if "level" in kernel["numbers"]:
                 self.numbers["level"] = float(Fraction(kernel["numbers"]["level"]))
             self.tell()
-            return self.made(Obligation("proof", SQUARES, "proved"), kernel, "filippov" in statement.assumptions)
+            return self.made(Obligation("proof", SQUARES, "proved"), kernel, "filippov" in proved.statement.assumptions)
         for name, word, find in self.refutations():
             state = find()
             if state is not None:
