@@ -44,10 +44,12 @@ def wired_matrix(name: str, value: Matrix) -> dict[str, Poly]:
 
 
 class AttitudeLoop:
-    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are."""
+    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are. `quotients`:
+    programs may divide by the state, and `divisors` are then the polynomials that variables are the inverses of."""
 
-    def __init__(self, claim: Claim, any_inertia: bool = False) -> None:
+    def __init__(self, claim: Claim, any_inertia: bool = False, quotients: bool = False) -> None:
         self.claim, self.any_inertia = claim, any_inertia
+        self.divisors: dict[str, Poly] | None = {} if quotients else None
         self.q, self.w = variables("q", 0), variables("w")
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
         self.e = variables("e") if self.outside else NONE
@@ -94,7 +96,7 @@ class AttitudeLoop:
                 given[name] = known(self.claim.subject[name])
             else:
                 raise RefusedError(f"the {role} asks for {name}, which nothing gives")
-        return program.run(given, Exactly(), count)
+        return program.run(given, Exactly(self.divisors), count)
 
     @cached_property
     def law(self) -> list[Piecewise]:

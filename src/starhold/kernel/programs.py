@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 from .intervals import Interval
 from .numbers import Account, demand, rational, read_list, read_table
-from .polynomials import Monomial, Poly, poly
+from .polynomials import Monomial, Poly, poly, var
 
 OPERATIONS = {
     "plus": "nn>n", "minus": "nn>n", "product": "nn>n", "divide": "nn>n", "negative": "n>n", "sqrt": "n>n",
@@ -22,7 +22,7 @@ OPERATIONS = {
 }  # fmt: skip
 """The operations, each with the kinds that it takes and gives: numbers and truths."""
 STEPS, CASES = 20_000, 2_000
-_NAME = re.compile(r"[a-z_]+(\.[a-z_]+|\.[0-9]+)*", re.ASCII)
+_NAME = re.compile(r"[a-z_]+(\.[a-z_][a-z0-9_]*|\.[0-9]+)*", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,11 @@ def single(cases: Piecewise) -> Poly:
 
 
 class Exactly:
-    """A program is read over exact polynomials, case by case. Roots, and quotients by the state, are refused."""
+    """A program is read over exact polynomials, case by case. Roots are refused, and so are quotients by the state, unless
+    there is a table for the variables that stand for the inverses of divisors."""
+
+    def __init__(self, divisors: dict[str, Poly] | None = None) -> None:
+        self.divisors = divisors
 
     def constant(self, x: Fraction) -> Piecewise:
         """Return a constant."""
@@ -164,6 +168,12 @@ class Exactly:
     def value(self, operation: str, x: list[Any]) -> Any:
         """Return the value of an operation."""
         demand(operation in EXACT, f"{operation} has no exact value")
+        if operation == "divide" and self.divisors is not None and x[1].names:
+            known = self.divisors
+            demand(not x[1].names & known.keys(), "a program divides by a quotient")
+            name = next((z for z, own in known.items() if own.terms == x[1].terms), f"z{len(known)}")
+            known[name] = x[1]
+            return x[0] * var(name)
         return EXACT[operation](*x)
 
 

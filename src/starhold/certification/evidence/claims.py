@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import ASKED, SAMPLED, SLIDING, Loop, sign_words
 from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.isotropic import find_isotropic
 from starhold.certification.evidence.squares import rounded
 from starhold.kernel.loops import MOVING, OUTSIDE
 from starhold.kernel.numbers import RefusedError, Rows, plus
@@ -25,6 +26,8 @@ def find_claims(flown: ClosedLoop, disturbance: float = 0.0) -> Loop:
     if not flown.remembers:
         if flown.law.lyapunov is not None:
             loop.show_end()
+        if hasattr(flown.law.module, "single_root"):
+            find_isotropic(loop)
         if hasattr(flown.law.module, "surface"):
             find_sliding(loop)
         find_sampled(loop)

@@ -1,0 +1,436 @@
+"""Guesses of sums of squares with products of what is known (`kernel.rules.Sum`): an interior point, then exact numbers.
+
+In floats the matrices are made as definite as can be, in units (powers of two) in which the variables are about one. Rounded
+to few binary digits they still are; what is then amiss is put on the matrix that has no factor.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from importlib import import_module
+from itertools import combinations, combinations_with_replacement
+from typing import Any, TypeAlias
+
+import numpy as np
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx
+
+from starhold.certification.evidence.squares import degree, interior_point, text
+from starhold.kernel.numbers import Account, RefusedError
+from starhold.kernel.polynomials import Monomial, Poly, dot, poly, read_poly
+from starhold.kernel.rules import Sum
+
+sparse: Any = import_module("scipy.sparse")
+linprog: Any = import_module("scipy.optimize").linprog
+MARGIN = 1e-7
+"""The least eigenvalue, in scaled units, with which exact numbers are tried."""
+PAIRED = 10
+"""Known polynomials of which products are tried in an identity."""
+MOST = 60_000
+"""Entries of the matrices, at most."""
+Terms: TypeAlias = dict[Monomial, Fraction]
+
+
+@dataclass
+class Block:
+    """A sum of squares z'Gz times the known polynomials of some places, whose product in scaled units is `factor`."""
+
+    places: tuple[int, ...]
+    factor: Poly
+    z: list[Poly]
+    pairs: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
+
+    def columns(self) -> list[Poly]:
+        """Return what the entries of the upper triangle are multiplied with."""
+        self.pairs = [(i, k) for k in range(len(self.z)) for i in range(k + 1)]
+        return [times(times(self.z[i], self.z[k]), self.factor, 1 if i == k else 2) for i, k in self.pairs]
+
+
+def times(a: Poly, b: Poly, c: int = 1) -> Poly:
+    """Return c a b, without an account."""
+    found: dict[Monomial, Fraction] = defaultdict(Fraction)
+    for m, x in a.terms.items():
+        for n, y in b.terms.items():
+            found[tuple(sorted(m + n)) if m and n else m or n] += x * y * c
+    return Poly(found)
+
+
+def monomials(names: Sequence[str], most: int, least: int = 0) -> list[Poly]:
+    """Return all monomials of these degrees."""
+    spare = range(least, most + 1)
+    return [Poly({tuple(m): Fraction(1)}) for d in spare for m in combinations_with_replacement(sorted(names), d)]
+
+
+def unit(x: float) -> Fraction:
+    """Return the power of two next to a positive number."""
+    return Fraction(2) ** round(np.log2(x)) if 0.0 < x < np.inf else Fraction(1)
+
+
+class Guess:
+    """The search for evidence of a sum. scales: about how large variables become; `basis`: of what squares are made beside
+    monomials; `pairs`: which products of two known polynomials are tried."""
+
+    def __init__(
+        self, o: Sum, scales: Mapping[str, float], top: int, pairs: Iterable[tuple[int, int]], basis: Sequence[Poly] | None
+    ) -> None:
+        Account.left = 10**12
+        self.o, self.basis = o, basis
+        names = sorted({x for q in (o.p, *o.known, *o.modulo, *o.strict) for x in q.names})
+        self.scale = {x: unit(scales.get(x, 1.0)) for x in names}
+        self.p, *self.strict = map(self.scaled, (o.p, *o.strict))
+        self.size = unit(largest(self.p))
+        self.units = [unit(largest(self.scaled(q))) for q in o.known]
+        self.known = [self.scaled(q) * (1 / u) for q, u in zip(o.known, self.units, strict=True)]
+        self.modulo = [self.scaled(q) for q in o.modulo]
+        self.p = self.p * (1 / self.size)
+        used = [k for k, q in enumerate(self.known) if q.names and degree(q) <= top]
+        chosen = [(), *((k,) for k in used), *(p for p in pairs if p[0] in used and p[1] in used)]
+        self.blocks = list[Block]()
+        for places in chosen:
+            factor = product_of(self.known, places)
+            room = top - degree(factor)
+            if room >= 0:
+                self.blocks.append(Block(places, factor, self.z(names, room // 2, places)))
+        self.loose = [[times(q, m) for m in monomials(names, top - degree(q))] if top >= degree(q) else [] for q in self.modulo]
+        self.reduce()
+
+    def z(self, names: Sequence[str], top: int, places: tuple[int, ...]) -> list[Poly]:
+        """Return what the squares of a block are made of."""
+        if self.basis is None or 0 in places:
+            return monomials(names, top)
+        own = [self.scaled(q) for q in self.basis]
+        return [times(q, m) for q in own for m in monomials(names, max(top - degree(q), 0)) if degree(q) <= top]
+
+    def scaled(self, q: Poly) -> Poly:
+        """Return a polynomial in scaled units."""
+        found: Terms = {}
+        for m, c in q.terms.items():
+            for x in m:
+                c = c * self.scale[x]
+            found[m] = c
+        return Poly(found)
+
+    def reduce(self) -> None:
+        """Leave out what cannot have a square: nothing else has its monomial, or all that has has its sign."""
+        while True:
+            free = {m for q in (self.p, *(c for own in self.loose for c in own)) for m in q.terms}
+            squares: dict[Monomial, list[tuple[int, int, bool]]] = defaultdict(list)
+            for q in self.strict:
+                for m, c in q.terms.items():
+                    squares[m].append((-1, -1, c > 0))
+            for b, block in enumerate(self.blocks):
+                for column, (i, k) in zip(block.columns(), block.pairs, strict=True):
+                    if i != k or len(column.terms) > 1:
+                        # A product of many terms may have either sign, but at its own ends.
+                        ends = set(column.terms) if i != k else set()
+                        free |= ends
+                    for m, c in column.terms.items() if i == k else ():
+                        squares[m].append((b, i, c > 0))
+            gone = {
+                (b, i)
+                for m, own in squares.items()
+                if m not in free and len({sign for _, _, sign in own}) == 1
+                for b, i, _ in own
+                if b >= 0
+            }
+            if not gone:
+                break
+            for b, block in enumerate(self.blocks):
+                block.z = [z for i, z in enumerate(block.z) if (b, i) not in gone]
+        self.blocks = [block for block in self.blocks if block.z or not block.places]
+
+    @cached_property
+    def columns(self) -> tuple[list[Poly], list[Poly]]:
+        """Return the columns of the positive and free numbers, and those of the matrices."""
+        return [*self.strict, *(c for own in self.loose for c in own)], [c for b in self.blocks for c in b.columns()]
+
+    def floats(self) -> Any | None:
+        """Return the numbers in floats that make the matrices most definite; None where they are not."""
+        single, grams = self.columns
+        every, signed = [*single, *grams], len(self.strict)
+        if len(grams) > MOST:
+            return None
+        rows = {m: k for k, m in enumerate(sorted({m for q in (self.p, *every) for m in q.terms}))}
+        entries = [(rows[m], k, float(c)) for k, q in enumerate(every) for m, c in q.terms.items()]
+        A = sparse.csc_matrix(
+            ([c for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])), (len(rows), len(every) + 1)
+        )
+        b = np.zeros(len(rows))
+        for m, c in self.p.terms.items():
+            b[rows[m]] = float(c)
+        parts, right, at = [A], [b], len(single)
+        top = len(every)
+        signs = sparse.csc_matrix(
+            ([*([-1.0] * signed), *([1.0] * signed), 1.0], ([*range(signed)] * 2 + [signed], [*range(signed), *([top] * signed), top])),
+            (signed + 1, top + 1),
+        )
+        parts.append(signs)
+        right.append(np.r_[np.zeros(signed), 1.0])
+        for block in self.blocks:
+            count = len(block.pairs)
+            half = [1.0 if i == k else np.sqrt(2.0) for i, k in block.pairs]
+            spots = range(count)
+            cone = sparse.csc_matrix(
+                ([-h for h in half] + [float(i == k) for i, k in block.pairs], ([*spots, *spots], [*range(at, at + count), *([top] * count)])),
+                (count, top + 1),
+            )
+            parts.append(cone)
+            right.append(np.zeros(count))
+            at += count
+        cost = np.r_[np.zeros(top), -1.0]
+        try:
+            x = interior_point(
+                cost, sparse.vstack(parts), np.concatenate(right), len(rows), signed + 1, [len(b.z) for b in self.blocks]
+            )
+        except BaseException as fault:  # a panic of the solver is one
+            if isinstance(fault, (KeyboardInterrupt, SystemExit)):
+                raise
+            return None
+        return None if x is None or not np.isfinite(x).all() or x[-1] < MARGIN else x
+
+    def freed(self, made: Mapping[Monomial, Poly]) -> Poly | None:
+        """Return a polynomial E for which p + E' is a sum, with the derivative of each monomial; None where there is none."""
+        self.loose.append([self.scaled(q) * -1 for q in made.values()])
+        first = len(self.strict) + sum(map(len, self.loose[:-1]))
+        x = self.floats()
+        self.loose.pop()
+        if x is None:
+            return None
+        found = {m: round(Fraction(float(v)) * self.size * 2**12) for m, v in zip(made, x[first:], strict=False)}
+        return Poly({m: Fraction(v, 2**12) for m, v in found.items()})
+
+    def exactly(self, x: Any) -> dict[str, Any] | None:
+        """Return evidence near floats that the kernel accepts; None where none was found."""
+        single, grams = self.columns
+        margin = float(x[-1])
+        for digits in (10, 20, 34):
+            step = unit(margin) / 2**digits
+            y = [round(Fraction(float(v)) / step) * step for v in x[:-1]]
+            rest = Counter(self.p)
+            for v, q in zip(y, [*single, *grams], strict=True):
+                if v:
+                    for m, c in q.terms.items():
+                        rest[m] = rest.get(m, Fraction(0)) - v * c
+            rest = {m: c for m, c in rest.items() if c}
+            fixed = self.shared(y, rest, len(single)) if self.basis is None else self.projected(y, rest, [*single, *grams])
+            if fixed is None:
+                return None
+            evidence = self.written(fixed)
+            try:
+                self.o.check(evidence)
+            except RefusedError:
+                continue
+            return evidence
+        return None
+
+    def shared(self, y: list[Fraction], rest: Terms, head: int) -> list[Fraction] | None:
+        """Put what is amiss of each monomial on the entries that have it of the matrix without a factor."""
+        places: dict[Monomial, list[int]] = defaultdict(list)
+        for k, column in enumerate(self.blocks[0].columns(), head):
+            places[next(iter(column.terms))].append(k)
+        grams = self.columns[1]
+        for m, c in rest.items():
+            if m not in places:
+                return None
+            whole = sum((next(iter(grams[k - head].terms.values())) for k in places[m]), Fraction(0))
+            for k in places[m]:
+                y[k] += c / whole
+        return y
+
+    def projected(self, y: list[Fraction], rest: Terms, every: list[Poly]) -> list[Fraction] | None:
+        """Put what is amiss on all numbers, as little as can be (least squares, exactly)."""
+        rows = {m: k for k, m in enumerate(sorted({m for q in every for m in q.terms}))}
+        if not set(rest) <= set(rows):
+            return None
+        A = fmpq_mat(len(rows), len(every))
+        for k, q in enumerate(every):
+            for m, c in q.terms.items():
+                A[rows[m], k] = fmpq(c.numerator, c.denominator)
+        echelon, rank = A.transpose().rref()
+        kept = [next(c for c in range(len(rows)) if echelon[r, c] != 0) for r in range(rank)]
+        names = list(rows)
+        own = fmpq_mat(rank, len(every), [A[r, k] for r in kept for k in range(len(every))])
+        b = [rest.get(names[r], Fraction(0)) for r in kept]
+        right = fmpq_mat(rank, 1, [fmpq(c.numerator, c.denominator) for c in b])
+        step = own.transpose() * (own * own.transpose()).solve(right)
+        return [v + Fraction(int(step[k, 0].p), int(step[k, 0].q)) for k, v in enumerate(y)]
+
+    def written(self, y: list[Fraction]) -> dict[str, Any]:
+        """Return the evidence in the units of the sum."""
+        at, size = len(self.strict), self.size
+        numbers = [str(v * size) for v in y[:at]]
+        cofactors: list[dict[str, str]] = []
+        for q, own in zip(self.o.modulo, self.loose, strict=True):
+            names = [m for m in monomials(sorted(self.scale), degree(self.p) + 8)[: len(own)]] if own else []
+            found = [self.unscaled(m) * (v * size) for m, v in zip(names, y[at : at + len(own)], strict=True)]
+            cofactors.append(text(dot(found, [poly(1)] * len(found)) if found else poly(0)))
+            at += len(own)
+            del q
+        parts: list[dict[str, Any]] = []
+        for block in self.blocks:
+            count, factor = len(block.z), Fraction(1)
+            for k in block.places:
+                factor *= self.units[k]
+            own = [[Fraction(0)] * count for _ in range(count)]
+            for (i, k), v in zip(block.pairs, y[at : at + len(block.pairs)], strict=True):
+                own[i][k] = own[k][i] = v * size / factor
+            at += len(block.pairs)
+            z, powers = [self.unscaled(q) for q in block.z], list[Fraction]()
+            for q in z:
+                powers.append(next(iter(q.terms.values())) if len(q.terms) == 1 else Fraction(1))
+            rows = [[str(v * a * b) for v, b in zip(row, powers, strict=True)] for row, a in zip(own, powers, strict=True)]
+            named = [" ".join(next(iter(q.terms))) if len(q.terms) == 1 else text(q) for q in z]
+            if any(v != "0" for row in rows for v in row):
+                parts.append({"of": list(block.places), "z": named, "gram": rows})
+        return {"numbers": numbers, "cofactors": cofactors, "parts": parts}
+
+    def unscaled(self, q: Poly) -> Poly:
+        """Return a polynomial of scaled variables in the variables."""
+        found: Terms = {}
+        for m, c in q.terms.items():
+            for x in m:
+                c = c / self.scale[x]
+            found[m] = c
+        return Poly(found)
+
+
+def Counter(p: Poly) -> Terms:
+    """Return the terms of a polynomial to be changed."""
+    return dict(p.terms)
+
+
+def largest(q: Poly) -> float:
+    """Return the largest coefficient."""
+    return max((abs(float(c)) for c in q.terms.values()), default=1.0)
+
+
+def identity(o: Sum) -> dict[str, Any] | None:
+    """Return evidence without squares: p as a combination of what is known, with factors, and of relations, with cofactors."""
+    if o.strict:
+        return None
+    names = sorted({x for q in (o.p, *o.modulo) for x in q.names})
+    top = max(degree(q) for q in (o.p, *o.modulo))
+    loose = [monomials(names, top - degree(q)) for q in o.modulo]
+    few = [k for k, q in enumerate(o.known) if degree(q) <= top]
+    places = [(), *((k,) for k in few), *combinations(few[:PAIRED], 2)]
+    made = {own: q for own in places if degree(q := product_of(o.known, own)) <= top}
+    free = [times(q, m) for q, own in zip(o.modulo, loose, strict=True) for m in own]
+    used = needed(o.p, free, made)
+    y = None if used is None else solved(o.p, [*free, *(made[own] for own in used)])
+    if used is None or y is None:
+        return None
+    cofactors, at = list[dict[str, str]](), 0
+    for own in loose:
+        cofactors.append(text(dot(y[at : at + len(own)], own)))
+        at += len(own)
+    parts = [{"of": [*own], "z": [""], "gram": [[str(c)]]} for own, c in zip(used, y[at:], strict=True) if c]
+    evidence = {"numbers": [], "cofactors": cofactors, "parts": parts}
+    try:
+        o.check(evidence)
+    except RefusedError:
+        return None
+    return evidence
+
+
+def product_of(known: Sequence[Poly], places: Iterable[int]) -> Poly:
+    """Return the product of the known polynomials of some places."""
+    found = poly(1)
+    for k in places:
+        found = times(found, known[k])
+    return found
+
+
+def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list[tuple[int, ...]] | None:
+    """Return the places of products that p is made of with positive factors, and of free polynomials, in floats."""
+    every = [*free, *made.values()]
+    rows = {m: k for k, m in enumerate({m for q in (p, *every) for m in q.terms})}
+    A, b = np.zeros((len(rows), len(every))), np.zeros(len(rows))
+    for k, q in enumerate(every):
+        for m, c in q.terms.items():
+            A[rows[m], k] = float(c)
+    for m, c in p.terms.items():
+        b[rows[m]] = float(c)
+    if not p.terms:
+        return []
+    cost = np.r_[np.zeros(len(free)), np.ones(len(made))]
+    found = linprog(cost, A_eq=A, b_eq=b, bounds=[(None, None)] * len(free) + [(0, None)] * len(made))
+    return [own for own, v in zip(made, found.x[len(free) :], strict=True) if v > 1e-9] if found.status == 0 else None
+
+
+def solved(p: Poly, every: list[Poly]) -> list[Fraction] | None:
+    """Return numbers that make p of these polynomials, as few as elimination finds; None where there are none."""
+    rows = {m: k for k, m in enumerate(sorted({m for q in (p, *every) for m in q.terms}))}
+    A = fmpq_mat(max(len(rows), 1), len(every) + 1)
+    for k, q in enumerate([*every, p]):
+        for m, c in q.terms.items():
+            A[rows[m], k] = fmpq(c.numerator, c.denominator)
+    echelon, rank = A.rref()
+    y = [Fraction(0)] * len(every)
+    for r in range(rank):
+        lead = next(k for k in range(len(every) + 1) if echelon[r, k] != 0)
+        if lead == len(every):
+            return None
+        y[lead] = Fraction(int(echelon[r, len(every)].p), int(echelon[r, len(every)].q))
+    return y
+
+
+def quotient(p: Poly, q: Poly) -> Poly | None:
+    """Return p / q, None where that is no polynomial."""
+    names = sorted(p.names | q.names)
+    ring = fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
+
+    def within(a: Poly) -> Any:
+        items = a.terms.items()
+        return ring.from_dict({tuple(m.count(x) for x in names): fmpq(c.numerator, c.denominator) for m, c in items})
+
+    found, rest = divmod(within(p), within(q))
+    if rest != 0:
+        return None
+    items = found.to_dict().items()
+    powers = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in items}
+    return Poly({m: Fraction(int(c.p), int(c.q)) for m, c in powers.items()})
+
+
+def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
+    """Return evidence where all that is asked has a factor that is known; None where that is not so."""
+    for k, q in enumerate(o.known if any(p.terms for p in o.strict) else ()):
+        parts = [quotient(p, q) for p in (o.p, *o.strict)] if q.names else [None]
+        if None not in parts:
+            p, *strict = (part for part in parts if part is not None)
+            found = find(Sum(p, o.known, o.modulo, strict), *more)
+            if found:
+                found["cofactors"] = [text(read_poly(c) * q) for c in found["cofactors"]]
+                for part in found["parts"]:
+                    part["of"].append(k)
+            if found is not None:
+                return found
+    return None
+
+
+def find(
+    o: Sum, scales: Mapping[str, float], basis: Sequence[Poly] | None = None, degrees: Sequence[int] = (0, 2), exact: bool = True
+) -> dict[str, Any] | None:
+    """Return evidence that the kernel accepts (exact False: that floats have some); None where none was found."""
+    found = identity(o)
+    if found is None:
+        found = divided(o, scales, basis, degrees, exact)
+    if found is not None:
+        return found
+    least = max(degree(q) for q in (o.p, *o.strict))
+    least += least % 2
+    sides = [k for k, q in enumerate(o.known) if degree(q) == 1]
+    few = [(a, b) for a, b in combinations(sides, 2) if o.known[a].names == o.known[b].names]
+    few += [(0, 1)] if len(o.known) > 1 else []
+    many = list(combinations(range(min(len(o.known), 12)), 2))
+    for more in degrees:
+        for pairs in (few, many) if more else (few,):
+            guess = Guess(o, scales, least + more, pairs, basis)
+            x = guess.floats()
+            if x is not None:
+                evidence = guess.exactly(x) if exact else {}
+                if evidence is not None:
+                    return evidence
+    return None
