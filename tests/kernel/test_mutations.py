@@ -109,7 +109,7 @@ def of_evidence(r, content, claim):
 
     def walk(node):
         for key, part in node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ():
-            if isinstance(part, str):
+            if isinstance(part, str) and part[-1:].isdigit():
                 spots.append((node, key))
             walk(part)
 

@@ -44,8 +44,8 @@ def wired_matrix(name: str, value: Matrix) -> dict[str, Poly]:
 
 
 class AttitudeLoop:
-    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are. `quotients`:
-    programs may divide by the state, and `divisors` are then the polynomials that variables are the inverses of."""
+    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are.
+    `quotients`: programs may divide by the state, and `divisors` are the polynomials that variables are inverses of."""
 
     def __init__(self, claim: Claim, any_inertia: bool = False, quotients: bool = False) -> None:
         self.claim, self.any_inertia = claim, any_inertia

@@ -9,12 +9,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.quaternion import Quaternion, vector_part
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import Vector, dot
 from starhold.certification.evidence.attitude import ASKED, Loop, sign_words
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.reduced import Reduced
+from starhold.certification.mixed import SHAPES, SIGNED, Shape
 from starhold.kernel.loops import HYSTERESIS, SHORTEST
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
@@ -25,46 +24,6 @@ LESS = (1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
 """How far below the level that points of a grid suggest a proof is tried."""
 TRIED = 3
 """Shapes that are tried where points of a grid miss states at which V rises."""
-
-
-class Shape(NamedTuple):
-    """The numbers of V = |w|^2/2 + a^2 (p u + c2 u^2) - a (g + m u) q.w with u = 1 - q0 and the root a."""
-
-    p: float
-    c2: float
-    g: float
-    m: float
-
-    def value(self, a: float, attitude: Quaternion, rate: Vector) -> Scalar:
-        """V (1/s2) of an attitude and a rate (rad/s) for the root a (1/s)."""
-        q, u = vector_part(attitude), 1.0 - attitude[0]
-        turned = a * a * ((self.p + self.c2 * u) * u)
-        return dot(rate, rate) * 0.5 + turned - a * ((self.g + self.m * u) * dot(q, rate))
-
-    def room(self, level: float, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """{V <= level a^2} at u is a ball of rates over -a: its radius squared, below zero where it is empty."""
-        return 2.0 * (level - self.p * u - self.c2 * u * u) + (self.g + self.m * u) ** 2 * u * (2.0 - u)
-
-    def volume(self, level: float) -> float:
-        """The volume of {V <= level a^2} among attitudes and rates, up to a factor."""
-        u = np.linspace(0.0, 2.0, 201)
-        return float(np.sum(np.maximum(self.room(level, u), 0.0) ** 1.5 * np.sqrt(u * (2.0 - u))))
-
-
-SHAPES = (
-    Shape(6.62, -0.62, 2.56, 0.59),
-    Shape(7.07, -0.58, 2.64, 0.62),
-    Shape(9.69, -0.9, 3.09, 0.72),
-    Shape(11.16, -0.65, 3.3, 0.75),
-    Shape(19.24, -1.97, 3.99, -0.45),
-    Shape(23.14, 0.0, 3.48, -0.44),
-    Shape(22.28, -0.02, 2.74, -1.22),
-    Shape(20.69, -0.03, 2.36, -1.18),
-)
-"""Near the largest sets for ab of up to 0.01, 0.02, 0.045, 0.07, 0.12, 0.2, 0.4 and from 1 on, from a search among points
-of a grid."""
-SIGNED = (Shape(4.0, 0.0, 0.02, 0.0), Shape(4.0, 0.0, 0.1, 0.0), Shape(5.0, 0.0, 0.7, -0.7))
-"""Where the sign of the quaternion is chosen: with a mixed term so small that a change of sign lowers V."""
 
 
 class Reach(NamedTuple):
@@ -121,7 +80,7 @@ def reach(loop: Loop, shape: Shape, a: float) -> Reach:
     V, hysteresis = loop.add(height, measurement=ASKED), loop.loop.hysteresis_width
     signed: dict[str, Any] = {"hysteresis": hysteresis} if HYSTERESIS in words(loop) else {}
     asked = cast(Sum, obligations(loop.claim(ISOTROPIC, words(loop), V, level=1, **signed), loop.by_digest)[0]["V falls"])
-    top = 2.0 * shape.p + 4.0 * shape.c2
+    top = shape.other_equilibrium
     if SHORTEST in words(loop):
         # Where q0 = 0.
         top = shape.p + shape.c2 - (shape.g + shape.m) ** 2 / 2.0

@@ -1,7 +1,7 @@
-"""A theorem about loops that know no axis: V and V' do not change where attitude and rate are turned together about any axis.
+"""A theorem about loops that know no axis: V and V' do not change where attitude and rate are turned together.
 
-So they depend on three numbers alone, 1 - q0, |w| and the part of q along w. The law may divide by the state, as long as what
-it divides by is positive. Proof: docs/kernel.md, section 3.
+So they depend on three numbers alone, 1 - q0, |w| and the part of q along w. The law may divide by the state, as long as
+what it divides by is positive. Proof: docs/kernel.md, section 3.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from .attitude import concluded
 
 
 def converges_without_axes(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
-    """Every motion from {V <= level} stays there and comes to rest on target: V is least on target, and V' <= -c (|w|^2 + |q|^2)
-    on the set (Lyapunov). Both are shown where w = (v, 0, 0) and q = (t, n, 0), to which every state can be turned, with
-    n^2 = |q|^2 - t^2 and |q|^2 = u (2 - u), u = 1 - q0."""
+    """Every motion from {V <= level} stays there and comes to rest on target: V is least on target, and on the set
+    V' <= -c (|w|^2 + |q|^2) (Lyapunov). Both are shown where w = (v, 0, 0) and q = (t, n, 0), to which every state can be
+    turned, with n^2 = |q|^2 - t^2 and |q|^2 = u (2 - u), u = 1 - q0."""
     loop = AttitudeLoop(claim, quotients=True)
     yield from loop.sound()
     V, level = loop.lyapunov, claim.numbers["level"]
