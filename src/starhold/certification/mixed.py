@@ -3,6 +3,7 @@ knows no axis: V = |w|^2/2 + a^2 (p u + c2 u^2) - a (g + m u) q.w with u = 1 - q
 
 from __future__ import annotations
 
+from bisect import bisect
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,7 +68,13 @@ SHAPES = (
     Shape(22.28, -0.02, 2.74, -1.22),
     Shape(20.69, -0.03, 2.36, -1.18),
 )
-"""Near the largest sets for ab of up to 0.01, 0.02, 0.045, 0.07, 0.12, 0.2, 0.4 and from 1 on, from a search among points
-of a grid."""
+LIMITS = (0.01, 0.02, 0.045, 0.07, 0.12, 0.2, 0.4)
+"""The shapes are near the largest sets for ab of up to these, and from 1 on, from a search among points of a grid."""
 SIGNED = (Shape(4.0, 0.0, 0.02, 0.0), Shape(4.0, 0.0, 0.1, 0.0), Shape(5.0, 0.0, 0.7, -0.7))
 """Where the sign of the quaternion is chosen: with a mixed term so small that a change of sign lowers V."""
+
+
+def near(beta: float) -> tuple[Shape, ...]:
+    """Return the shape for ab and its neighbours."""
+    place = bisect(LIMITS, beta)
+    return SHAPES[max(place - 1, 0) : place + 2]
