@@ -21,7 +21,7 @@ from starhold.kernel.polynomials import Poly
 from starhold.kernel.rules import Sum
 
 ISOTROPIC = "converges without a preferred axis"
-LESS = (1e-3, 3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
+LESS = (3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
 """How far below the level that points of a grid suggest a proof is tried."""
 
 

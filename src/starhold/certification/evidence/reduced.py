@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from starhold.certification.evidence.sums import Block, Guess, Terms, product_of
+from starhold.certification.evidence.sums import Block, Guess, product_of
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.rules import Sum
 
@@ -25,19 +25,14 @@ class Reduced(Guess):
         super().__init__(o, scales, 4, (), None)
 
     def reduce(self) -> None:
-        """Take these squares, but those that would have to vanish."""
-        sizes = self.sizes.items()
-        self.blocks = [Block(places, product_of(self.known, places), powers(*size)) for places, size in sizes]
+        """Take these squares, but those that would have to vanish. What changes its sign with v and t has its own block,
+        for nothing else does."""
+        self.blocks = [
+            Block(places, product_of(self.known, places), powers(*size, odd))
+            for places, size in self.sizes.items()
+            for odd in (0, 1)
+        ]
         super().reduce()
-
-    def shared(self, y: list[Fraction], rest: Terms, head: int) -> list[Fraction] | None:
-        """Put what is amiss of u on the number of |q|^2, for u is no product of two that vanish on target."""
-        size = self.strict[-1]
-        share = rest.pop(("u",), Fraction(0)) / size.terms[("u",)]
-        y[head - 1] += share
-        for m in size.terms.keys() - {("u",)}:
-            rest[m] = rest.get(m, Fraction(0)) - share * size.terms[m]
-        return super().shared(y, rest, head)
 
     def evidence(self) -> dict[str, Any] | None:
         """Return evidence that the kernel accepts; None where none was found."""
@@ -45,8 +40,8 @@ class Reduced(Guess):
         return None if x is None else self.exactly(x)
 
 
-def powers(fast: int, turned: int) -> list[Poly]:
-    """Return all v^i u^j t^k with i up to `fast` and j + k up to `turned`."""
+def powers(fast: int, turned: int, odd: int) -> list[Poly]:
+    """Return all v^i u^j t^k with i up to `fast`, j + k up to `turned`, and i + k odd or even."""
     spare = range(turned + 1)
-    found = [("t",) * k + ("u",) * j + ("v",) * i for i in range(fast + 1) for j in spare for k in spare if j + k <= turned]
-    return [Poly({m: Fraction(1)}) for m in found]
+    found = [(i, j, k) for i in range(fast + 1) for j in spare for k in spare if j + k <= turned and (i + k) % 2 == odd]
+    return [Poly({("t",) * k + ("u",) * j + ("v",) * i: Fraction(1)}) for i, j, k in found]

@@ -20,10 +20,11 @@ from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx
 
 from starhold.certification.evidence.squares import degree, interior_point, text
 from starhold.kernel.numbers import Account, RefusedError
-from starhold.kernel.polynomials import Monomial, Poly, dot, poly, read_poly
+from starhold.kernel.polynomials import Monomial, Poly, apply, dot, poly, read_poly
 from starhold.kernel.rules import Sum
 
 sparse: Any = import_module("scipy.sparse")
+pivoted: Any = import_module("scipy.linalg").qr
 linprog: Any = import_module("scipy.optimize").linprog
 MARGIN = 1e-7
 """The least eigenvalue, in scaled units, with which exact numbers are tried."""
@@ -102,7 +103,7 @@ class Guess:
         if self.basis is None or 0 in places:
             return monomials(names, top)
         own = [self.scaled(q) for q in self.basis]
-        return [times(q, m) for q in own for m in monomials(names, max(top - degree(q), 0)) if degree(q) <= top]
+        return independent([times(q, m) for q in own for m in monomials(names, max(top - degree(q), 0)) if degree(q) <= top])
 
     def scaled(self, q: Poly) -> Poly:
         """Return a polynomial in scaled units."""
@@ -161,6 +162,12 @@ class Guess:
         b = np.zeros(len(rows))
         for m, c in self.p.terms.items():
             b[rows[m]] = float(c)
+        if self.basis is not None:
+            # Equations that follow from others would stop the interior point.
+            _, triangle, order = pivoted(A.toarray().T, mode="economic", pivoting=True)
+            sizes = np.abs(np.diag(triangle))
+            kept = np.sort(order[: int((sizes > 1e-10 * sizes[0]).sum())])
+            A, b = A[kept], b[kept]
         parts, right, at = [A], [b], len(single)
         top = len(every)
         signs = sparse.csc_matrix(
@@ -183,7 +190,7 @@ class Guess:
         cost = np.r_[np.zeros(top), -1.0]
         try:
             x = interior_point(
-                cost, sparse.vstack(parts), np.concatenate(right), len(rows), signed + 1, [len(b.z) for b in self.blocks]
+                cost, sparse.vstack(parts), np.concatenate(right), len(b), signed + 1, [len(block.z) for block in self.blocks]
             )
         except BaseException as fault:  # a panic of the solver is one
             if isinstance(fault, (KeyboardInterrupt, SystemExit)):
@@ -209,15 +216,16 @@ class Guess:
         for digits in (10, 20, 34):
             step = unit(margin) / 2**digits
             y = [round(Fraction(float(v)) / step) * step for v in x[:-1]]
-            rest = Counter(self.p)
-            for v, q in zip(y, [*single, *grams], strict=True):
-                if v:
-                    for m, c in q.terms.items():
-                        rest[m] = rest.get(m, Fraction(0)) - v * c
-            rest = {m: c for m, c in rest.items() if c}
-            fixed = self.shared(y, rest, len(single)) if self.basis is None else self.projected(y, rest, [*single, *grams])
+            covered = self.covered(len(single))
+            rest = self.amiss(y)
+            alone = {m: c for m, c in rest.items() if m not in covered}
+            fixed = self.projected(y, alone, covered) if alone else y
             if fixed is None:
                 return None
+            for m, c in self.amiss(fixed).items():
+                whole = sum((next(iter(grams[k - len(single)].terms.values())) for k in covered[m]), Fraction(0))
+                for k in covered[m]:
+                    fixed[k] += c / whole
             evidence = self.written(fixed)
             try:
                 self.o.check(evidence)
@@ -226,29 +234,35 @@ class Guess:
             return evidence
         return None
 
-    def shared(self, y: list[Fraction], rest: Terms, head: int) -> list[Fraction] | None:
-        """Put what is amiss of each monomial on the entries that have it of the matrix without a factor."""
-        places: dict[Monomial, list[int]] = defaultdict(list)
-        for k, column in enumerate(self.blocks[0].columns(), head):
-            places[next(iter(column.terms))].append(k)
-        grams = self.columns[1]
-        for m, c in rest.items():
-            if m not in places:
-                return None
-            whole = sum((next(iter(grams[k - head].terms.values())) for k in places[m]), Fraction(0))
-            for k in places[m]:
-                y[k] += c / whole
-        return y
+    def amiss(self, y: list[Fraction]) -> Terms:
+        """Return what is missing of p."""
+        single, grams = self.columns
+        rest = dict(self.p.terms)
+        for v, q in zip(y, [*single, *grams], strict=True):
+            for m, c in q.terms.items() if v else ():
+                rest[m] = rest.get(m, Fraction(0)) - v * c
+        return {m: c for m, c in rest.items() if c}
 
-    def projected(self, y: list[Fraction], rest: Terms, every: list[Poly]) -> list[Fraction] | None:
-        """Put what is amiss on all numbers, as little as can be (least squares, exactly)."""
-        rows = {m: k for k, m in enumerate(sorted({m for q in every for m in q.terms}))}
+    def covered(self, head: int) -> dict[Monomial, list[int]]:
+        """Return for each monomial the entries of the matrix without a factor that have it alone."""
+        places: dict[Monomial, list[int]] = defaultdict(list)
+        for k, column in enumerate((c for block in self.blocks if not block.places for c in block.columns()), head):
+            if self.basis is None:
+                places[next(iter(column.terms))].append(k)
+        return dict(places)
+
+    def projected(self, y: list[Fraction], rest: Terms, covered: Mapping[Monomial, Any]) -> list[Fraction] | None:
+        """Put what is amiss of monomials that are not covered on all numbers, as little as can be (least squares, exactly)."""
+        single, grams = self.columns
+        every = [*single, *grams]
+        rows = {m: k for k, m in enumerate(sorted({m for q in every for m in q.terms if m not in covered}))}
         if not set(rest) <= set(rows):
             return None
         A = fmpq_mat(len(rows), len(every))
         for k, q in enumerate(every):
             for m, c in q.terms.items():
-                A[rows[m], k] = fmpq(c.numerator, c.denominator)
+                if m in rows:
+                    A[rows[m], k] = fmpq(c.numerator, c.denominator)
         echelon, rank = A.transpose().rref()
         kept = [next(c for c in range(len(rows)) if echelon[r, c] != 0) for r in range(rank)]
         names = list(rows)
@@ -297,9 +311,15 @@ class Guess:
         return Poly(found)
 
 
-def Counter(p: Poly) -> Terms:
-    """Return the terms of a polynomial to be changed."""
-    return dict(p.terms)
+def independent(given: list[Poly]) -> list[Poly]:
+    """Return polynomials without those that others before them make."""
+    rows = {m: k for k, m in enumerate({m for q in given for m in q.terms})}
+    A = fmpq_mat(max(len(rows), 1), max(len(given), 1))
+    for k, q in enumerate(given):
+        for m, c in q.terms.items():
+            A[rows[m], k] = fmpq(c.numerator, c.denominator)
+    echelon, rank = A.rref()
+    return [given[next(k for k in range(len(given)) if echelon[r, k] != 0)] for r in range(rank)]
 
 
 def largest(q: Poly) -> float:
@@ -410,6 +430,27 @@ def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
     return None
 
 
+def eliminated(o: Sum, q: Poly, x: str, *more: Any) -> dict[str, Any] | None:
+    """Return evidence by that without a variable, which a relation tells; its cofactor is what is then amiss, divided by it."""
+    instead = {x: Poly({(x,): Fraction(1)}) - q * (1 / q.terms[(x,)])}
+    others = [r for r in o.modulo if r is not q]
+    found = find(Sum(o.p.at(instead), *([r.at(instead) for r in own] for own in (o.known, others, o.strict))), *more)
+    if not found:
+        return found
+    cofactors = [read_poly(c) for c in found["cofactors"]]
+    rest = o.p - dot([Fraction(v) for v in found["numbers"]], o.strict) - dot(cofactors, others)
+    for part in found["parts"]:
+        z = [read_poly({name: "1"} if isinstance(name, str) else name) for name in part["z"]]
+        form = dot(z, apply([[Fraction(v) for v in row] for row in part["gram"]], z))
+        rest = rest - form * product_of(o.known, part["of"])
+    own = quotient(rest, q)
+    if own is None:
+        return None
+    loose = iter(cofactors)
+    found["cofactors"] = [text(own if r is q else next(loose)) for r in o.modulo]
+    return found
+
+
 def find(
     o: Sum, scales: Mapping[str, float], basis: Sequence[Poly] | None = None, degrees: Sequence[int] = (0, 2), exact: bool = True
 ) -> dict[str, Any] | None:
@@ -419,6 +460,10 @@ def find(
         found = divided(o, scales, basis, degrees, exact)
     if found is not None:
         return found
+    for q in o.modulo:
+        alone = [x for x in q.names if (x,) in q.terms and sum(x in m for m in q.terms) == 1]
+        if alone:
+            return eliminated(o, q, alone[0], scales, basis, degrees, exact)
     least = max(degree(q) for q in (o.p, *o.strict))
     least += least % 2
     sides = [k for k, q in enumerate(o.known) if degree(q) == 1]
@@ -426,7 +471,7 @@ def find(
     few += [(0, 1)] if len(o.known) > 1 else []
     many = list(combinations(range(min(len(o.known), 12)), 2))
     for more in degrees:
-        for pairs in (few, many) if more else (few,):
+        for pairs in (few, many) if more and len(o.p.names) < 4 else (few,):
             guess = Guess(o, scales, least + more, pairs, basis)
             x = guess.floats()
             if x is not None:
