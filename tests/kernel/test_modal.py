@@ -2,15 +2,17 @@
 
 import copy
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from starhold.certification.certify import certify
 from starhold.certification.evidence.claims import find_claims
-from starhold.certification.evidence.finding import certificate, obligations
+from starhold.certification.evidence.finding import certificate, obligations, read
 from starhold.certification.evidence.isotropic import ISOTROPIC, values
 from starhold.kernel.check import check
+from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import WORK, Account, RefusedError
 from starhold.kernel.polynomials import poly, var
 from starhold.kernel.programs import Exactly, Program, known
@@ -84,13 +86,22 @@ def test_inertia_target_and_its_motion_do_not_matter():
     assert number(claim["numbers"]["level"]) == pytest.approx(number(shown(loop_of())[1]["numbers"]["level"]), rel=1e-9)
 
 
+def test_the_torque_of_a_law_with_quotients_may_be_held():
+    loop = loop_of()
+    own = certify(loop).claim("sampling")
+    (claim,) = (c for c in find_claims(loop).claims if "samples" in c["theorem"])
+    numbers = {name: number(x) for name, x in claim["numbers"].items()}
+    assert numbers["longest"] == pytest.approx(own.numbers["longest"], rel=0.02)
+    assert numbers["radius"] < 1.0
+
+
 @pytest.mark.parametrize(
     "lines", ["phi_0 = -0.4\nphi_1 = -0.5\nb = -0.01", "phi_0 = [-0.4, -0.4, -0.3]\nphi_1 = -0.4\nb = -0.01"]
 )
 def test_other_spectra_are_left_alone_and_say_so(lines):
     loop = find_claims(loop_of(more=lines))
     assert "only for phi_0 = phi_1" in loop.failed[ISOTROPIC]
-    assert not loop.claims
+    assert ISOTROPIC not in {claim["theorem"] for claim in loop.claims}
 
 
 @pytest.mark.parametrize(
@@ -140,6 +151,16 @@ def test_divisors_are_gathered_once_and_hold_no_quotient():
         nested.run(given, Exactly({}), 1)
     with pytest.raises(RefusedError, match="divides by the state"):
         nested.run(given, Exactly(), 1)
+
+
+def test_inverses_are_expanded_where_their_divisors_do_not_vanish():
+    content = contents("landing", "rounded", 0)
+    loop = AttitudeLoop(read(content["claims"][0], content["programs"]), quotients=True)
+    rest, q1 = loop.on_target | loop.still, var("q1")
+    loop.divisors = {"z0": q1 + 2, "z1": q1 * q1}
+    assert not (loop.expanded(var("z0") * q1, rest) - q1 * Fraction(1, 2) + q1 * q1 * Fraction(1, 4)).terms
+    with pytest.raises(RefusedError, match="divides by zero at rest"):
+        loop.expanded(var("z1"), rest)
 
 
 def test_functions_are_reduced_to_what_a_turn_leaves():

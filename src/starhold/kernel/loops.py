@@ -138,6 +138,15 @@ class AttitudeLoop:
         rates = zip((*(f"q{k}" for k in range(4)), *self.still), (*self.turning, *acceleration), strict=True)
         return total(p.slope(name) * rate for name, rate in rates)
 
+    def expanded(self, p: Poly, rest: Mapping[str, int]) -> Poly:
+        """Return p with the inverses in it as they are to the first order around a point, where no divisor vanishes."""
+        for z, divisor in (self.divisors or {}).items():
+            if z in p.names:
+                d = divisor.at(rest).number
+                demand(d != 0, "a program divides by zero at rest")
+                p = p.at({z: (2 * d - divisor) * (1 / (d * d))})
+        return p
+
     def sound(self) -> Shown:
         """The inertia is one, and the programs of the body and of its turning are the equations above."""
         if not self.any_inertia:
