@@ -139,12 +139,12 @@ class AttitudeLoop:
         return total(p.slope(name) * rate for name, rate in rates)
 
     def expanded(self, p: Poly, rest: Mapping[str, int]) -> Poly:
-        """Return p with the inverses in it as they are to the first order around a point, where no divisor vanishes."""
+        """Return p with the inverses in it as they are to the first order around a point, where no divisor of any program
+        vanishes, used or not."""
         for z, divisor in (self.divisors or {}).items():
-            if z in p.names:
-                d = divisor.at(rest).number
-                demand(d != 0, "a program divides by zero at rest")
-                p = p.at({z: (2 * d - divisor) * (1 / (d * d))})
+            d = divisor.at(rest).number
+            demand(d != 0, "a program divides by zero at rest")
+            p = p.at({z: (2 * d - divisor) * (1 / (d * d))})
         return p
 
     def sound(self) -> Shown:
