@@ -43,9 +43,7 @@ def test_a_refuted_claim_ends_with_three_and_its_state(tmp_path):
     assert (tmp_path / "out" / "invariant.png").stat().st_size > 10_000
 
 
-def test_an_undecided_claim_ends_with_four(tmp_path, monkeypatch):
-    # Nor is it shown with 25 times as many boxes.
-    monkeypatch.setattr(enclosure, "MOST", 10_000)
+def test_an_undecided_claim_ends_with_four(tmp_path):
     assert written(tmp_path, y="0", theorem="attracts").returncode == 4
 
 

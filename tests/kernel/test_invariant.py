@@ -168,7 +168,7 @@ def test_mutations_say_nothing_false(name):
 
 
 def mutated(content, rng):
-    """Return the content with one change: of a step or an output of a program, a number, a side or a part of the evidence."""
+    """Return the content with one change: of a step or an output of a program, a number, a side or of the evidence."""
     content = copy.deepcopy(content)
     claim = claimed(content)
     where = rng.choice(["program", "program", "numbers", "subject", "evidence"])

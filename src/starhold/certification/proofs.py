@@ -30,7 +30,7 @@ from starhold.kernel.check import Proved, check
 HOW = {
     **dict.fromkeys(("Vanishes", "Solves"), EXACT),
     **dict.fromkeys(("Definite", "Exceeds"), EXACT_SIGN),
-    "Squares": SQUARES,
+    **dict.fromkeys(("Squares", "Sum"), SQUARES),
     "Contracts": LYAPUNOV,
 }
 """How each rule of the kernel shows what it shows."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import ASKED, SAMPLED, SLIDING, Loop, sign_words
 from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.isotropic import find_isotropic
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.subject import Subject
 from starhold.kernel.loops import MOVING, OUTSIDE
@@ -26,6 +27,8 @@ def find_claims(subject: Subject, turn: float | None = None) -> Loop:
     if not flown.remembers:
         if flown.law.lyapunov is not None:
             loop.show_end(turn)
+        if hasattr(flown.law.module, "single_root"):
+            find_isotropic(loop)
         if hasattr(flown.law.module, "surface"):
             find_sliding(loop)
         find_sampled(loop)

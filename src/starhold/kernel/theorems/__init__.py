@@ -8,7 +8,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, invariant, sampling, sliding, station
+from . import attitude, invariant, isotropic, sampling, sliding, station
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -18,6 +18,7 @@ THEOREMS: dict[str, Theorem] = {
     "converges whatever the inertia": attitude.converges_whatever_the_inertia,
     "converges from both quaternions": attitude.converges_evenly,
     "converges from both quaternions whatever the inertia": attitude.converges_evenly_whatever_the_inertia,
+    "converges without a preferred axis": isotropic.converges_without_axes,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
     "attracts": invariant.attracts,

@@ -34,10 +34,10 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     solve ((J - h C/2) x^2 + (C - h K/4) x + K/2) v = 0 up to a factor of x: where the three matrices are symmetric and
     positive definite, Re x < 0 and so |z| < 1. The first two are linear
     in h, and so definite for every h up to the longest if they are for this, for at 0 they then are as well."""
-    loop = AttitudeLoop(claim)
+    loop = AttitudeLoop(claim, quotients=True)
     yield from loop.sound()
     rest: dict[str, int] = loop.on_target | loop.still
-    u = [near_rest(cases, rest) for cases in loop.law]
+    u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
     loop.autonomous(u)
     for k, p in enumerate(u):
         yield f"rest on target {k}", Vanishes(p.at(rest))
