@@ -15,7 +15,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 172fe596a5566b13e339d707e790a4e522068dd00d373d54a9a4d46e2772a155:
+   Certificate: certificate.json, sha256 5988f55da460d7d0c2cf0ffd7e80b2a674f23ea95014bfdef2d638466a36a981:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
@@ -30,10 +30,9 @@
      entry of the inertia off by up to 100 % of sqrt(J_ii J_jj)
      proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
      every period up to 19.99 s
-   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
-   applied continuously; torque not limited; no torque from outside but what the law cancels; torque from
-   outside bounded in norm; inertia within the tolerance; no torque from outside; target at rest; linear
-   motion near rest on a target at rest.
+   These claims assume: rigid body; exact measurement and ideal actuators; torque applied continuously;
+   inertia exactly as given; torque not limited; no torque from outside; torque from outside bounded in
+   norm; inertia within the tolerance; target at rest; linear motion near rest on a target at rest.
    Check it independently: starhold check certificate.json */
 
 #ifndef LQR_H

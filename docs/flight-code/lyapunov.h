@@ -13,20 +13,20 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 c55afd773a8c7d4ec6f3f8a39f2636126bf6d056b24ae6cdaacc4ad32f17a859:
+   Certificate: certificate.json, sha256 7dd5f36bf1331e704b5483a2270f71ceeeda9f0b29789b5b20029b733f3bde84:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
      target, almost always at q0 = 1; it may turn the long way to get there (unwinding)
-     proved: within the torque limit: from the level set of V that holds rest at up to 96.98° and, on
-     target, 3.156°/s about any axis, the torque never exceeds 0.01 N m on every axis
+     proved: within the torque limit: from the level set of V that holds rest at up to 97.3° and, on
+     target, 3.166°/s about any axis, the torque never exceeds 0.01 N m on every axis
      proved: uncertain inertia: with unlimited torque, from every attitude and rate it converges whatever
      the inertia of the body really is
      proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
      every period up to 39.99 s
-   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
-   applied continuously; torque not limited; no torque from outside but what the law cancels; no torque
-   from outside; target at rest; linear motion near rest on a target at rest.
+   These claims assume: rigid body; exact measurement and ideal actuators; torque applied continuously;
+   inertia exactly as given; torque not limited; no torque from outside but what the law cancels; torque
+   from outside bounded on each axis; no torque from outside; linear motion near rest on a target at rest.
    Check it independently: starhold check certificate.json */
 
 #ifndef LYAPUNOV_H

@@ -14,7 +14,7 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 6dbbd42bcfe10e359856024e89fb3fe1babb0cec7e7c369f623ca11489ffbd4e:
+   Certificate: certificate.json, sha256 c3e893757edd950b59cc325c52db3799b5d15a5648d6dcf010e4fce6f78552e0:
    proved
    Claims:
      proved: region of attraction: from the level set of V that holds rest at every attitude told by the

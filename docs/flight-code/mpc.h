@@ -19,7 +19,7 @@
    wheels.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 87fcf48769836739be82749cd554f4a13a37b5fb5282251caa0acaed29fc1daf:
+   Certificate: certificate.json, sha256 4ffb6612a401266e66e66151902f7f7a52c2fdcf50eb9cbe9a0df8165149cd8e:
    undecided
    Claims:
    Check it independently: starhold check certificate.json */

@@ -19,7 +19,7 @@
    0.1 s.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 cc71803e5225da180974cec32c1c96af676fdd8c0444ae78852df860c8d79638:
+   Certificate: certificate.json, sha256 6020d8c9880d24e9fdd69cc1b3cdbcad7896460419342d2f20fbd69e111974ad:
    undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches

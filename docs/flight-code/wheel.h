@@ -13,22 +13,23 @@
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
 
-   Certificate: certificate.json, sha256 b50f164c94623e063597182845d80e33530a70e40001bad4abf47494b887d62a:
+   Certificate: certificate.json, sha256 6115a39aaba1a774012a72c9f62a34a5c3c43d5b4efe12de3584205c002fe307:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
      body comes to rest on target, almost always: it could also rest at half turns, which are unstable
-     proved: within the wheels' limits: from the level set of V that holds rest at up to 26.57° and, on
-     target, 1.416°/s about any axis, while the total momentum is at most 0.02945 N m s, no motor gives
-     more than 0.02 N m and no wheel stores more than 0.1771 N m s
+     proved: within the wheels' limits: from the level set of V that holds rest at up to 30.23° and, on
+     target, 1.607°/s about any axis, while the total momentum is at most 0.02945 N m s, no motor gives
+     more than 0.02 N m and no wheel stores more than 0.396 N m s
      proved: uncertain inertia: with wheels that have neither limits nor friction, from every attitude and
      rate it converges whatever the inertia of the body really is
      proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
      every period up to 13.62 s
-   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
-   applied continuously; neither torque nor wheels limited, wheels without friction; no torque from outside
-   but what the law cancels; wheels without friction; total momentum at most as told; no torque from
-   outside; target at rest; linear motion near rest on a target at rest; no stored momentum.
+   These claims assume: rigid body; exact measurement and ideal actuators; torque applied continuously;
+   inertia exactly as given; neither torque nor wheels limited, wheels without friction; no torque from
+   outside but what the law cancels; total momentum at most as told; torque from outside bounded on each
+   axis; wheels without friction; no torque from outside; target at rest; no stored momentum; linear motion
+   near rest on a target at rest.
    Check it independently: starhold check certificate.json */
 
 #ifndef WHEEL_H

@@ -53,7 +53,8 @@ def by_hand(law, gains, claims, **changes):
     outcome = "undecided" if [claim["kind"] for claim in claims] == ["sampling"] else "proved"
     kinds = [claim["kind"] for claim in claims]
     certificate = {"name": law, "outcome": outcome, "subject": subject, "kinds": kinds, "claims": claims}
-    return {"format": "starhold certificate 2", "scenario": "hand", "versions": {}, "certificates": [certificate]}
+    about = {"scenario": "hand", "versions": {}, "note": "", "programs": {}, "claims": []}
+    return {"format": "starhold certificate 3", **about, "certificates": [certificate]}
 
 
 HOWS = {

@@ -13,8 +13,9 @@ from starhold.analysis.departure import start_inside
 from starhold.analysis.trial import fly_claims
 from starhold.certification import region
 from starhold.certification.certify import Wanted, certify
+from starhold.certification.mixed import SHAPES, Shape
 from starhold.certification.motion import Motion
-from starhold.certification.region import ENERGY, SHAPES, Shape, holds
+from starhold.certification.region import ENERGY, holds
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration

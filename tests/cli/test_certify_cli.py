@@ -1,6 +1,8 @@
 """Certificates as a user meets them: what is printed, what is written, the exit codes."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -19,7 +21,7 @@ def proved(tmp_path_factory):
 
 def outcomes(path):
     content = json.loads(path.read_text())
-    assert content["format"] == "starhold certificate 2"
+    assert content["format"] == "starhold certificate 3"
     return {c["name"]: {claim["kind"]: claim["outcome"] for claim in c["claims"]} for c in content["certificates"]}
 
 
@@ -32,7 +34,7 @@ def test_certify_writes_a_certificate(proved):
     assert {"convergence", "torque-limit", "inertia", "sampling"} <= set(found["pd"])
     for word in ("proved", "converges", "within the torque limit", "rigid body", "flown", "starhold check"):
         assert word in done.stdout
-    assert sorted(path.name for path in (folder / "out").iterdir()) == ["certificate.json"]
+    assert sorted(path.name for path in (folder / "out").iterdir()) == ["certificate.json", "kernel.pyz"]
 
 
 def test_existing_results_are_refused(proved):
@@ -45,11 +47,22 @@ def test_existing_results_are_refused(proved):
 
 def test_check_passes_what_certify_wrote_and_fails_what_was_changed(proved):
     folder, _ = proved
+    content = json.loads((folder / "out" / "certificate.json").read_text())
     good = starhold("check", "out/certificate.json", cwd=folder, code=0)
     assert " 0 fail" in good.stdout
-    content = json.loads((folder / "out" / "certificate.json").read_text())
+    assert good.stdout.startswith("The programs of its proofs were not compared with those of a scenario.")
+    same = starhold("check", "out/certificate.json", "--scenario", "small.toml", cwd=folder, code=0)
+    assert same.stdout.startswith("The programs of its proofs are those of small.toml.")
+    (folder / "other.toml").write_text((CRAFT + PD).replace("k_attitude = 0.009", "k_attitude = 0.008"))
+    other = starhold("check", "out/certificate.json", "--scenario", "other.toml", cwd=folder, code=1)
+    assert other.stdout.startswith("another loop  pd: gains.k_attitude is another number")
+    alone = subprocess.run(
+        [sys.executable, "-I", "-S", "out/kernel.pyz", "out/certificate.json"], cwd=folder, capture_output=True, text=True
+    )
+    assert alone.returncode == 0
+    assert alone.stdout.count("proved: ") == len(content["claims"])
     limit = next(claim for claim in content["certificates"][0]["claims"] if claim["kind"] == "torque-limit")
-    limit["numbers"]["limit"] *= 0.5
+    content["claims"][limit["proof"]]["numbers"]["limit"] = "1/1000"
     (folder / "changed.json").write_text(json.dumps(content))
     bad = starhold("check", "changed.json", cwd=folder, code=1)
     assert "fails" in bad.stdout

@@ -7,6 +7,7 @@ from functools import cache
 import starhold as sh
 from starhold.certification.evidence.claims import find_claims
 from starhold.certification.evidence.finding import certificate
+from starhold.certification.subject import make_subject
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build
 
@@ -26,7 +27,7 @@ def found(scenario, law):
     else:
         given = sh.load(scenario)
         loop = build(given, given.pick(law))
-    return find_claims(loop)
+    return find_claims(make_subject(loop))
 
 
 def contents(scenario, law, *claims):

@@ -69,7 +69,7 @@ def of_words(r, content, claim):
     elif way == "theorem":
         claim["theorem"] = r.choice(
             ["converges", "converges strictly", "converges whatever the inertia", "converges from both quaternions",
-             "stays stable between samples", "reaches its surface"])  # fmt: skip
+             "converges without a preferred axis", "stays stable between samples", "reaches its surface"])  # fmt: skip
     else:
         a, b = r.sample(sorted(claim["programs"]), 2)
         claim["programs"][a], claim["programs"][b] = claim["programs"][b], claim["programs"][a]
@@ -81,7 +81,7 @@ def of_evidence(r, content, claim):
 
     def walk(node):
         for key, part in node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ():
-            if isinstance(part, str):
+            if isinstance(part, str) and part[-1:].isdigit():
                 spots.append((node, key))
             walk(part)
 

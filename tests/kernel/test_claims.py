@@ -22,6 +22,7 @@ KINDS = {
     "converges from both quaternions": "convergence",
     "converges whatever the inertia": "inertia",
     "converges from both quaternions whatever the inertia": "inertia",
+    "converges without a preferred axis": "region",
     "stays stable between samples": "sampling",
     "reaches its surface": "sliding",
 }
@@ -33,6 +34,8 @@ LAWS = [
     ("cubesat-slew", "sliding"), ("flexible-slew", "pd"), ("flexible-slew", "stiff"), ("geostationary", "pd"),
     ("geostationary", "matrix-pd"), ("geostationary", "lyapunov"), ("geostationary", "sliding"), ("wheels-orbital", "wheel"),
     ("wheels-orbital", "uncompensated"), ("cubesat-nadir", "wheel"), ("cubesat-nadir", "lyapunov"),
+    ("landing", "fit"), ("landing", "rounded"), ("landing", "searched"), ("landing-limits", "published"),
+    ("landing-limits", "own-fit"),
 ]  # fmt: skip
 
 

@@ -95,8 +95,25 @@ def whirled(m):
     return add(feedback()(m), (1e-3, 0.0, 0.0))
 
 
+def leaning(epsilon):
+    """A V with a mixed term, for a body with an inertia of 1 about every axis."""
+    return lambda m, craft: positive(m, craft) + epsilon * dot(m.rate, vector_part(m.attitude))
+
+
+def divided(m):
+    """Speeds up, by a torque that is multiplied and divided by a negative number."""
+    q = vector_part(m.attitude)
+    size = -1.0 - dot(q, q)
+    return scale(1.0 / size, scale(size, feedback(-C)(m)))
+
+
+def sideways(m):
+    """Damps turns about one axis, and speeds up those about the others."""
+    return add(feedback()(m), (0.0, 2.0 * C * m.rate[1], 2.0 * C * m.rate[2]))
+
+
 SAMPLED, REACHES, EVENLY = "stays stable between samples", "reaches its surface", "converges from both quaternions"
-ANY = "converges whatever the inertia"
+ANY, ISOTROPIC = "converges whatever the inertia", "converges without a preferred axis"
 CASES = {
     "Euler's equation": case(J=(1.0, 2.0, 3.0), body=no_gyroscopic),
     "turning": case(turning=faster),
@@ -114,6 +131,8 @@ CASES = {
     "torque": case(level=0.1, limit=0.15),
     "norm of the torque": case(level=0.1, limit_norm=0.15),
     "half turns are outside": case(even, evenly, EVENLY, level=0.2),
+    "divisor s": case(divided, leaning(-0.05), ISOTROPIC, level=0.05),
+    "V' turned about axis": case(sideways, leaning(0.05), ISOTROPIC, level=0.05),
     "step": case(theorem=SAMPLED, period=1.0, radius=0.5),
     "radius": case(feedback(-0.01), theorem=SAMPLED, period=1.0, radius=1.1),
     "rest on target": case(whirled, theorem=SAMPLED, period=1.0, radius=0.99),

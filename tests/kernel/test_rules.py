@@ -251,8 +251,14 @@ def test_a_program_under_another_digest_is_refused():
     content["programs"][name]["steps"].append(["constant", "0"])
     with pytest.raises(RefusedError, match="digest"):
         check(text(content))
-    with pytest.raises(RefusedError, match="number"):
-        check(json.dumps(contents("three-laws", "sliding") | {"format": 1.5}))
+    for stray in (1.5, 10**12):
+        with pytest.raises(RefusedError, match="format"):
+            check(json.dumps(contents("three-laws", "sliding") | {"format": stray}))
+        content = contents("three-laws", "sliding")
+        check(json.dumps(content | {"certificates": [stray]}))
+        content["claims"][0]["subject"]["gains.boundary_layer"] = stray
+        with pytest.raises(RefusedError, match="a number is not written as one"):
+            check(json.dumps(content))
 
 
 def test_polynomials_and_rounding():

@@ -14,8 +14,8 @@ from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, subtract
 from starhold.analysis.metrics import ALMOST, on_limit
 from starhold.certification.certificate import WHEELS
+from starhold.certification.mixed import Shape
 from starhold.certification.openness import WITHOUT
-from starhold.certification.region import Shape
 from starhold.laws.interface import Measurement
 from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import kinetic_energy

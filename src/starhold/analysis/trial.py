@@ -18,9 +18,9 @@ from starhold.analysis.departure import shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.frame import take_apart
 from starhold.certification.matrices import floats, number
+from starhold.certification.mixed import Shape
 from starhold.certification.motion import Motion
 from starhold.certification.potential import Potential, Spring
-from starhold.certification.region import Shape
 from starhold.certification.sampling import stable_period
 from starhold.certification.sliding import take_surface
 from starhold.certification.subject import make_subject

@@ -8,19 +8,25 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib import metadata
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
 from starhold.version import __version__
 
-FORMAT = "starhold certificate 2"
-FILE = "certificate.json"
+FORMAT = "starhold certificate 3"
+FILE, KERNEL = "certificate.json", "kernel.pyz"
+NOTE = (
+    "A claim with a number under 'proof' is that of the claims below, counted from 0, which kernel.pyz checks by itself. "
+    "Any other claim carries no proof: the checker of starhold derives it again from the subject."
+)
 Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
 EXACT_SIGN = "exact inequality"
+SQUARES, LYAPUNOV = "sum of squares", "Lyapunov's inequality"
 UNLIMITED = "torque not limited"
 WHEELS = "neither torque nor wheels limited, wheels without friction"
 """Claims about loops with wheels assume this in place of torque that is not limited."""
@@ -38,16 +44,26 @@ class Obligation:
     evidence: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
+@dataclass(frozen=True)
+class Proof:
+    """A proof as the kernel checks it: the claim with its evidence, and the programs that it is about by their digests."""
+
+    claim: dict[str, Any]
+    programs: dict[str, Any]
+
+
 @dataclass(frozen=True, repr=False)
 class Claim:
     """`kind` says what is claimed, `numbers` how much, in SI units; None among them means without bound. `witness`:
-    numbers that make the proof, and that a checker needs."""
+    numbers that make the proof, and that a checker needs. `proof`: what the kernel has checked; without one the checker
+    derives the claim again."""
 
     kind: str
     numbers: dict[str, Any]
     witness: dict[str, Any]
     assumptions: tuple[str, ...]
     obligations: tuple[Obligation, ...]
+    proof: Proof | None = None
 
     def __repr__(self) -> str:
         return f"<Claim {self.kind}: {self.outcome}; {len(self.obligations)} obligations>"
@@ -98,22 +114,32 @@ class Certificate:
 
 
 def write(certificates: Sequence[Certificate], scenario: str, path: Path) -> None:
-    """The certificates of a scenario's laws as one JSON file; every number reads back as the same float."""
+    """The certificates of a scenario's laws as one JSON file; every number reads back as the same float. Claims with proofs
+    stand there as the kernel reads them; what it does not read stands beside them."""
     versions = {"starhold": __version__, "python": platform.python_version()}
     versions |= {name: metadata.version(name) for name in ("python-flint", "numpy", "scipy")}
+    proofs = [claim.proof for certificate in certificates for claim in certificate.claims if claim.proof is not None]
+    places = count()
     content = {
         "format": FORMAT,
         "scenario": scenario,
         "versions": versions,
-        "certificates": [_plain(c) for c in certificates],
+        "note": NOTE,
+        "certificates": [_plain(c, places) for c in certificates],
+        "programs": {name: program for proof in proofs for name, program in proof.programs.items()},
+        "claims": [proof.claim for proof in proofs],
     }
     path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _plain(certificate: Certificate) -> dict[str, Any]:
+def _plain(certificate: Certificate, places: Iterator[int]) -> dict[str, Any]:
     claims: list[dict[str, Any]] = []
     for claim in certificate.claims:
-        claims.append({"kind": claim.kind, "outcome": claim.outcome, **asdict(claim)})
+        shown = {"kind": claim.kind, "outcome": claim.outcome}
+        if claim.proof is not None:
+            claims.append(shown | {"proof": next(places)})
+        else:
+            claims.append(shown | {part: value for part, value in asdict(claim).items() if part != "proof"})
     kinds = [claim["kind"] for claim in claims]
     about = {"outcome": certificate.outcome, "subject": certificate.subject, "kinds": kinds}
     proof = {} if certificate.proof is None else {"proof": certificate.proof}

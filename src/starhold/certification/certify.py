@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite, isinf
 from typing import Any
@@ -16,6 +17,7 @@ from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import needed, torque_limit
 from starhold.certification.motion import Motion
 from starhold.certification.openness import bounded_torque, named
+from starhold.certification.proofs import proved_claims
 from starhold.certification.region import region
 from starhold.certification.sampling import APART, sampling
 from starhold.certification.saturation import FREE, saturation
@@ -73,31 +75,39 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
         everywhere = {"rate_everywhere": None, "everything": True}
         claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
+        proved = {claim.kind: claim for claim in proved_claims(subject, wanted.slew_angle)}
         if loop.law.lyapunov is not None:
-            claims.extend(_by_lyapunov(subject, wanted))
+            claims.extend(_by_lyapunov(subject, wanted, proved))
         else:
-            own = (region(subject), surface_claim(subject) if loop.wheels is None else None)
-            claims.extend(claim for claim in own if claim is not None)
+            slides = proved.get("sliding") or (surface_claim(subject) if loop.wheels is None else None)
+            claims.extend(claim for claim in (region(subject), slides) if claim is not None)
             claims.extend(_unshown(subject, wanted))
-        sampled = sampling(Motion(subject))
+        sampled = proved.get("sampling") or sampling(Motion(subject))
         claims.extend([] if sampled is None else [sampled])
         claims = needed(claims, Motion(subject)) if loop.law.lyapunov is not None else claims
     return claims
 
 
-def _by_lyapunov(subject: Subject, wanted: Wanted) -> list[Claim]:
+def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) -> list[Claim]:
     rate = "best" if wanted.rate is None else None if wanted.rate == float("inf") else wanted.rate
-    main, found, own = converge(subject, rate)
-    if found is None:
-        return [main]
-    # The law's own V, where it serves, gives the larger sets.
-    basin = own or found
+    main, basin = proved.get("convergence"), None
+    pushed = subject.disturbance != 0 or subject.modelled_norm != 0
     wheeled = subject.loop.wheels is not None
-    limit = saturation(basin, wanted.slew_angle) if wheeled else torque_limit(basin, wanted.slew_angle)
+    limit, box = proved.get("wheels" if wheeled else "torque-limit"), proved.get("inertia")
+    if main is not None and rate != "best" and not main.numbers["everything"]:
+        main = None
+    if main is None or limit is None or box is None or pushed:
+        derived, found, own = converge(subject, rate)
+        main = main or derived
+        # The law's own V, where it serves, gives the larger sets.
+        basin = own or found
+    if basin is not None:
+        limit = limit or (saturation if wheeled else torque_limit)(basin, wanted.slew_angle)
+        box = box or inertia_box(basin, wanted.inertia_tolerance)
     more = (
         (limit, wanted.slew_angle or (wheeled and wanted.momentum is not None)),
-        (disturbance(basin), wanted.disturbance),
-        (inertia_box(basin, wanted.inertia_tolerance), wanted.inertia_tolerance),
+        (None if basin is None else disturbance(basin), wanted.disturbance),
+        (box, wanted.inertia_tolerance),
     )
     # What nobody asked for is claimed only where it is proved.
     return [main, *(c for c, asked in more if c is not None and (asked or c.outcome == "proved"))]

@@ -108,7 +108,9 @@ def needed(claims: Sequence[Claim], motion: Motion) -> list[Claim]:
     pieces = jointly(motion.torque) if kind != "none" and np.isfinite(limit) else []
     if len(pieces) < 2 or not _everywhere(pieces, exact(limit), kind):
         return [*claims]
-    return [replace(c, assumptions=tuple(text for text in c.assumptions if text != UNLIMITED)) for c in claims]
+    return [
+        c if c.proof else replace(c, assumptions=tuple(text for text in c.assumptions if text != UNLIMITED)) for c in claims
+    ]
 
 
 def told_set(basin: Basin, level: Any | None, turn: float | None) -> dict[str, Any]:

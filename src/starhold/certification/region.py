@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from flint import arb
@@ -33,9 +33,9 @@ from starhold.certification.boxes import Sides, holds_on
 from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, LASALLE, Claim
 from starhold.certification.convergence import Obligations, assumed
 from starhold.certification.matrices import number, root_float
+from starhold.certification.mixed import SHAPES, Shape
 from starhold.certification.motion import Motion
 from starhold.certification.subject import Subject, above, below, direction, enclosed
-from starhold.parts.bodies.rigid_body import ROWS
 
 MOST = 300_000
 """Boxes that one proof may take: a fraction of a second."""
@@ -43,60 +43,8 @@ LESS = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)
 """How far below the level that points of a grid suggest a proof is tried."""
 
 
-class Shape(NamedTuple):
-    """The numbers of V. Where p > 0, p + 2 c2 > 0 and p + 4 c2 > 0 the attitude's part rises with the turn."""
-
-    p: float
-    c2: float
-    g: float
-    m: float
-
-    @property
-    def other_equilibrium(self) -> float:
-        """V/alpha^2 at rest on the other quaternion of the target."""
-        return 2.0 * self.p + 4.0 * self.c2
-
-    def value(self, a: float, attitude: Any, rate: Any) -> Any:
-        """V (1/s2) of attitude (4, ...) and rate (3, ...; rad/s) for the root a (1/s)."""
-        q, w = np.asarray(attitude), np.asarray(rate)
-        u, along = 1.0 - q[0], np.sum(q[1:] * w, axis=0)
-        turned = a * a * (self.p * u + self.c2 * u * u)
-        return np.sum(w * w, axis=0) / 2.0 + turned - a * (self.g + self.m * u) * along
-
-    def room(self, bound: float, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """{V <= bound alpha^2} at u is a ball of rates over alpha: its radius squared, below zero where it is empty."""
-        return 2.0 * (bound - self.p * u - self.c2 * u * u) + (self.g + self.m * u) ** 2 * u * (2.0 - u)
-
-    def draw(self, a: float, level: float, count: int, random: np.random.Generator) -> NDArray[np.float64]:
-        """States (16, count) of {V <= level}, half of them on its surface. Not part of any proof."""
-        axes, directions = random.normal(size=(2, 3, count))
-        axes /= np.linalg.norm(axes, axis=0)
-        directions /= np.linalg.norm(directions, axis=0)
-        u = random.uniform(0.0, 2.0, size=count)
-        # Where no rate is small enough, less of the turn.
-        while ((room := self.room(level / (a * a), u)) < 0.0).any():
-            u = np.where(room < 0.0, 0.9 * u, u)
-        inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count) ** (1.0 / 3.0))
-        states = np.zeros((ROWS.torque.stop, count))
-        states[0], states[1:4] = 1.0 - u, np.sqrt(u * (2.0 - u)) * axes
-        states[ROWS.rate] = a * ((self.g + self.m * u) * states[1:4] + inside * np.sqrt(room) * directions)
-        return states
-
-
 ENERGY = Shape(4.0, 0.0, 0.0, 0.0)
 """The one without a mixed term: it falls wherever the body turns, and a switch of the quaternion never raises it."""
-SHAPES = (
-    Shape(6.62, -0.62, 2.56, 0.59),
-    Shape(7.07, -0.58, 2.64, 0.62),
-    Shape(9.69, -0.9, 3.09, 0.72),
-    Shape(11.16, -0.65, 3.3, 0.75),
-    Shape(19.24, -1.97, 3.99, -0.45),
-    Shape(23.14, 0.0, 3.48, -0.44),
-    Shape(22.28, -0.02, 2.74, -1.22),
-    Shape(20.69, -0.03, 2.36, -1.18),
-)
-"""Near the largest sets for ab of up to 0.01, 0.02, 0.045, 0.07, 0.12, 0.2, 0.4 and from 1 on, from a search among points
-of a grid."""
 TRIED = 3
 """Shapes that are tried where points of a grid miss states at which V rises."""
 
@@ -179,7 +127,7 @@ def _largest(a: Any, beta: Any, cover: str) -> tuple[Shape, float] | None:
     # At q0 = 0, where the feedback of the shorter way switches, V is at least half of that on the other quaternion.
     ceiling = 0.5 if cover == "shortest" else 1.0
     guesses = [(shape, min(_guess(shape, beta), ceiling * shape.other_equilibrium)) for shape in shapes]
-    for shape, guess in sorted(guesses, key=lambda found: -_volume(*found))[:TRIED]:
+    for shape, guess in sorted(guesses, key=lambda found: -found[0].volume(found[1]))[:TRIED]:
         for less in LESS:
             level = below(exact(guess * (1.0 - less)) * a * a)
             if level > 0.0 and holds(shape, beta, exact(level) / (a * a)):
@@ -197,12 +145,6 @@ def _guess(shape: Shape, beta: Any, count: int = 60) -> float:
     v, slope, form = _scaled(shape, enclosed(beta), points)
     rising = (form[0] if shape == ENERGY else slope).high >= 0.0
     return min(least, float(v.low[rising].min(initial=np.inf)))
-
-
-def _volume(shape: Shape, bound: float) -> float:
-    """The volume of {V <= bound alpha^2} among attitudes and rates, up to a factor."""
-    u = np.linspace(0.0, 2.0, 201)
-    return float(np.sum(np.maximum(shape.room(bound, u), 0.0) ** 1.5 * np.sqrt(u * (2.0 - u))))
 
 
 def _turn(shape: Shape, bound: Any) -> float:

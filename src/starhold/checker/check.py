@@ -4,11 +4,12 @@ number and condition anew from the law's and the models' equations, by other met
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from flint import ctx
@@ -23,6 +24,7 @@ from starhold.checker.shapes import (
     HOWS,
     NUMBERS,
     OBLIGATION,
+    PROVED,
     STATION,
     SUBJECT,
     UNKNOWN_BODY,
@@ -34,12 +36,17 @@ from starhold.checker.shapes import (
 from starhold.checker.station import StationSubject, read_station, station_findings
 from starhold.checker.subject import LoopSubject, read_subject
 from starhold.checker.torque import never_beyond
-from starhold.kernel.check import check as kernel_check
+from starhold.kernel.check import Proved
+from starhold.kernel.check import check as prove_all
 from starhold.kernel.numbers import RefusedError
-from starhold.kernel.reading import FORMAT as KERNEL
+from starhold.kernel.reading import FORMAT
 
-FORMAT = "starhold certificate 2"
-FORMER = ("starhold certificate 1", "starhold invariant certificate 1", "starhold invariant certificate 2")
+FORMER = (
+    "starhold certificate 1",
+    "starhold certificate 2",
+    "starhold invariant certificate 1",
+    "starhold invariant certificate 2",
+)
 """Formats of earlier versions, whose keys had other names."""
 ENDS = (
     "convergence",
@@ -54,6 +61,8 @@ ENDS = (
     "hand-over",
 )
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
+BY_THE_KERNEL = "proved by the kernel"
+"""The reason of findings about claims with a proof."""
 READ_BY = {"disturbance": {"disturbance", "sliding"}, "switch": {"hand-over"}}
 """Entries of a subject that are allowed only beside a claim of one of these kinds, which alone read them."""
 BITS = 192
@@ -79,9 +88,9 @@ def passed(findings: Sequence[Finding]) -> bool:
 def check_file(path: Path | str) -> list[Finding]:
     """The findings about a certificate file; InputError where there is none that can be read."""
     content, faults = read_file(path)
-    if isinstance(content, Mapping) and content.get("format") == KERNEL:  # pyright: ignore[reportUnknownMemberType]
+    if isinstance(content, dict) and content.get("format") == FORMAT and "certificates" not in content:  # pyright: ignore
         try:
-            proved = kernel_check(Path(path).read_text(encoding="utf-8"))
+            proved = prove_all(Path(path).read_text(encoding="utf-8"))
         except RefusedError as reason:
             return [Finding("", "", "", "fails", str(reason))]
         return [Finding("", one.claim.theorem, one.statement.written(), "holds", "") for one in proved]
@@ -94,17 +103,40 @@ def check(content: Any) -> list[Finding]:
     with ctx.workprec(BITS), np.errstate(all="ignore"):
         try:
             shallow(content)
-            shaped(content, FILE, "the file")
-            former = content["format"] in FORMER
-            demand(not former, f"the format is {content['format']!r}, of an earlier version: certify again")
-            demand(content["format"] == FORMAT, f"the format is not {FORMAT!r}, nor the kernel's")
-            demand(len(content["certificates"]) > 0, "there are no certificates")
+            _known(content)
+            proofs = _proofs(content)
         except CheckError as fault:
             return [Finding("", "", "", "fails", str(fault))]
-        return [finding for given in content["certificates"] for finding in _certificate(given)]
+        return [finding for given in content["certificates"] for finding in _certificate(given, proofs)]
 
 
-def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
+def _known(content: Any) -> None:
+    """Refuse a file of another format, or one that lacks what a file of this format has."""
+    table = cast(dict[str, Any], content if isinstance(content, dict) else {})
+    given: Any = table.get("format")
+    demand(given not in FORMER, f"the format is {given!r}, of an earlier version: certify again")
+    shaped(content, FILE, "the file")
+    demand(given == FORMAT, f"the format is not {FORMAT!r}")
+    demand(len(table["certificates"]) > 0, "there are no certificates")
+
+
+def _proofs(content: Any) -> list[Proved]:
+    """What the kernel proves of a file, each claim of which has to be told of once, in order."""
+    listed: list[Any] = [given["claims"] for given in content["certificates"] if isinstance(given.get("claims"), list)]
+    told: list[Any] = [
+        claim["proof"] for claims in listed for claim in claims if isinstance(claim, dict) and "proof" in claim
+    ]
+    demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
+    if not told:
+        demand(not content["programs"], "there are programs without a proof")
+        return []
+    try:
+        return prove_all(json.dumps(content))
+    except RefusedError as fault:
+        raise CheckError(f"refused by the kernel: {fault}") from None
+
+
+def _certificate(given: Mapping[str, Any], proofs: Sequence[Proved]) -> Iterator[Finding]:
     name = str(given.get("name", ""))
     about = given.get("subject")
     if isinstance(about, Mapping) and "body" in about:
@@ -125,11 +157,12 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
         return
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
-        proofs, fault = _guarded(partial(_claim, subject, _absent(given["subject"], claim), claim))
-        if proofs is None:
+        work = partial(_proved, proofs, claim) if "proof" in claim else partial(_claim, subject, given["subject"], claim)
+        found, fault = _guarded(work)
+        if found is None:
             yield Finding(name, kind, "", "fails", fault)
             continue
-        for obligation, verdict, reason in proofs:
+        for obligation, verdict, reason in found:
             yield Finding(name, kind, obligation, verdict, reason)
     if not given["claims"]:
         yield Finding(name, "", "", "not claimed", "there are no claims")
@@ -180,15 +213,25 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
     return (read_station if station else read_subject)(given["subject"])
 
 
+def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, str]]:
+    """What the kernel found of a claim with a proof; numbers and assumptions are those of the proof alone."""
+    shaped(claim, PROVED, "the claim")
+    proved = proofs[int(claim["proof"])]
+    demand(proved.statement.label == claim["kind"], f"the proof is of another kind of claim: {proved.statement.label}")
+    names = dict.fromkeys(name.rstrip("+-0123456789 ") for name, _ in proved.shown)
+    return [(name, "holds", BY_THE_KERNEL) for name in names]
+
+
 def _absent(subject: Mapping[str, Any], claim: Any) -> list[str]:
     """The parts of the loop that a claim is not about; torques with a bound are among them where it is not about such."""
     bounded: list[str] = [] if claim.get("kind") == "disturbance" else subject.get("bounded_away", [])
     return [*subject["assumed_away"], *bounded]
 
 
-def _claim(subject: LoopSubject, absent: Sequence[str], claim: Any) -> list[tuple[str, Verdict, str]]:
-    """Verdict and reason for each obligation of a claim."""
+def _claim(subject: LoopSubject, about: Mapping[str, Any], claim: Any) -> list[tuple[str, Verdict, str]]:
+    """Verdict and reason for each obligation of a claim without a proof, about a subject as the file tells it."""
     shaped(claim, CLAIM, "the claim")
+    absent = _absent(about, claim)
     demand(claim["kind"] in CLAIMS, f"there is no kind of claim {claim['kind']} about such a loop")
     for obligation in claim["obligations"]:
         shaped(obligation, OBLIGATION, "an obligation")

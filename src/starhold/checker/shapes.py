@@ -89,11 +89,13 @@ def _within(shape: Mapping[str, Test]) -> Test:
 _OUTCOME = _one("proved", "refuted", "undecided")
 _VECTOR, _MAYBE = _list(_number, 3), _or_none(_number)
 FILE: dict[str, Test] = {
-    "format": _text,
-    "scenario": _text,
+    **dict.fromkeys(("format", "scenario", "note"), _text),
     "versions": lambda x: _object(x) and all(map(_text, x.values())),
-    "certificates": _list(_object),
+    "programs": _object,
+    **dict.fromkeys(("claims", "certificates"), _list(_object)),
 }
+PROVED: dict[str, Test] = {"kind": _text, "outcome": _one("proved"), "proof": lambda x: type(x) is int and x >= 0}
+"""A claim that the file has a proof of, by its place."""
 CERTIFICATE: dict[str, Test] = {
     "name": lambda x: _text(x) and len(x) <= 1_000,
     "outcome": _OUTCOME,

@@ -47,14 +47,24 @@ def check(
         list[Path] | None,
         typer.Option("--law-file", metavar="FILE", help="a law it speaks of that a file holds; repeatable"),
     ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option("--scenario", metavar="SCENARIO", help="record its loops again and compare them with the proofs"),
+    ] = None,
 ) -> None:
-    """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims."""
+    """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims.
+
+    Proofs are checked by the kernel, which kernel.pyz beside the file holds too; other claims are derived again.
+    """
     from contextlib import ExitStack
 
     from starhold.checker import check_file, passed
-    from starhold.cli.show_certificates import print_findings
+    from starhold.checker.check import BY_THE_KERNEL
+    from starhold.cli.show_certificates import print_compared, print_findings
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import adopted
+    from starhold.scenario.reading import load
+    from starhold.studies.certificates import compare_programs
 
     with ExitStack() as laws:
         # Only what the user names is run: a certificate comes from elsewhere.
@@ -62,6 +72,10 @@ def check(
             law = find_law(str(file))
             laws.enter_context(adopted(law))
         findings = check_file(path)
+        whole = passed(findings)
+        others = compare_programs(path, load(scenario)) if whole and scenario is not None else []
+    if any(found.reason == BY_THE_KERNEL for found in findings):
+        print_compared(others, scenario if whole else None)
     print_findings(findings)
-    if not passed(findings):
+    if others or not whole:
         raise typer.Exit(FAILED_CHECK)

@@ -107,6 +107,16 @@ def assumptions(certificate: Certificate) -> str:
     return "; ".join(texts)
 
 
+def print_compared(others: Sequence[str], scenario: str | None) -> None:
+    """Print whether the proofs are about the loops of a scenario; None: they were not compared with any."""
+    if scenario is None:
+        console.print("The programs of its proofs were not compared with those of a scenario.", highlight=False)
+    elif not others:
+        console.print(f"The programs of its proofs are those of {_safe(scenario)}.", highlight=False)
+    for text in others:
+        console.print(f"[red]another loop[/red]  {_safe(text)}", highlight=False)
+
+
 def print_findings(findings: Sequence[Finding]) -> None:
     """Print the findings of an independent check, claim by claim, and every obligation that fails."""
     groups: dict[tuple[str, str], list[Finding]] = {}

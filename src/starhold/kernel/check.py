@@ -10,10 +10,12 @@ from .reading import BYTES, Claim, read_certificate
 from .sentences import Statement
 from .theorems import THEOREMS
 
+UNREAD = "The programs were not compared with those of a scenario; what stands under 'certificates' was not read."
+
 
 @dataclass(frozen=True)
 class Proved:
-    """A claim that is proved, what it says, and what was shown for it, each with the name of its rule."""
+    """A claim that is proved, what it says, and the obligations that were checked, each with the name of its rule."""
 
     claim: Claim
     statement: Statement
@@ -27,12 +29,12 @@ def check(text: str) -> list[Proved]:
 
 
 def prove(claim: Claim) -> Proved:
-    """Check each obligation of a claim's theorem, and return what the theorem then says."""
+    """Check each obligation of a claim's theorem; RefusedError where one is not shown."""
     demand(claim.theorem in THEOREMS, "there is no such theorem")
-    wanted, shown = THEOREMS[claim.theorem](claim), list[tuple[str, str]]()
+    needed, shown = THEOREMS[claim.theorem](claim), list[tuple[str, str]]()
     while True:
         try:
-            name, obligation = next(wanted)
+            name, obligation = next(needed)
         except StopIteration as end:
             claim.close()
             return Proved(claim, end.value, tuple(shown))
@@ -52,7 +54,7 @@ def main(arguments: list[str]) -> int:
     except (RefusedError, OSError, UnicodeDecodeError, RecursionError, MemoryError) as fault:
         print(f"refused: {' '.join(str(fault).split()) or type(fault).__name__}")
         return 1
-    print("The programs were not compared with those of a scenario.", *lines, sep="\n")
+    print(UNREAD, *lines, sep="\n")
     return 0
 
 

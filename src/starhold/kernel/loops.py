@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from .numbers import RefusedError, Rows, demand, inverse
 from .polynomials import Poly, apply, cross, dot, poly, total, var, variables
-from .programs import Exactly, Piecewise, known, single
+from .programs import Asking, Exactly, Piecewise, known, single
 from .reading import Claim
 from .rules import Definite, Shown, Vanishes
 
@@ -60,10 +60,12 @@ def read(claim: Claim, role: str, count: int, ring: Exactly, *tables: Wired) -> 
 
 
 class AttitudeLoop:
-    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are."""
+    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are.
+    `quotients`: programs may divide by the state, but not by quotients, and take no roots of it."""
 
-    def __init__(self, claim: Claim, any_inertia: bool = False) -> None:
+    def __init__(self, claim: Claim, any_inertia: bool = False, quotients: bool = False) -> None:
         self.claim, self.any_inertia = claim, any_inertia
+        self.ring = Asking() if quotients else Exactly()
         self.q, self.w = variables("q", 0), variables("w")
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
         self.e = variables("e") if self.outside else NONE
@@ -99,7 +101,17 @@ class AttitudeLoop:
 
     def read(self, role: str, count: int, *tables: Wired) -> list[Piecewise]:
         """Return the outputs of a program, its inputs wired as the tables say."""
-        return read(self.claim, role, count, Exactly(), *tables)
+        found = read(self.claim, role, count, self.ring, *tables)
+        demand(not isinstance(self.ring, Asking) or not self.ring.roots, "a program takes a root of the state")
+        nested = any(divisor.names & self.divisors.keys() for divisor in self.divisors.values())
+        demand(not nested, "a program divides by a quotient")
+        return found
+
+    @property
+    def divisors(self) -> dict[str, Poly]:
+        """Return the polynomials that variables are inverses of."""
+        found = self.ring.inverses if isinstance(self.ring, Asking) else {}
+        return {name: Poly(dict(own)) for own, name in found.items()}
 
     @cached_property
     def law(self) -> list[Piecewise]:
@@ -140,6 +152,15 @@ class AttitudeLoop:
         """Return the derivative of a function of the state along the motion with an acceleration."""
         rates = zip((*(f"q{k}" for k in range(4)), *self.still), (*self.turning, *acceleration), strict=True)
         return total(p.slope(name) * rate for name, rate in rates)
+
+    def expanded(self, p: Poly, rest: Mapping[str, int]) -> Poly:
+        """Return p with the inverses in it as they are to the first order around a point, where no divisor of any program
+        vanishes, used or not."""
+        for z, divisor in self.divisors.items():
+            d = divisor.at(rest).number
+            demand(d != 0, "a program divides by zero at rest")
+            p = p.at({z: (2 * d - divisor) * (1 / (d * d))})
+        return p
 
     def sound(self) -> Shown:
         """The inertia is one, and the programs of the body and of its turning are the equations above."""

@@ -10,54 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 from .loops import read, wired
 from .numbers import demand
-from .polynomials import Poly, dot, multiple, total, var, variables
-from .programs import Case, Condition, Exactly, Guards, Piecewise, single
+from .polynomials import Poly, dot, total, var, variables
+from .programs import Asking, Guards, single
 from .reading import Claim
 
 STATE = ("x1", "x2", "x3", "v1", "v2", "v3")
-
-
-class Asking(Exactly):
-    """A program is read over polynomials in which roots n >= 0 and inverses s are variables, named by what they are of."""
-
-    def __init__(self) -> None:
-        self.roots, self.inverses = dict[Condition, str](), dict[Condition, str]()
-        self.divisors: list[Poly] = []
-        """What is divided by where no guard says that it is positive."""
-
-    def cases(self, guards: Guards, operation: str, x: list[Any]) -> Piecewise:
-        """Return the cases of a value; a comparison that the guards decide has one."""
-        if operation == "sqrt" and x[0].names:
-            return [Case(guards, self._named(self.roots, "n", x[0]))]
-        if operation == "divide" and x[1].names:
-            if positive(guards, x[1]) is not True:
-                self.divisors.append(x[1])
-            return [Case(guards, x[0] * self._named(self.inverses, "s", x[1]))]
-        if operation in ("less", "less_equal"):
-            strict = operation == "less"
-            told = positive(guards, x[1] - x[0] if strict else x[0] - x[1])
-            if told is not None:
-                return [Case(guards, told == strict)]
-        return super().cases(guards, operation, x)
-
-    def _named(self, found: dict[Condition, str], letter: str, p: Poly) -> Poly:
-        return var(found.setdefault(tuple(sorted(p.terms.items())), f"{letter}{len(found)}"))
-
-
-def positive(guards: Guards, p: Poly) -> bool | None:
-    """Tell whether p > 0 where guards hold, as far as one of them alone decides it: None where none does."""
-    for condition, above in guards if p.names else ():
-        g = Poly(dict(condition))
-        factor, offset = multiple(p, g if above else -g)
-        if factor > 0 and (offset > 0 or (above and offset == 0)):
-            return True
-        if factor < 0 and offset <= 0:
-            return False
-    return None
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,9 @@ from .numbers import RefusedError, demand, rational, read_dict, read_list, read_
 from .programs import Program
 
 FORMAT = "starhold certificate 3"
-BYTES, CLAIMS, NUMBERS = 8_000_000, 50, 2_000
+ASIDE = {"certificates", "note", "scenario", "versions"}
+"""What a certificate may hold beside proofs, and the kernel does not read."""
+BYTES, CLAIMS, NUMBERS = 8_000_000, 500, 2_000
 _T = TypeVar("_T")
 
 
@@ -69,7 +71,8 @@ def read_certificate(text: str) -> list[Claim]:
         raise RefusedError(f"the certificate is no JSON: {fault.msg} in line {fault.lineno}") from None
     except RecursionError:
         raise RefusedError("the certificate is nested too deeply") from None
-    kind, programs, claims = read_table(content, "format", "programs", "claims")
+    own = {key: part for key, part in read_dict(content, 3 + len(ASIDE)).items() if key not in ASIDE}
+    kind, programs, claims = read_table(own, "format", "programs", "claims")
     demand(kind == FORMAT, f"the format is not {FORMAT!r}")
     found = Told("programs", _table(programs, Program.read))
     for name in found.content:
@@ -90,9 +93,15 @@ def _claim(given: Any, programs: Told[Program]) -> Claim:
         Told("words", dict.fromkeys(taken, True)),
         Told("programs", _table(roles, lambda name: programs[name if isinstance(name, str) else ""])),
         Told("subject", _table(subject, rational)),
-        Told("numbers", _table(numbers, rational)),
+        Told("numbers", _table(numbers, _bound)),
         Told("evidence", _table(evidence, lambda part: part)),
     )
+
+
+def _bound(given: Any) -> Fraction:
+    found = rational(given)
+    demand(found >= 0, "a number of a claim is negative")
+    return found
 
 
 def _table(given: Any, read: Callable[[Any], _T]) -> dict[str, _T]:
@@ -105,10 +114,13 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
+class _Stray:
+    """A number outside of a text, which no reader takes."""
+
+
 def _no_number(text: str) -> Any:
-    raise RefusedError("a number stands outside of a text")
+    return _Stray()
 
 
-def _place(text: str) -> int:
-    demand(len(text) <= 9, "a whole number is too long")
-    return int(text)
+def _place(text: str) -> Any:
+    return int(text) if len(text) <= 9 else _Stray()

@@ -45,10 +45,11 @@ ASSUMPTIONS = {
 
 @dataclass(frozen=True)
 class Statement:
-    """A sentence, and the identifiers of what it assumes."""
+    """A sentence, the identifiers of what it assumes, and a label of what it is about."""
 
     text: str
     assumptions: tuple[str, ...]
+    label: str = ""
 
     def written(self) -> str:
         """Return the sentence with its assumptions."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from starhold.certification.certificate import FILE as CERTIFICATES
+from starhold.certification.certificate import KERNEL
 from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished
@@ -29,7 +30,7 @@ SUMMARY, PAGE = "summary.json", "report.html"
 INDEX = "index.html"
 EXPORT = "export.json"
 STUDIED = tuple(f"{name}.{kind}" for name in commands.names() if commands.command(name).suffix for kind in ("csv", "png"))
-MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, *STUDIED)
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *STUDIED)
 """A folder with one of these holds results."""
 
 
@@ -139,10 +140,15 @@ def write_part(result: commands.Result, kind: str, path: Path) -> Path:
 
 
 def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:
-    """Certificates as one file of a folder; returns its path."""
+    """Certificates as one file of a folder, and beside it the kernel that checks those with proofs; returns its path."""
+    from starhold.certification.evidence.bundle import kernel_bundle
+
     path = folder / CERTIFICATES
     with atomic_write(path) as hidden:
         write_certificates(certificates, name, hidden)
+    if any(claim.proof for certificate in certificates for claim in certificate.claims):
+        with atomic_write(folder / KERNEL) as hidden:
+            hidden.write_bytes(kernel_bundle())
     return path
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import json
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.studies.body import study_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from starhold.analysis.trial import Trial
     from starhold.certification.certificate import Certificate
+    from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import Scenario
 
 
@@ -21,6 +25,26 @@ class Tried(NamedTuple):
     certificate: Certificate
     trial: Trial | None
     start_inside: dict[str, bool]
+
+
+def compare_programs(path: Path, scenario: Scenario) -> list[str]:
+    """How the proofs of a file that was checked are about other loops than a scenario has; nothing where they are not."""
+    from starhold.certification.comparison import differences
+    from starhold.studies.bodies.rigid_body import certified_loops
+
+    content: Any = json.loads(path.read_text(encoding="utf-8"))
+    loops: dict[str, ClosedLoop] = {}
+    for entry in scenario.laws:
+        loops |= certified_loops(scenario, entry, build(scenario, entry)) if scenario.body == "rigid-body" else {}
+    found: list[str] = []
+    for given in content["certificates"]:
+        places = [claim["proof"] for claim in given["claims"] if "proof" in claim]
+        if places and given["name"] not in loops:
+            found.append(f"{given['name']}: the scenario has no such law")
+            continue
+        own = [text for place in places for text in differences(content["claims"][place], loops[given["name"]])]
+        found += [f"{given['name']}: {text}" for text in dict.fromkeys(own)]
+    return found
 
 
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:

@@ -52,6 +52,12 @@ def modes_flown(law: Law, run: Recording) -> tuple[Begun, ...]:
     return tuple(Begun(law.module.modes[one.mode - 1].name, one.first * period) for one in stretches(run))
 
 
+def named_modes(loop: ClosedLoop, name: str) -> dict[str, ClosedLoop]:
+    """The loop of each mode of a law, by the name of its certificate."""
+    modes: Any = loop.law.module.modes
+    return {f"{name}: {mode.name}": loop_of_mode(loop, place) for place, mode in enumerate(modes)}
+
+
 def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     """The certificates of the law of each mode, and of each switch whose next mode is known to converge."""
     from starhold.certification.certify import certify
@@ -60,9 +66,8 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     module: Any = loop.law.module
     assert isinstance(module, Modes)
     issued: list[Issued] = []
-    for place, mode in enumerate(module.modes):
-        mode_loop = loop_of_mode(loop, place)
-        issued.append(Issued(certify(mode_loop, f"{name}: {mode.name}", wanted), mode_loop, mode=place + 1))
+    for place, (title, mode_loop) in enumerate(named_modes(loop, name).items()):
+        issued.append(Issued(certify(mode_loop, title, wanted), mode_loop, mode=place + 1))
     for place, (mode, _, switches) in enumerate(module.parts(loop.gains)):
         for switch, (_, _, *levels) in switches:
             mode_loop, title = loop_of_mode(loop, switch.to), f"{name}: {mode.name} to {module.modes[switch.to].name}"

@@ -15,7 +15,7 @@ from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved
-from starhold.certification.subject import Subject, above, make_subject
+from starhold.certification.subject import Subject, above
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
@@ -37,6 +37,10 @@ TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
 """The other quaternion of the target, and half turns."""
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
+WRITTEN: dict[str, float | None] = {"stiffness": None, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
+"""The numbers of a V that is the law's own."""
+NEAR = 1.1
+"""How many times the least level those of other limits may be, to be looked at again."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
 """Shares of a largest level that are given away, for at the largest the matrices are singular."""
 
@@ -45,16 +49,20 @@ GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
 class Loop:
     """The programs and numbers of a closed loop, and the claims that were found."""
 
-    loop: ClosedLoop
-    disturbance: float = 0.0
+    known: Subject
     programs: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     claims: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     failed: dict[str, str] = field(default_factory=dict[str, str])
 
-    @cached_property
-    def known(self) -> Subject:
-        """The bounds of what acts on the loop from outside."""
-        return make_subject(self.loop, self.disturbance)
+    written_by: dict[str, dict[str, float | None]] = field(default_factory=dict[str, dict[str, float | None]])
+    """The numbers that a V which is not the law's own is made of, by its digest."""
+    eigenvalues: list[list[float]] = field(default_factory=list[list[float]])
+    """Those of a step near rest, in floats."""
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The loop that the claims are about."""
+        return self.known.loop
 
     @cached_property
     def roles(self) -> dict[str, str]:
@@ -83,12 +91,16 @@ class Loop:
         loop = self.loop
         plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
         if stiffness is None:
-            return self.add(loop.law.lyapunov, measurement=ASKED, gains=loop.gains, craft=plant)  # pyright: ignore
+            own = self.add(loop.law.lyapunov, measurement=ASKED, gains=loop.gains, craft=plant)  # pyright: ignore
+            self.written_by[own] = WRITTEN
+            return own
 
         def energy(measurement: Measurement, craft: Any) -> Any:
             return rigid_body.kinetic_energy(measurement.rate, craft) + 2.0 * stiffness * (1.0 - measurement.attitude[0])
 
-        return self.add(energy, measurement=ASKED, craft=plant)
+        found = self.add(energy, measurement=ASKED, craft=plant)
+        self.written_by[found] = WRITTEN | {"stiffness": stiffness}
+        return found
 
     @cached_property
     def subject(self) -> dict[str, str]:
@@ -166,8 +178,9 @@ class Loop:
         self.failed.pop(claim["theorem"], None)
         return True
 
-    def show_end(self) -> None:
-        """Find where motions end, by the law's own V or by the kinetic energy in its place."""
+    def show_end(self, turn: float | None = None) -> None:
+        """Find where motions end, by the law's own V or by the kinetic energy in its place. turn: what the set within the
+        limits is to hold (rad)."""
         V, signs = self.lyapunov(), sign_words(self.loop)
         widths = {"hysteresis": self.loop.hysteresis_width} if HYSTERESIS in signs else {}
         ways = [
@@ -180,10 +193,10 @@ class Loop:
             more: dict[str, Any] = widths if own else {}
             if SHORTEST in own:
                 # Below V where the sign changes.
-                level = Fraction(self.cap(theorem, own, V)) * (1 - GIVEN_AWAY[0])
+                level = Fraction(self.cap(theorem, own, V) * (1.0 - float(GIVEN_AWAY[0])))
                 more = {"level": level, **self.contents(self.form(V), level)}
             if self.try_to_show(self.claim(theorem, [*words, *own], V, **more), self.scales(V)):
-                self.show_limits(theorem, [*words, *own], V, widths if own else {})
+                self.show_limits(theorem, [*words, *own], V, widths if own else {}, turn)
                 more = {name: x for name, x in more.items() if name != "rate"}
                 self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
                 return
@@ -238,10 +251,12 @@ class Loop:
                 + epsilon * lean
             )
 
-        return self.add(energy, measurement=ASKED, craft=self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL))
+        found = self.add(energy, measurement=ASKED, craft=self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL))
+        self.written_by[found] = WRITTEN | {"stiffness": s, "epsilon": epsilon}
+        return found
 
-    def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> bool:
-        """Find the largest level on which everything is within its limits."""
+    def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any], turn: float | None) -> bool:
+        """Find the largest level on which everything is within its limits; False where that does not hold the turn."""
         loop, known, wheels = self.loop, self.known, self.loop.wheels
         numbers: dict[str, Any] = dict(more)
         if OUTSIDE in words:
@@ -266,8 +281,12 @@ class Loop:
             return False
         form, scales = self.form(V), self.scales(V, float(level))
         for share in GIVEN_AWAY:
-            told = numbers | self.contents(form, level * (1 - share))
-            if self.try_to_show(self.claim(theorem, words, V, level=level * (1 - share), **told), scales):
+            lower = Fraction(float(level * (1 - share)))
+            held = self.contents(form, lower)
+            if turn is not None and held["angle"] < turn:
+                break
+            told = numbers | held | ({} if turn is None else {"angle": turn})
+            if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
                 return True
         return False
 
@@ -293,9 +312,12 @@ class Loop:
         for _ in range(3):
             scales = self.scales(V, level if isfinite(level) else None)
             found = [highest(o, scales) for o in limits]
-            if any(x is None or x <= 0.0 for x in found):
+            known = [x for x in found if x is not None and x > 0.0]
+            if len(known) < len(found):
                 return None
-            level = min(cap, *(x for x in found if x is not None)) if found else cap
+            level = min(cap, *known) if found else cap
+            # Scales change what is found by little: the others stay higher.
+            limits = [o for o, x in zip(limits, known, strict=True) if x < NEAR * level]
         return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:

@@ -11,20 +11,24 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import ASKED, SAMPLED, SLIDING, Loop, sign_words
 from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.isotropic import find_isotropic
 from starhold.certification.evidence.squares import rounded
+from starhold.certification.subject import Subject
 from starhold.kernel.loops import MOVING, OUTSIDE
 from starhold.kernel.numbers import RefusedError, Rows, plus
 from starhold.kernel.rules import Contracts, Definite
-from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 
 
-def find_claims(flown: ClosedLoop, disturbance: float = 0.0) -> Loop:
-    """Find the claims that can be proved: where motions end, for every inertia, within limits, between samples."""
-    loop = Loop(flown, disturbance)
+def find_claims(subject: Subject, turn: float | None = None) -> Loop:
+    """Find the claims that can be proved: where motions end, for every inertia, within limits, between samples. turn: what
+    the set within the limits is to hold (rad)."""
+    loop, flown = Loop(subject), subject.loop
     if not flown.remembers:
         if flown.law.lyapunov is not None:
-            loop.show_end()
+            loop.show_end(turn)
+        if hasattr(flown.law.module, "single_root"):
+            find_isotropic(loop)
         if hasattr(flown.law.module, "surface"):
             find_sliding(loop)
         find_sampled(loop)
@@ -49,6 +53,8 @@ def find_sampled(loop: Loop) -> None:
     assert isinstance(K, Definite)
     roots: Any = np.linalg.eigvals(floats(step.A))
     radius = float(np.abs(roots).max())
+    ordered = sorted(map(complex, roots), key=lambda z: (-abs(z), z.imag))
+    loop.eigenvalues = [[z.real, z.imag] for z in ordered]
     told = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
     with np.errstate(all="ignore"):
         # They were made for twice the period.
@@ -58,14 +64,39 @@ def find_sampled(loop: Loop) -> None:
         loop.claim(SAMPLED, [], None, **told, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
     ):
         return
+    if radius >= 1.0:
+        loop.failed[SAMPLED] = "the torque is held for too long"
+        return
+    other = longest_stable(floats(J.a) + float(h) * floats(damping), floats(damping), floats(K.a), float(h))
+    for share in (1e-9, 1e-7, 1e-5, 1e-3):
+        if loop.try_to_show(loop.claim(SAMPLED, [], None, **told, other=other * (1.0 - share)), {}):
+            return
     loop.try_to_show(loop.claim(SAMPLED, [], None, **told), {})
+
+
+def longest_stable(J: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64], period: float) -> float:
+    """Return a period near the longest, from a stable one on, that floats find all stable up to."""
+    pull = np.asarray(np.linalg.solve(J, np.hstack([C, K])), dtype=np.float64)
+    one, none = np.eye(3), np.zeros((3, 3))
+
+    def stable(h: float) -> bool:
+        step = np.block([[one, none], [0.5 * h * one, one]]) - np.vstack([h * pull, 0.25 * h * h * pull])
+        return float(np.abs(np.linalg.eigvals(step)).max()) < 1.0
+
+    low, high = period, 2.0 * period
+    while stable(high) and high < 1e12 * period:
+        low, high = high, 2.0 * high
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
 
 
 def find_sliding(loop: Loop) -> None:
     """Find the claim that the surface is reached."""
     roles, flown = loop.roles, loop.loop
     roles["surface"] = loop.add(flown.law.module.surface, measurement=ASKED, gains=flown.gains)
-    m = [fraction(x) + Fraction(loop.disturbance) for x in loop.known.modelled]
+    m = [fraction(x + loop.known.disturbance) for x in loop.known.modelled]
     told: dict[str, Any] = {f"outside.{k}": x for k, x in enumerate(m)} if any(m) else {}
     words = [*([OUTSIDE] if any(m) else []), *([MOVING] if MOVING in loop.words else [])]
     layer = float(getattr(flown.gains, "boundary_layer", 0.0))
@@ -82,7 +113,10 @@ def signed(loop: Loop, told: dict[str, Any]) -> dict[str, Any]:
     J, K = tensor(loop.loop.craft.inertia), tensor(loop.loop.gains.surface_gain)
     low = told.get("inertia.low", float(np.linalg.eigvalsh(J)[0]) * (1.0 - 1e-6))
     k = told.get("surface.low", float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) * (1.0 - 1e-6))
-    return {"inertia.low": low, "surface.low": k, "level": 0.5 * low * k * k * (1.0 - 1e-6)}
+    level, moments = 0.5 * low * k * k * (1.0 - 1e-6), np.linalg.eigvalsh(J)
+    sine = np.sqrt(2.0 * level / np.linalg.eigvalsh(K.T @ J @ K)[-1])
+    held = {"angle": 2.0 * asin(min(sine, 1.0)) * (1.0 - 1e-7), "rate": np.sqrt(2.0 * level / moments[-1]) * (1.0 - 1e-7)}
+    return {"inertia.low": low, "surface.low": k, "level": level, **held}
 
 
 def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
@@ -99,8 +133,8 @@ def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
         "inertia.low": low,
         "inertia.high": high,
     }
-    found |= {"surface.low": k, "surface.high": steep, "surface": size, "rate": (size + steep * size / k) * more}
-    return found | {"angle": 2.0 * asin(min(size / k, 1.0)) * more}
+    found |= {"surface.low": k, "surface.high": steep, "surface": size, "end.rate": (size + steep * size / k) * more}
+    return found | {"end.angle": 2.0 * asin(min(size / k, 1.0)) * more}
 
 
 def floats(rows: Rows) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import plainly, rounded, squares, text
 from starhold.kernel import rules
 from starhold.kernel.numbers import Account, RefusedError, inverse, rational
@@ -64,6 +65,8 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
         found = plainly(o) or squares(o, scales)
         if found is None:
             raise NotFoundError(f"{name}: no sum of squares was found")
+    elif isinstance(o, rules.Sum):
+        found = Reduced(o, scales).evidence()
     elif isinstance(o, rules.Solves):
         found = in_proportion(o) or solves(o)
     elif isinstance(o, rules.Vanishes) and o.modulo:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from importlib import import_module
 from itertools import combinations_with_replacement
 from typing import Any
@@ -16,7 +17,6 @@ from typing import Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from starhold.errors import InputError
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
@@ -128,9 +128,15 @@ def degree(p: Poly) -> int:
 
 def posed(p: Poly, known: list[Poly], others: list[Poly], z: Sequence[Poly]) -> Problem:
     """Return the problem of finding multipliers of what is known, factors of the others and a Gram matrix."""
-    pairs = [(i, k) for k in range(len(z)) for i in range(k + 1)]
-    grams = [z[i] * z[k] * (1 if i == k else 2) for i, k in pairs]
+    pairs, grams = products(tuple(tuple(sorted(p.terms.items())) for p in z))
     return Problem(p, [*known, *others, *grams], len(known), pairs, z)
+
+
+@cache
+def products(z: tuple[tuple[tuple[Monomial, Fraction], ...], ...]) -> tuple[list[tuple[int, int]], list[Poly]]:
+    """Return the places of a Gram matrix's upper triangle, and what its entries stand before."""
+    parts, pairs = [Poly(dict(terms)) for terms in z], [(i, k) for k in range(len(z)) for i in range(k + 1)]
+    return pairs, [parts[i] * parts[k] * (1 if i == k else 2) for i, k in pairs]
 
 
 def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly] = ()) -> tuple[Any, Any, Any]:
@@ -162,10 +168,8 @@ def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly
 
 def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
     """Minimise cost.x with A x + s = b, s in the cones; None where that fails."""
-    try:
-        clarabel: Any = import_module("clarabel")
-    except ImportError:
-        raise InputError("certify", "", "no clarabel", "pip install clarabel, which guesses matrices") from None
+    # Not every command certifies.
+    clarabel: Any = import_module("clarabel")
     cones = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(signed), *map(clarabel.PSDTriangleConeT, sides)]
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.time_limit = False, LIMIT

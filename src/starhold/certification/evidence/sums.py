@@ -257,7 +257,7 @@ class Guess:
     def covered(self, head: int) -> dict[Monomial, list[int]]:
         """Return for each monomial the entries of the matrix without a factor that have it alone."""
         places: dict[Monomial, list[int]] = defaultdict(list)
-        for k, column in enumerate(self.blocks[0].columns(), head):
+        for k, column in enumerate((c for block in self.blocks if not block.places for c in block.columns()), head):
             if self.basis is None:
                 places[next(iter(column.terms))].append(k)
         return dict(places)

@@ -26,9 +26,7 @@ Part: TypeAlias = Generator[tuple[str, Obligation], None, list[str]]
 def converges(claim: Claim) -> Proof:
     """Every motion comes to rest on target, or, almost never, on the other quaternion of the same attitude.
 
-    V is least on target and proper; V' <= -c |w|^2; at rest the law's torque vanishes with q alone (LaSalle 1960). Around
-    q0 = -1 the linear motion has an unstable direction, for V is at its highest at rest there (inertia theorem: Chen and
-    Wimmer 1973), so that only a set of measure zero ends there (centre-stable manifold: Kelley 1967)."""
+    V' <= -c |w|^2 (LaSalle 1960); the other rest is unstable, for V at rest is highest there (Chen and Wimmer 1973)."""
     loop = AttitudeLoop(claim)
     yield from least_on_target(loop)
     said = yield from is_non_increasing(loop, _damped(loop), 3)
@@ -58,9 +56,7 @@ def converges_whatever_the_inertia(claim: Claim) -> Proof:
 
 
 def converges_evenly(claim: Claim) -> Proof:
-    """Every motion comes to rest on target, on either quaternion, or at a half turn, each of which is unstable: V at rest is
-    a quadratic form of q1, q2, q3, and -q.(torque at rest) is q0 times another, both positive definite. So the body rests
-    where q = 0 or q0 = 0; and turned from a half turn towards the target V is lower, so that the motion does not return."""
+    """Every motion comes to rest on target, on either quaternion, or at a half turn, each of which is unstable."""
     return (yield from _evenly(AttitudeLoop(claim)))
 
 
@@ -114,7 +110,6 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
     if fastest is not None:
-        demand(fastest > 0, "a rate is not positive")
         slow = fastest * fastest - dot(loop.w, loop.w)
         yield "rates", Squares(slow, [poly(1), *loop.q, *loop.w], 0, [numbers["level"] - V], [loop.sphere])
         known = [slow * w * w for w in loop.w]
@@ -158,8 +153,8 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         said.append("comes to rest on target")
     else:
         demand(level is None, "a level for every inertia needs a sign of the quaternion")
-        for name in loop.still if strictly else ():
-            yield f"V is level at the other equilibrium {name}", Vanishes(V.slope(name).at(loop.opposite | loop.still))
+        for k, name in enumerate(loop.still if strictly else ()):
+            yield f"V is level at the other equilibrium {k}", Vanishes(V.slope(name).at(loop.opposite | loop.still))
         lower = V.at(loop.opposite | loop.still) - V.at(loop.still)
         yield "the other equilibrium repels", Squares(lower, [1 + loop.q[0], *loop.q[1:]], 4, modulo=[loop.sphere])
         said.append("comes to rest on target, but for a set of measure zero, which ends on the other quaternion")
@@ -169,26 +164,24 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
 def finished(loop: AttitudeLoop, said: list[str], even: bool = False) -> Proof:
     """Add what the set holds and the limits, and say all that was shown."""
     claim = loop.claim
-    held = yield from contents(loop)
+    held = yield from contents(loop, loop.lyapunov)
     limited = yield from within_limits(loop)
     assumptions = ["rigid-body", "exact-measurement", "ideal-actuators", "continuous-torque"]
     assumptions += [] if loop.any_inertia else ["inertia-as-given"]
     assumptions += limited.assumptions
     bounded = claim.numbers.content.keys()
-    outside, target = "outside.0" in bounded, "target.rate" in bounded
     words = claim.taken.content
-    assumptions.append(
-        ("known-outside-torque" if not outside else "bounded-outside-torque") if OUTSIDE in words else "no-outside-torque"
-    )
-    assumptions.append(("known-target" if not target else "bounded-target") if MOVING in words else "target-at-rest")
+    assumptions.append("known-outside-torque" if OUTSIDE in words else "no-outside-torque")
+    assumptions.append("known-target" if MOVING in words else "target-at-rest")
+    assumptions += ["bounded-outside-torque"] * ("outside.0" in bounded) + ["bounded-target"] * ("target.rate" in bounded)
     assumptions.append("frictionless-wheels" if WHEELS in words else "no-wheels")
     if not even:
         assumptions.append("sign-at-once" if {SHORTEST, HYSTERESIS} & words.keys() else "quaternion-as-fed")
     text = f"{' '.join(said)}{''.join(f'; {part}' for part in (enumerated(held), limited.text) if part)}"
-    return Statement(text, tuple(assumptions))
+    return Statement(text, tuple(assumptions), limited.label or ("inertia" if loop.any_inertia else "convergence"))
 
 
-def contents(loop: AttitudeLoop) -> Part:
+def contents(loop: AttitudeLoop, V: Poly) -> Part:
     """{V <= level} holds every attitude at rest turned by up to `angle`; on target every rate up to `rate`; and every state
     turned by up to `start.angle` at up to `start.rate`."""
     numbers, said = loop.claim.numbers, list[str]()
@@ -200,12 +193,11 @@ def contents(loop: AttitudeLoop) -> Part:
         return [loop.q[0] - cosine, *([loop.q[0] * loop.q[0] - cosine * cosine] if cosine >= 0 else [])]
 
     def slow(rate: Fraction) -> list[Poly]:
-        demand(rate >= 0, "a rate is negative")
         return [rate * rate - dot(loop.w, loop.w)]
 
     if level is None:
         return said
-    inside, angle, rate = level - loop.lyapunov, numbers.get("angle"), numbers.get("rate")
+    inside, angle, rate = level - V, numbers.get("angle"), numbers.get("rate")
     if angle is not None:
         yield "turns from rest", Squares(inside.at(loop.still), z[:5], 0, near(angle), [loop.sphere])
         said.append(f"the set holds every rest turned by up to {below(angle)} rad")

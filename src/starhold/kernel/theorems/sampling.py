@@ -34,22 +34,25 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     solve ((J - h C/2) x^2 + (C - h K/4) x + K/2) v = 0 up to a factor of x: where the three matrices are symmetric and
     positive definite, Re x < 0 and so |z| < 1. The first two are linear
     in h, and so definite for every h up to the longest if they are for this, for at 0 they then are as well."""
-    loop = AttitudeLoop(claim)
+    loop = AttitudeLoop(claim, quotients=True)
     yield from loop.sound()
     rest: dict[str, int] = loop.on_target | loop.still
-    u = [near_rest(cases, rest) for cases in loop.law]
+    u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
     loop.autonomous(u)
     for k, p in enumerate(u):
         yield f"rest on target {k}", Vanishes(p.at(rest))
     C, K = ([[-p.slope(f"{letter}{k}").at(rest).number for k in (1, 2, 3)] for p in u] for letter in "wq")
     J: Rows = [[poly(x).number for x in row] for row in loop.J]
     push = [[poly(x).number for x in row] for row in loop.J_inverse]
-    h, radius, longest = claim.numbers["period"], claim.numbers["radius"], claim.numbers.get("longest")
-    demand(h > 0 and radius > 0, "a period or a radius is not positive")
+    h, radius = claim.numbers["period"], claim.numbers["radius"]
+    longest, other = claim.numbers.get("longest"), claim.numbers.get("other")
     held = times(push, [[*a, *b] for a, b in zip(C, K, strict=True)])
-    upper = plus([[*a, *b] for a, b in zip(scalar(1), scalar(0), strict=True)], held, -h)
-    lower = plus([[*a, *b] for a, b in zip(scalar(h / 2), scalar(1), strict=True)], held, -h * h / 4)
-    yield "step", Contracts([*upper, *lower], radius)
+
+    def step(h: Fraction) -> Rows:
+        upper = plus([[*a, *b] for a, b in zip(scalar(1), scalar(0), strict=True)], held, -h)
+        return upper + plus([[*a, *b] for a, b in zip(scalar(h / 2), scalar(1), strict=True)], held, -h * h / 4)
+
+    yield "step", Contracts(step(h), radius)
     yield "radius", Exceeds(Fraction(1), radius)
     said = (
         f"near rest, with the torque held for {below(h)} s, the loop is stable, with all eigenvalues within {above(radius)}"
@@ -60,6 +63,9 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
         yield "inertia outweighs damping", Definite(plus(J, C, -longest / 2))
         yield "damping outweighs stiffness", Definite(plus(C, K, -longest / 4))
         said += f", and it is stable for every period up to {below(longest)} s"
+    if other is not None:
+        yield "another step", Contracts(step(other))
+        said += f", and it is stable for a period of {below(other)} s"
     demand(not claim.taken.content, "the loop is taken with nothing")
-    assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators", "unlimited-torque")
-    return Statement(said, (*assumptions, "no-outside-torque", "target-at-rest", "no-wheels", "linear-motion"))
+    assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
+    return Statement(said, (*assumptions, "no-outside-torque", "target-at-rest", "no-wheels", "linear-motion"), "sampling")

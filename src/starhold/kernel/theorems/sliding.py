@@ -13,6 +13,7 @@ from ..programs import Case
 from ..reading import Claim
 from ..rules import Definite, Exceeds, Obligation, Shown, Squares, Vanishes
 from ..sentences import Statement, above, below
+from .attitude import contents
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,7 @@ class Axis:
 
 def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     """The motion reaches s = w + Kq = 0 in a finite time, against any torque from outside that is at most as told, and
-    slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target.
-
-    s.Js/2 falls at sum (reach_i - outside_i) |s_i| at least (Filippov solutions), and on s = 0 q0' = q.Kq/2. In a layer each
-    s_i (J s')_i <= outside_i |s_i| - slope_i s_i^2 <= outside_i^2/(4 slope_i); the sum of these is `total`. Where |s_i| is
-    above far_i, axis i loses more than that, so s.Js/2 ends at its largest value in the box |s_i| <= far_i, and |s| at most
-    sqrt(high/low sum far_i^2) with low <= J <= high; then q0 grows while |q| > surface/k, where q.Kq >= k |q|^2."""
+    slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target."""
     loop = AttitudeLoop(claim)
     numbers = claim.numbers
     yield from loop.sound()
@@ -46,7 +42,6 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     axes, outside = list[Axis](), [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
     for i in AXES:
         axes.append(taken_apart(loop, i, moved[i] - loop.e[i], s[i]))
-        demand(outside[i] >= 0, "a bound is negative")
         yield f"reach {i}", Exceeds(axes[i].reach, outside[i])
     layered = any(axis.slope is not None for axis in axes)
     squares, ending = Fraction(0), "slides to rest on target, on either quaternion"
@@ -63,7 +58,8 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
             "the sign never changes",
             Exceeds(low * k * k, max(2 * level, numbers["inertia.high"] * squares if squares else 0)),
         )
-        begun = f"{{s.Js/2 <= {below(level)}}}"
+        held = yield from contents(loop, dot(s, apply(loop.J, s)) * Fraction(1, 2))
+        begun = " ".join([f"{{s.Js/2 <= {below(level)}}}", *(f"({part})" for part in held)])
     text = f"from {begun} the motion {said} the law's surface and {ending}"
     torque = "bounded-outside-torque" if loop.outside else "no-outside-torque"
     target = "known-target" if loop.moving else "target-at-rest"
@@ -72,6 +68,7 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     return Statement(
         text,
         (*assumptions, "unlimited-torque", torque, target, "no-wheels", "sign-at-once" if signed else "quaternion-as-fed"),
+        "sliding",
     )
 
 
@@ -112,7 +109,6 @@ def losses(
         total += m * m / (4 * axis.slope) if axis.slope is not None else 0
     for i, (axis, m) in enumerate(zip(axes, outside, strict=True)):
         far = loop.claim.numbers[f"far.{i}"]
-        demand(far > 0, "a bound is not positive")
         yield f"beyond the layer {i}", Exceeds((axis.reach - m) * far, total)
         if axis.slope is not None:
             yield f"in the layer {i}", Exceeds(axis.slope * far * far - m * far, total)
@@ -123,7 +119,6 @@ def losses(
 def bounded(loop: AttitudeLoop, K: Rows) -> Shown:
     """low |x|^2 <= x.Jx, and k |x|^2 <= x.Kx."""
     low, k = loop.claim.numbers["inertia.low"], loop.claim.numbers["surface.low"]
-    demand(low > 0 and k > 0, "a bound is not positive")
     J: Rows = [[poly(x).number for x in row] for row in loop.J]
     yield "least moment", Definite(plus(J, scalar(1), -low))
     yield "least slope", Definite(plus([[x / 2 for x in row] for row in plus(K, transpose(K))], scalar(1), -k))
@@ -133,8 +128,8 @@ def ending_in_the_layer(loop: AttitudeLoop, squares: Fraction, K: Rows) -> Gener
     """Show where motions end in a boundary layer."""
     numbers = loop.claim.numbers
     low, high, k, steep = (numbers[name] for name in ("inertia.low", "inertia.high", "surface.low", "surface.high"))
-    size, angle, rate = numbers["surface"], numbers["angle"], numbers["rate"]
-    demand(min(high, steep, size, angle, 3 - angle) > 0, "a bound is not positive, or an angle too large")
+    size, angle, rate = numbers["surface"], numbers["end.angle"], numbers["end.rate"]
+    demand(angle < 3, "an angle is too large")
     yield from bounded(loop, K)
     J: Rows = [[poly(x).number for x in row] for row in loop.J]
     yield "largest moment", Definite(plus(scalar(high), J, -1))

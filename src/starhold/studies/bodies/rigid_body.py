@@ -15,7 +15,7 @@ from starhold.parts.epoch import OF_DATE, iso_text
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
-from starhold.studies.modes import certify_modes, mode_departures, same_numbers
+from starhold.studies.modes import certify_modes, mode_departures, named_modes, same_numbers
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -133,11 +133,19 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[I
     wanted = Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum)
     if mode_laws(loop.law, loop.gains):
         return certify_modes(loop, entry.name, wanted)
-    issued: list[Issued] = []
-    for step, now in _known(loop, scenario.table.simulation.steps):
-        name = f"{entry.name} from {step * loop.period:g} s" if step else entry.name
-        issued.append(Issued(certify(now, name, wanted), now, step))
-    return issued
+    return [Issued(certify(now, name, wanted), now, step) for name, now, step in _named(scenario, entry, loop)]
+
+
+def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, ClosedLoop]:
+    """The loops that the certificates of one law of the scenario are about, by their names."""
+    if mode_laws(loop.law, loop.gains):
+        return named_modes(loop, entry.name)
+    return {name: now for name, now, _ in _named(scenario, entry, loop)}
+
+
+def _named(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[tuple[str, ClosedLoop, int]]:
+    known = _known(loop, scenario.table.simulation.steps)
+    return [(f"{entry.name} from {step * loop.period:g} s" if step else entry.name, now, step) for step, now in known]
 
 
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:

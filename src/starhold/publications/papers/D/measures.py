@@ -15,7 +15,8 @@ from scipy.optimize import brentq
 from starhold.analysis.rigid_body import error_angle
 from starhold.analysis.roots import PUBLISHED, TwoPieceFit
 from starhold.analysis.transient import Limits
-from starhold.certification.region import ENERGY, Shape
+from starhold.certification.mixed import Shape
+from starhold.certification.region import ENERGY
 from starhold.parts.craft import tensor
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel

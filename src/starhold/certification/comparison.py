@@ -1,0 +1,58 @@
+"""Compares a proof with a loop: whether its programs and numbers are those that fly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from math import isfinite
+from typing import Any
+
+from starhold.certification.evidence.attitude import CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
+from starhold.certification.subject import make_subject
+from starhold.kernel.loops import HYSTERESIS, SHORTEST, WHEELS
+from starhold.kernel.numbers import rational
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.effectors.wheels import BAND
+
+
+def differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
+    """Return how a claim, which the kernel has checked, is about another loop than this one; nothing where it is not."""
+    own = Loop(make_subject(loop))
+    return [*_programs(claim, own), *_numbers(claim, own), *_words(claim, own)]
+
+
+def _programs(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
+    for role, digest in own.roles.items():
+        if claim["programs"].get(role) != digest:
+            yield f"the program of the {role} is another one"
+    for name, x in claim["subject"].items():
+        if name not in own.subject or rational(own.subject[name]) != rational(x):
+            yield f"{name} is another number"
+
+
+def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
+    loop, known, wheels = own.loop, own.known, own.loop.wheels
+    told = {name: rational(x) for name, x in claim["numbers"].items()}
+    exactly = {"period": loop.period, "hysteresis": loop.hysteresis_width}
+    least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
+    least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
+    most = {"limit": float(loop.craft.torque_limit), "limit.norm": float(loop.craft.torque_limit)}
+    if wheels is not None:
+        most |= {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit)}
+        most |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit)}
+    for name, x in told.items():
+        if name in exactly and x != Fraction(exactly[name]):
+            yield f"the {name} is another number"
+        if name in least and x < Fraction(int(least[name].p), int(least[name].q)):
+            yield f"{name} is exceeded"
+        if name in most and isfinite(most[name]) and x > Fraction(most[name]):
+            yield f"{name} is lower"
+
+
+def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
+    taken, theorem = set(claim["taken"]), claim["theorem"]
+    signed = theorem in (SLIDING, STRICTLY) or (theorem.startswith(CONVERGES) and "both" not in theorem)
+    if taken & {SHORTEST, HYSTERESIS} != set(sign_words(own.loop) if signed else []):
+        yield "the sign of the quaternion is chosen in another way"
+    if theorem != SAMPLED and (WHEELS in taken) != (own.loop.wheels is not None):
+        yield "wheels are there, or are not"

@@ -1,0 +1,114 @@
+"""Finds the claim about a loop that knows no axis: a V with a mixed term, the largest level, and evidence for the kernel."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import acos, sqrt
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.scalar import Scalar
+from starhold.certification.evidence.attitude import ASKED, Loop, sign_words
+from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.reduced import Reduced
+from starhold.certification.evidence.squares import rounded
+from starhold.certification.mixed import SIGNED, Shape, near
+from starhold.kernel.loops import HYSTERESIS, SHORTEST
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.polynomials import Poly
+from starhold.kernel.rules import Sum
+
+ISOTROPIC = "converges without a preferred axis"
+LESS = (3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
+"""How far below the level that points of a grid suggest a proof is tried."""
+
+
+class Reach(NamedTuple):
+    """A V that was recorded, what the kernel asks of its fall for the level 1, and about the largest level (1/s2)."""
+
+    shape: Shape
+    V: str
+    asked: Sum
+    level: float
+
+    def falls(self, level: float) -> bool:
+        """Whether floats have a sum for a level."""
+        inside, *others = self.asked.known
+        asked = Sum(self.asked.p, [inside - 1 + Fraction(level), *others], (), self.asked.strict)
+        return Reduced(asked, units(level)).floats() is not None
+
+
+def find_isotropic(loop: Loop) -> None:
+    """Find the claim with the largest set, for a law that tells a single root."""
+    flown = loop.loop
+    root = flown.law.module.single_root(flown.gains)
+    if root is None or not max(root) < 0.0:
+        loop.failed[ISOTROPIC] = "only for phi_0 = phi_1 = a E with a < 0, and b < 0"
+        return
+    a, b = root
+    try:
+        found = [reach(loop, in_seconds(shape, a)) for shape in (SIGNED if sign_words(flown) else near(a * b))]
+    except RefusedError as reason:
+        loop.failed[ISOTROPIC] = str(reason)
+        return
+    for one in sorted(found, key=lambda one: -one.shape.volume(one.level)):
+        for level in (short(one.level * (1.0 - less)) for less in LESS):
+            claim = loop.claim(ISOTROPIC, words(loop), one.V, level=level, **contents(loop, one.shape, level))
+            if one.falls(level) and loop.try_to_show(claim, loop.scales(one.V, level) | units(level)):
+                return
+
+
+def units(level: float) -> dict[str, float]:
+    """Return about how large u, t and v become."""
+    return {"u": 1.0, "t": 1.0, "v": sqrt(2.0 * level)}
+
+
+def words(loop: Loop) -> list[str]:
+    """Name what the loop is taken with."""
+    return [*loop.words, *sign_words(loop.loop)]
+
+
+def short(x: float) -> float:
+    """Return a number of few binary digits: what is exact becomes long of long numbers."""
+    return float(rounded(x, 4))
+
+
+def in_seconds(shape: Shape, a: float) -> Shape:
+    """Return about the shape that for the root -1/s is what this one is for the root a."""
+    return Shape(short(a * a * shape.p), short(a * a * shape.c2), short(-a * shape.g), short(-a * shape.m))
+
+
+def reach(loop: Loop, shape: Shape) -> Reach:
+    """Record V, and find about the largest level (1/s2) below which V falls, by points of a grid."""
+
+    def height(measurement: Any) -> Scalar:
+        return shape.value(-1.0, measurement.attitude, measurement.rate)
+
+    V, hysteresis = loop.add(height, measurement=ASKED), loop.loop.hysteresis_width
+    signed: dict[str, Any] = {"hysteresis": hysteresis} if HYSTERESIS in words(loop) else {}
+    asked = cast(Sum, obligations(loop.claim(ISOTROPIC, words(loop), V, level=1, **signed), loop.by_digest)[0]["V falls"])
+    top = shape.other_equilibrium
+    if SHORTEST in words(loop):
+        # Where q0 = 0.
+        top = shape.p + shape.c2 - (shape.g + shape.m) ** 2 / 2.0
+    fastest = max(abs(shape.g), abs(shape.g + 2.0 * shape.m)) + sqrt(2.0 * top + shape.g**2)
+    u, x, v = np.meshgrid(np.linspace(0.0, 2.0, 61)[1:], np.linspace(-1.0, 1.0, 31), np.linspace(0.0, fastest, 61)[1:])
+    at = {"u": u, "v": v, "t": x * np.sqrt(u * (2.0 - u))}
+    heights, falls = 1.0 - values(asked.known[0], at), values(asked.p, at)
+    return Reach(shape, V, asked, min(top * (1.0 - 1e-6), float(heights[falls <= 0.0].min(initial=np.inf))))
+
+
+def values(p: Poly, at: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return a polynomial's values in floats."""
+    parts = [float(c) * np.prod([at[name] for name in m], axis=0) for m, c in p.terms.items()]
+    return np.sum(np.broadcast_arrays(*parts), axis=0)
+
+
+def contents(loop: Loop, shape: Shape, level: float) -> dict[str, Any]:
+    """Return a turn from rest and a rate on target that are in the set, and the width of the hysteresis."""
+    less = 1.0 - 1e-7
+    u = 2.0 * level / (shape.p + sqrt(shape.p**2 + 4.0 * shape.c2 * level))
+    told: dict[str, Any] = {"angle": 2.0 * acos(1.0 - min(u, 1.98)) * less, "rate": sqrt(2.0 * level) * less}
+    return told | ({"hysteresis": loop.loop.hysteresis_width} if HYSTERESIS in words(loop) else {})
