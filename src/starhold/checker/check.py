@@ -121,7 +121,7 @@ def _known(content: Any) -> None:
 
 
 def _proofs(content: Any) -> list[Proved]:
-    """What the kernel proves of a file, each claim of which has to be told of once, in order."""
+    """Return what the kernel proves of a file, each claim of which has to be told of once, in order."""
     listed: list[Any] = [given["claims"] for given in content["certificates"] if isinstance(given.get("claims"), list)]
     told: list[Any] = [
         claim["proof"] for claims in listed for claim in claims if isinstance(claim, dict) and "proof" in claim
@@ -214,7 +214,7 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
 
 
 def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, str]]:
-    """What the kernel found of a claim with a proof; numbers and assumptions are those of the proof alone."""
+    """Return what the kernel found of a claim with a proof; numbers and assumptions are those of the proof alone."""
     shaped(claim, PROVED, "the claim")
     proved = proofs[int(claim["proof"])]
     demand(proved.statement.label == claim["kind"], f"the proof is of another kind of claim: {proved.statement.label}")
