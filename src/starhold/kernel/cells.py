@@ -12,7 +12,7 @@ from typing import Any
 
 from .numbers import RefusedError, demand, read_list
 from .polynomials import Poly, dot, poly, var
-from .programs import Condition, Exactly, Guards, known
+from .programs import Condition, Exactly, Guards, joined, known
 from .reading import Claim
 from .rules import Obligation, Shown, Sum
 from .sentences import Statement
@@ -68,12 +68,8 @@ class System:
         for role in roles:
             demand(set(claim.programs[role].inputs) <= set(given), "a function depends on more than the state")
             outputs += claim.programs[role].run(given, Exactly(), 1)
-        joined: list[tuple[Guards, list[Poly]]] = [(frozenset(), [])]
-        for cases in outputs:
-            pairs = ((a | case.guards, [*before, case.value]) for a, before in joined for case in cases)
-            joined = [(guards, values) for guards, values in pairs if not contradictory(guards)]
-            demand(len(joined) <= CELLS, "there are too many cells")
-        self.all = [Cell(signs(guards), values[:count], values[count:]) for guards, values in joined]
+        found = joined(outputs, CELLS)
+        self.all = [Cell(signs(case.guards), case.value[:count], case.value[count:]) for case in found]
         self.surfaces = sorted({surface for cell in self.all for surface in cell.signs})
 
     @cached_property
@@ -177,13 +173,6 @@ class System:
             if all(x * sign >= 0 if sign else x == 0 for x, sign in sides):
                 return cell, state
         raise RefusedError("no cell holds a state")
-
-
-def contradictory(guards: Guards) -> bool:
-    """Tell whether a condition is to hold and not to hold, or two that are opposite are to hold."""
-    against = {(p, False) for p, truth in guards if truth}
-    against |= {(tuple((m, -c) for m, c in p), True) for p, truth in guards if truth}
-    return not against.isdisjoint(guards)
 
 
 def signs(guards: Guards) -> dict[Condition, int]:

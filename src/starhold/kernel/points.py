@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 from .loops import read, wired
 from .numbers import demand
 from .polynomials import Poly, dot, total, var, variables
-from .programs import Asking, Guards, single
+from .programs import Asking, Guards, joined, single
 from .reading import Claim
 
 STATE = ("x1", "x2", "x3", "v1", "v2", "v3")
@@ -55,12 +54,7 @@ class PointLoop:
     @cached_property
     def sides(self) -> list[Side]:
         """Return the cases of the law's three outputs together."""
-        found: list[Side] = []
-        for cases in product(*read(self.claim, "law", 3, self.ring, self.told)):
-            guards = frozenset(guard for case in cases for guard in case.guards)
-            if not any((p, not above) in guards for p, above in guards):
-                found.append(Side(guards, [case.value for case in cases]))
-        return found
+        return [Side(case.guards, case.value) for case in joined(read(self.claim, "law", 3, self.ring, self.told))]
 
     def acceleration(self, side: Side) -> list[Poly]:
         """Return v'."""

@@ -1,4 +1,4 @@
-"""Recorded programs: straight lines of the scalar operations that fly, read exactly, piecewise, and over intervals."""
+"""Recorded programs: straight lines of the scalar operations that fly, read exactly, case by case."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import hashlib
 import json
 import operator as op
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
 from typing import Any, TypeAlias
 
-from .intervals import Interval
 from .numbers import Account, demand, rational, read_list, read_table
 from .polynomials import Monomial, Poly, multiple, poly, var
 
@@ -63,27 +61,14 @@ class Program:
             kinds.append(gives)
         return cls(tuple(inputs), tuple(found), tuple(place(k, "n") for k in outputs), digest(given))
 
-    def run(self, given: Mapping[str, Any], ring: Exactly | Enclosing, count: int) -> list[Any]:
-        """Return the values of the outputs, of which there have to be so many, over a ring."""
+    def run(self, given: Mapping[str, Piecewise], ring: Exactly, count: int) -> list[Piecewise]:
+        """Return the outputs, of which there have to be so many, case by case."""
         demand(len(self.outputs) == count, f"a program has {len(self.outputs)} outputs and not {count}")
         values = [given[name] for name in self.inputs]
         for operation, operands in self.steps:
-            if operation == "constant":
-                values.append(ring.constant(operands))
-                continue
-            values.append(ring.apply(self.meant(operation, operands), [values[k] for k in operands]))
+            constant = operation == "constant"
+            values.append(known(operands) if constant else ring.apply(operation, [values[k] for k in operands]))
         return [values[k] for k in self.outputs]
-
-    def meant(self, operation: str, operands: tuple[int, ...]) -> str:
-        """Name a product of a value with itself a square, and a choice between the two values that its truth compares their
-        minimum or maximum: what intervals could not tell."""
-        if operation == "product" and operands[0] == operands[1]:
-            return "square"
-        if operation == "select" and operands[0] >= len(self.inputs):
-            test, compared = self.steps[operands[0] - len(self.inputs)]
-            if test in ("less", "less_equal") and sorted(compared) == sorted(operands[1:]):
-                return "minimum" if compared == operands[1:] else "maximum"
-        return operation
 
 
 def digest(given: Any) -> str:
@@ -124,45 +109,64 @@ def single(cases: Piecewise) -> Poly:
     return cases[0].value
 
 
+def joined(values: Iterable[Piecewise], most: int = CASES) -> Piecewise:
+    """Return the cases of some values together, without those whose guards contradict each other."""
+    found = [Case(frozenset(), [])]
+    for cases in values:
+        pairs = ((a.guards | b.guards, [*a.value, b.value]) for a in found for b in cases)
+        found = [Case(guards, value) for guards, value in pairs if not contradictory(guards)]
+        demand(len(found) <= most, "a program has too many cases")
+    return found
+
+
+def contradictory(guards: Guards) -> bool:
+    """Tell whether a condition is to hold and not to hold, or two that are opposite are to hold."""
+    Account.spend(1 + len(guards))
+    against = {(p, False) for p, truth in guards if truth}
+    against |= {(tuple((m, -c) for m, c in p), True) for p, truth in guards if truth}
+    return not against.isdisjoint(guards)
+
+
+def positive(guards: Guards, p: Poly) -> bool | None:
+    """Tell whether p > 0 where guards hold, as far as one of them alone decides it: None where none does."""
+    if not p.names:
+        return p.number > 0
+    for own, above in guards:
+        g = Poly(dict(own))
+        factor, offset = multiple(p, g if above else -g)
+        if factor > 0 and (offset > 0 or (above and offset == 0)):
+            return True
+        if factor < 0 and offset <= 0:
+            return False
+    return None
+
+
 class Exactly:
     """A program is read over exact polynomials, case by case. Roots and quotients by the state are refused."""
 
-    def constant(self, x: Fraction) -> Piecewise:
-        """Return a constant."""
-        return known(x)
-
     def apply(self, operation: str, operands: list[Piecewise]) -> Piecewise:
-        """Return the cases of an operation's value, without those whose guards contradict each other."""
-        if operation in ("select", "minimum", "maximum"):
-            truth, *sides = operands
-            chosen: Any = ((t, s) for t in truth for s in sides[0 if t.value else 1])
-            joined = [(cases, "select", [cases[1].value]) for cases in chosen]
-        else:
-            chosen = product(*(operands[:1] if operation == "square" else operands))
-            joined = [(cases, operation, [case.value for case in cases]) for cases in chosen]
-        found: Piecewise = []
-        for cases, name, x in joined:
-            guards: Guards = frozenset(guard for case in cases for guard in case.guards)
-            Account.spend(1 + len(guards))
-            if not any((p, not truth) in guards for p, truth in guards):
-                found += self.cases(guards, name, x)
-            demand(len(found) <= CASES, "a program has too many cases")
+        """Return the cases of an operation's value."""
+        chosen = [operands]
+        if operation == "select":
+            chosen = [[[truth], operands[1 if truth.value else 2]] for truth in operands[0]]
+        found = [new for own in chosen for case in joined(own) for new in self.cases(case.guards, operation, case.value)]
+        demand(len(found) <= CASES, "a program has too many cases")
         return found
 
     def cases(self, guards: Guards, operation: str, x: list[Any]) -> Piecewise:
-        """Return the one case of a value, or the two of a comparison."""
+        """Return the one case of a value, or the two of a comparison that the guards do not decide."""
         if operation not in ("less", "less_equal"):
-            return [Case(guards, self.value(operation, x))]
+            return [Case(guards, self.value(guards, operation, x))]
         # a <= b is that not b < a.
         strict = operation == "less"
         gap = x[1] - x[0] if strict else x[0] - x[1]
-        if not gap.names:
-            return [Case(guards, (gap.number > 0) == strict)]
-        told = {sign for sign in (True, False) if (condition(gap), sign) in guards} or {True, False}
-        return [Case(guards | {(condition(gap), sign)}, sign == strict) for sign in sorted(told)]
+        told = positive(guards, gap)
+        if told is not None:
+            return [Case(guards, told == strict)]
+        return [Case(guards | {(condition(gap), sign)}, sign == strict) for sign in (False, True)]
 
-    def value(self, operation: str, x: list[Any]) -> Any:
-        """Return the value of an operation."""
+    def value(self, guards: Guards, operation: str, x: list[Any]) -> Any:
+        """Return the value of an operation where guards hold."""
         demand(operation in EXACT, f"{operation} has no exact value")
         return EXACT[operation](*x)
 
@@ -173,13 +177,9 @@ def _quotient(x: Poly, y: Poly) -> Poly:
     return x * (1 / y.number)
 
 
-def _square(x: Poly) -> Poly:
-    return x * x
-
-
 EXACT: dict[str, Callable[..., Any]] = {
-    "plus": op.add, "minus": op.sub, "product": op.mul, "square": _square, "negative": op.neg, "divide": _quotient,
-    "select": op.pos, "both": bool.__and__, "either": bool.__or__, "opposite": op.not_,
+    "plus": op.add, "minus": op.sub, "product": op.mul, "negative": op.neg, "divide": _quotient,
+    "select": lambda truth, chosen: chosen, "both": bool.__and__, "either": bool.__or__, "opposite": op.not_,
 }  # fmt: skip
 
 
@@ -191,84 +191,15 @@ class Asking(Exactly):
         self.divisors: list[Poly] = []
         """What is divided by where no guard says that it is positive."""
 
-    def cases(self, guards: Guards, operation: str, x: list[Any]) -> Piecewise:
-        """Return the cases of a value; a comparison that the guards decide has one."""
+    def value(self, guards: Guards, operation: str, x: list[Any]) -> Any:
+        """Return the value of an operation; of a root or quotient by the state a variable."""
         if operation == "sqrt" and x[0].names:
-            return [Case(guards, self._named(self.roots, "n", x[0]))]
+            return self._named(self.roots, "n", x[0])
         if operation == "divide" and x[1].names:
             if positive(guards, x[1]) is not True:
                 self.divisors.append(x[1])
-            return [Case(guards, x[0] * self._named(self.inverses, "s", x[1]))]
-        if operation in ("less", "less_equal"):
-            strict = operation == "less"
-            told = positive(guards, x[1] - x[0] if strict else x[0] - x[1])
-            if told is not None:
-                return [Case(guards, told == strict)]
-        return super().cases(guards, operation, x)
+            return x[0] * self._named(self.inverses, "s", x[1])
+        return super().value(guards, operation, x)
 
     def _named(self, found: dict[Condition, str], letter: str, p: Poly) -> Poly:
         return var(found.setdefault(tuple(sorted(p.terms.items())), f"{letter}{len(found)}"))
-
-
-def positive(guards: Guards, p: Poly) -> bool | None:
-    """Tell whether p > 0 where guards hold, as far as one of them alone decides it: None where none does."""
-    for condition, above in guards if p.names else ():
-        g = Poly(dict(condition))
-        factor, offset = multiple(p, g if above else -g)
-        if factor > 0 and (offset > 0 or (above and offset == 0)):
-            return True
-        if factor < 0 and offset <= 0:
-            return False
-    return None
-
-
-class Enclosing:
-    """A program is read over intervals; a truth is True, False or None."""
-
-    def constant(self, x: Fraction) -> Interval:
-        """Return a constant."""
-        return Interval.of(x)
-
-    def apply(self, operation: str, x: list[Any]) -> Any:
-        """Return an enclosure of an operation's value."""
-        Account.spend(4)
-        return ENCLOSING[operation](*x[: 1 if operation == "square" else 3])
-
-
-def _less(x: Interval, y: Interval) -> bool | None:
-    return True if x.high < y.low else False if x.low >= y.high else None
-
-
-def _not(t: bool | None) -> bool | None:
-    return None if t is None else not t
-
-
-def _both(t: bool | None, u: bool | None) -> bool | None:
-    return False if False in (t, u) else None if None in (t, u) else True
-
-
-def _select(t: bool | None, x: Interval, y: Interval) -> Interval:
-    return x.hull(y) if t is None else x if t else y
-
-
-def _minimum(t: bool | None, x: Interval, y: Interval) -> Interval:
-    return Interval(min(x.low, y.low), min(x.high, y.high))
-
-
-def _maximum(t: bool | None, x: Interval, y: Interval) -> Interval:
-    return Interval(max(x.low, y.low), max(x.high, y.high))
-
-
-def _either(t: bool | None, u: bool | None) -> bool | None:
-    return _not(_both(_not(t), _not(u)))
-
-
-def _less_equal(x: Interval, y: Interval) -> bool | None:
-    return _not(_less(y, x))
-
-
-ENCLOSING: dict[str, Callable[..., Any]] = {
-    "plus": op.add, "minus": op.sub, "product": op.mul, "square": Interval.square, "negative": op.neg,
-    "divide": Interval.__truediv__, "sqrt": Interval.sqrt, "less": _less, "less_equal": _less_equal, "select": _select,
-    "minimum": _minimum, "maximum": _maximum, "both": _both, "either": _either, "opposite": _not,
-}  # fmt: skip

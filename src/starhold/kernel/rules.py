@@ -3,16 +3,13 @@ that does not show it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TypeAlias
 
-from .intervals import Box, Enclosed, Interval
-from .numbers import Account, Rows, definite, demand, matrix, plus, rational, read_list, read_table, times, transpose
-from .polynomials import Poly, apply, dot, read_poly, var
-
-CELLS = 200_000
+from .numbers import Rows, definite, demand, matrix, plus, rational, read_list, read_table, times, transpose
+from .polynomials import Poly, apply, dot, read_poly
 
 
 def combination(cofactors: Any, relations: Sequence[Poly]) -> Poly:
@@ -149,66 +146,6 @@ class Exceeds:
         demand(self.large > self.small, "a number is not the larger one")
 
 
-@dataclass(frozen=True)
-class OnCells:
-    """On each box of a subdivision one of the reasons holds. Evidence: the tree in preorder, the letter of a reason or the
-    place of the variable whose middle splits the box."""
-
-    box: Mapping[str, tuple[Fraction, Fraction]]
-    reasons: Mapping[str, Callable[[Box], bool]]
-
-    def check(self, evidence: Any) -> None:
-        demand(isinstance(evidence, str) and len(evidence) <= CELLS, "a subdivision is not a text")
-        names, waiting = list(self.box), [{name: Interval.of(*ends) for name, ends in self.box.items()}]
-        for mark in evidence:
-            demand(bool(waiting), "a subdivision goes on after its end")
-            Account.spend(len(names))
-            box = waiting.pop()
-            if mark in self.reasons:
-                demand(self.reasons[mark](box), f"the reason {mark} fails on a box")
-                continue
-            demand(mark in "0123456789" and int(mark) < len(names), "a subdivision has another mark")
-            side = box[names[int(mark)]]
-            halves = (Interval(side.middle.low, side.high), Interval(side.low, side.middle.low))
-            waiting += [box | {names[int(mark)]: half} for half in halves]
-        demand(not waiting, "a subdivision ends early")
-
-
-@dataclass(frozen=True)
-class Local:
-    """p > 0 in a box but at the origin, or where it does not matter. Evidence: p = x'G(x)x with a matrix of polynomials, and
-    a tree on each of whose cells p is positive (p), or G is positive definite (g), or it does not matter (o)."""
-
-    names: Sequence[str]
-    p: Poly
-    box: Mapping[str, tuple[Fraction, Fraction]]
-    outside: Callable[[Box], bool]
-
-    def check(self, evidence: Any) -> None:
-        rows, tree = read_table(evidence, "gram", "tree")
-        self.cells(rows).check(tree)
-
-    def cells(self, rows: Any) -> OnCells:
-        """Return what the tree has to show."""
-        count = len(self.names)
-        gram = [[read_poly(entry) for entry in read_list(row, count)] for row in read_list(rows, count)]
-        x = [var(name) for name in self.names]
-        demand(not (dot(x, apply(gram, x)) - self.p).terms, "a form is another one")
-        demand(all((gram[i][k] - gram[k][i]).terms == {} for i in range(count) for k in range(i)), "a form is not symmetric")
-        whole, parts = Enclosed(self.p), [[Enclosed(entry) for entry in row] for row in gram]
-
-        def form(cell: Box) -> bool:
-            rest = [[entry.on(cell) for entry in row] for row in parts]
-            for k, pivots in enumerate(rest):
-                if pivots[k].low <= 0:
-                    return False
-                for i in range(k + 1, count):
-                    rest[i] = [a - rest[i][k] * b / pivots[k] for a, b in zip(rest[i], pivots, strict=True)]
-            return True
-
-        return OnCells(self.box, {"o": self.outside, "p": lambda cell: whole.on(cell).low > 0, "g": form})
-
-
-Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Definite | Exceeds | OnCells | Local
+Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Definite | Exceeds
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
 """Obligations, each with the name under which its evidence stands."""
