@@ -15,7 +15,7 @@ from starhold.kernel import rules
 from starhold.kernel.numbers import Account, RefusedError, inverse, rational
 from starhold.kernel.polynomials import Poly, multiple
 from starhold.kernel.programs import Program, digest
-from starhold.kernel.reading import Claim, Told
+from starhold.kernel.reading import Claim, Numbers, Told
 from starhold.kernel.theorems import THEOREMS
 
 linalg: Any = import_module("scipy.linalg")
@@ -32,7 +32,7 @@ def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
         Told("words", dict.fromkeys(claim["taken"], True)),
         Told("programs", {role: Program.read(programs[name]) for role, name in claim["programs"].items()}),
         Told("subject", {name: rational(x) for name, x in claim["subject"].items()}),
-        Told("numbers", {name: rational(x) for name, x in claim["numbers"].items()}),
+        Numbers("numbers", {name: rational(x) for name, x in claim["numbers"].items()}),
         Told("evidence", {}),
     )
 
