@@ -161,7 +161,7 @@ def test_quotients_of_an_attitude_loop_hold_no_quotient_and_no_root(steps, why):
     names = ["measurement.attitude.1", "measurement.rate.0"]
     loop.claim.programs.content["law"] = Program.read({"inputs": names, "steps": steps, "outputs": [3]})
     with pytest.raises(RefusedError, match=why):
-        loop.read("law", 1, loop.told)
+        loop.read("law", 1)
 
 
 def test_inverses_are_expanded_where_their_divisors_do_not_vanish():

@@ -15,9 +15,9 @@ from fractions import Fraction
 from functools import cached_property
 from typing import TypeAlias
 
-from .numbers import RefusedError, Rows, demand, inverse
+from .numbers import Rows, demand, inverse
 from .polynomials import Poly, apply, cross, dot, poly, total, var, variables
-from .programs import Asking, Exactly, Piecewise, known, single
+from .programs import Asking, Condition, Exactly, Piecewise, known, single
 from .reading import Claim
 from .rules import Definite, Shown, Vanishes
 
@@ -43,65 +43,78 @@ def wired_matrix(name: str, value: Matrix) -> dict[str, Poly]:
     return found | ({f"{name}.{i}": poly(value[i][i]) for i in AXES} if plain else {})
 
 
-def read(claim: Claim, role: str, count: int, ring: Exactly, *tables: Wired) -> list[Piecewise]:
-    """Return the outputs of a program over a ring, its inputs wired as the tables say; beside these only gains, numbers of
-    the craft as the law knows it and as it is, and the period are numbers, those of the subject."""
-    program, given, inputs = claim.programs[role], dict[str, Piecewise](), dict[str, Poly]()
-    for table in tables:
-        inputs |= table
-    for name in program.inputs:
-        if name in inputs:
-            given[name] = known(inputs[name])
-        elif name.startswith(("gains.", "craft.", "plant.")) or name == "measurement.period":
-            given[name] = known(claim.subject[name])
-        else:
-            raise RefusedError(f"the {role} asks for {name}, which nothing gives")
-    return program.run(given, ring, count)
+class Loop:
+    """What loops share: programs read over one ring, and the rates (name of a variable: its derivative) that do not depend
+    on the law. Programs have what `told` names for inputs, and what is wired to the one that is read."""
+
+    told: Wired
+    rates: Mapping[str, Poly]
+    driven: Sequence[str]
+
+    def __init__(self, claim: Claim, ring: Exactly) -> None:
+        self.claim, self.ring = claim, ring
+
+    def read(self, role: str, count: int, *tables: Wired) -> list[Piecewise]:
+        """Return the outputs of a program. Of its inputs only gains, numbers of the craft as the law knows it and as it is,
+        and the period are numbers, those of the subject."""
+        program, given = self.claim.programs[role], dict[str, Piecewise]()
+        for name in program.inputs:
+            wires = [table[name] for table in (self.told, *tables) if name in table]
+            number = name.startswith(("gains.", "craft.", "plant.")) or name == "measurement.period"
+            demand(bool(wires) or number, f"the {role} asks for {name}, which nothing gives")
+            given[name] = known(wires[-1] if wires else self.claim.subject[name])
+        return program.run(given, self.ring, count)
+
+    def single(self, role: str, count: int, *tables: Wired) -> list[Poly]:
+        """Return the outputs of a program that does not switch."""
+        return [single(cases) for cases in self.read(role, count, *tables)]
+
+    def slopes_along(self, p: Poly, acceleration: Sequence[Poly]) -> Poly:
+        """Return the derivative of a function of the state along the motion with an acceleration."""
+        rates = {**self.rates, **dict(zip(self.driven, acceleration, strict=True))}
+        return total(p.slope(name) * rate for name, rate in rates.items())
 
 
-class AttitudeLoop:
+class AttitudeLoop(Loop):
     """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are.
     `quotients`: programs may divide by the state, but not by quotients, and take no roots of it."""
 
+    driven = ("w1", "w2", "w3")
+
     def __init__(self, claim: Claim, any_inertia: bool = False, quotients: bool = False) -> None:
-        self.claim, self.any_inertia = claim, any_inertia
-        self.ring = Asking() if quotients else Exactly()
+        super().__init__(claim, Asking() if quotients else Exactly())
+        self.any_inertia = any_inertia
         self.q, self.w = variables("q", 0), variables("w")
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
         self.e = variables("e") if self.outside else NONE
         self.r, self.a = (variables(letter) if self.moving else NONE for letter in "ra")
-        self.J, self.J_inverse = self._inertia()
+        if any_inertia:
+            self.J, self.J_inverse = ([[var(f"{x}{min(i, k)}{max(i, k)}") for k in AXES] for i in AXES] for x in "ji")
+        else:
+            self.J = [[claim.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in AXES] for i in AXES]
+            self.J_inverse = inverse(self.J)
         self.rate = [w + r for w, r in zip(self.w, self.r, strict=True)]
         spin = apply(self.J, self.rate)
         self.H = variables("h") if self.wheels else spin
         self.stored = [h - own for h, own in zip(self.H, spin, strict=True)]
-        self.told: Wired = {
-            name: part
-            for field, value in {
-                "attitude": self.q, "rate": self.w, "body_rate": self.rate, "target_rate": self.r,
-                "target_acceleration": self.a, "external_torque": self.e, "position": variables("p"),
-                "wheel_momentum": self.stored, "magnetic_field": variables("b"),
-            }.items()
-            for name, part in wired(f"measurement.{field}", value).items()
+        fields = {
+            "attitude": self.q, "rate": self.w, "body_rate": self.rate, "target_rate": self.r,
+            "target_acceleration": self.a, "external_torque": self.e, "position": variables("p"),
+            "wheel_momentum": self.stored, "magnetic_field": variables("b"),
         }  # fmt: skip
+        self.told = {name: p for field, value in fields.items() for name, p in wired(f"measurement.{field}", value).items()}
         self.sphere = dot(self.q, self.q) - 1
-        self.still: dict[str, int] = dict.fromkeys(("w1", "w2", "w3"), 0)
+        self.still: dict[str, int] = dict.fromkeys(self.driven, 0)
         self.on_target, self.opposite = ({"q0": q0, "q1": 0, "q2": 0, "q3": 0} for q0 in (1, -1))
         # q' = q (0, w)/2.
         own, half = self.q[1:], Fraction(1, 2)
         turned = [self.q[0] * w + c for w, c in zip(self.w, cross(own, self.w), strict=True)]
         self.turning = [-half * dot(self.w, own), *(half * part for part in turned)]
-
-    def _inertia(self) -> tuple[Matrix, Matrix]:
-        if self.any_inertia:
-            pair = ([[var(f"{x}{min(i, k)}{max(i, k)}") for k in AXES] for i in AXES] for x in "ji")
-            return next(pair), next(pair)
-        J = [[self.claim.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in AXES] for i in AXES]
-        return J, inverse(J)
+        self.rates = {f"q{k}": rate for k, rate in enumerate(self.turning)}
 
     def read(self, role: str, count: int, *tables: Wired) -> list[Piecewise]:
-        """Return the outputs of a program, its inputs wired as the tables say."""
-        found = read(self.claim, role, count, self.ring, *tables)
+        """Return the outputs of a program."""
+        found = super().read(role, count, *tables)
         demand(not isinstance(self.ring, Asking) or not self.ring.roots, "a program takes a root of the state")
         nested = any(divisor.names & self.divisors.keys() for divisor in self.divisors.values())
         demand(not nested, "a program divides by a quotient")
@@ -110,13 +123,24 @@ class AttitudeLoop:
     @property
     def divisors(self) -> dict[str, Poly]:
         """Return the polynomials that variables are inverses of."""
-        found = self.ring.inverses if isinstance(self.ring, Asking) else {}
+        found = self.ring.inverses if isinstance(self.ring, Asking) else dict[Condition, str]()
         return {name: Poly(dict(own)) for own, name in found.items()}
+
+    @property
+    def assumed(self) -> list[str]:
+        """Return what is assumed of a body of this loop."""
+        return [
+            "rigid-body", "exact-measurement", "ideal-actuators",
+            *([] if self.any_inertia else ["inertia-as-given"]),
+            "known-outside-torque" if self.outside else "no-outside-torque",
+            "known-target" if self.moving else "target-at-rest",
+            "frictionless-wheels" if self.wheels else "no-wheels",
+        ]  # fmt: skip
 
     @cached_property
     def law(self) -> list[Piecewise]:
         """Return the torque that the law asks for, case by case."""
-        return self.read("law", 3, self.told)
+        return self.read("law", 3)
 
     @cached_property
     def u(self) -> list[Poly]:
@@ -125,8 +149,7 @@ class AttitudeLoop:
 
     def balance(self, u: Sequence[Poly]) -> list[Poly]:
         """Return J w' under a torque of the law."""
-        turning = cross(self.rate, self.H)
-        columns = zip(u, self.e, turning, apply(self.J, self.a), strict=True)
+        columns = zip(u, self.e, cross(self.rate, self.H), apply(self.J, self.a), strict=True)
         return [torque + outside - gyroscopic - moved for torque, outside, gyroscopic, moved in columns]
 
     @cached_property
@@ -137,9 +160,7 @@ class AttitudeLoop:
     @cached_property
     def lyapunov(self) -> Poly:
         """Return V, less what it is at rest on target."""
-        plant = wired_matrix("craft.inertia", self.J)
-        (cases,) = self.read("lyapunov", 1, self.told, plant)
-        V = single(cases)
+        (V,) = self.single("lyapunov", 1, wired_matrix("craft.inertia", self.J))
         self.autonomous([V])
         return V - V.at(self.on_target | self.still)
 
@@ -148,14 +169,8 @@ class AttitudeLoop:
         names = {name for part in parts for name in part.names if name[0] not in "qwj"}
         demand(not names, f"the motion depends on more than the state: {', '.join(sorted(names))}")
 
-    def slopes_along(self, p: Poly, acceleration: Sequence[Poly]) -> Poly:
-        """Return the derivative of a function of the state along the motion with an acceleration."""
-        rates = zip((*(f"q{k}" for k in range(4)), *self.still), (*self.turning, *acceleration), strict=True)
-        return total(p.slope(name) * rate for name, rate in rates)
-
     def expanded(self, p: Poly, rest: Mapping[str, int]) -> Poly:
-        """Return p with the inverses in it as they are to the first order around a point, where no divisor of any program
-        vanishes, used or not."""
+        """Return p with inverses to the first order around a point, where no divisor vanishes, used or not."""
         for z, divisor in self.divisors.items():
             d = divisor.at(rest).number
             demand(d != 0, "a program divides by zero at rest")
@@ -164,20 +179,21 @@ class AttitudeLoop:
 
     def sound(self) -> Shown:
         """The inertia is one, and the programs of the body and of its turning are the equations above."""
-        if not self.any_inertia:
-            yield "inertia", Definite([[Fraction(poly(x).number) for x in row] for row in self.J])
-        pushed, inverses = variables("t"), list[Poly]()
+        inverses = list[Poly]()
         if self.any_inertia:
             columns = list(zip(*self.J_inverse, strict=True))
             inverses = [dot(self.J[i], columns[k]) - (i == k) for i in AXES for k in AXES]
+        else:
+            yield "inertia", Definite([[poly(x).number for x in row] for row in self.J])
+        pushed = variables("t")
         plant = wired_matrix("craft.inertia", self.J) | wired_matrix("craft.inverse_inertia", self.J_inverse)
-        moved = [single(c) for c in self.read("body", 3, wired("rate", self.w), wired("torque", pushed), plant)]
+        moved = self.single("body", 3, wired("rate", self.w), wired("torque", pushed), plant)
         wanted = [t - g for t, g in zip(pushed, cross(self.w, apply(self.J, self.w)), strict=True)]
         for k, (found, p) in enumerate(zip(apply(self.J, moved), wanted, strict=True)):
             yield f"Euler's equation {k}", Vanishes(found - p, inverses)
-        turned = self.read("turning", 4, wired("q", self.q), wired("rate", self.w))
+        turned = self.single("turning", 4, wired("q", self.q), wired("rate", self.w))
         for k, (found, p) in enumerate(zip(turned, self.turning, strict=True)):
-            yield f"turning {k}", Vanishes(single(found) - p)
+            yield f"turning {k}", Vanishes(found - p)
 
 
 def slopes(parts: Sequence[Poly], letter: str, at: Mapping[str, Poly | Fraction | int]) -> Rows:

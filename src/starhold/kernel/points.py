@@ -1,8 +1,7 @@
 """The loop of a craft near a libration point, wired from programs by the kernel.
 
 x are places and v velocities in axes that turn with the two bodies: x' = v, v' = field(x, v) + u, with the law's control u.
-Roots and quotients by the state become variables, the same wherever the same is asked for, so that what the law takes off
-the field cancels.
+Roots and quotients by the state are variables, the same wherever the same is asked for.
 """
 
 from __future__ import annotations
@@ -10,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from .loops import read, wired
+from .loops import Loop, wired
 from .numbers import demand
-from .polynomials import Poly, dot, total, var, variables
-from .programs import Asking, Guards, joined, single
+from .polynomials import Poly, dot, var, variables
+from .programs import Asking, Guards, joined
 from .reading import Claim
 
 STATE = ("x1", "x2", "x3", "v1", "v2", "v3")
@@ -32,37 +31,29 @@ class Side:
         return [Poly(dict(condition)) * (1 if above else -1) for condition, above in sorted(self.guards)]
 
 
-class PointLoop:
+class PointLoop(Loop):
     """A craft near a libration point under a law; `sides` are the cases of the law, which together are all states."""
 
+    ring: Asking
+    driven = STATE[3:]
+
     def __init__(self, claim: Claim) -> None:
-        self.claim, self.ring, self.x, self.v = claim, Asking(), variables("x"), variables("v")
-        told = {"position": self.x, "velocity": self.v}
-        self.told = {
-            name: p
-            for word, value in told.items()
-            for at in ("", "measurement.")
-            for name, p in wired(at + word, value).items()
-        }
+        super().__init__(claim, Asking())
+        self.x, self.v = variables("x"), variables("v")
+        own = wired("position", self.x) | wired("velocity", self.v)
+        self.told = own | {f"measurement.{name}": p for name, p in own.items()}
+        self.rates = dict(zip(STATE, self.v, strict=False))
         self.field = self.single("field", 3)
         demand(not claim.taken.content, "the loop is taken with nothing")
-
-    def single(self, role: str, count: int) -> list[Poly]:
-        """Return the outputs of a program that does not switch."""
-        return [single(cases) for cases in read(self.claim, role, count, self.ring, self.told)]
 
     @cached_property
     def sides(self) -> list[Side]:
         """Return the cases of the law's three outputs together."""
-        return [Side(case.guards, case.value) for case in joined(read(self.claim, "law", 3, self.ring, self.told))]
+        return [Side(case.guards, case.value) for case in joined(self.read("law", 3))]
 
     def acceleration(self, side: Side) -> list[Poly]:
         """Return v'."""
         return [a + u for a, u in zip(self.field, side.u, strict=True)]
-
-    def along(self, p: Poly, acceleration: list[Poly]) -> Poly:
-        """Return the derivative of a function of the state along the motion."""
-        return total(p.slope(name) * rate for name, rate in zip(STATE, (*self.v, *acceleration), strict=True))
 
     @property
     def linear(self) -> bool:

@@ -116,7 +116,7 @@ class Station:
         if away is None:
             raise NotFoundError("the law is no relay")
         f1, f2, _ = circle.errors
-        slope = loop.along(f2, loop.acceleration(away))
+        slope = loop.slopes_along(f2, loop.acceleration(away))
         drift = slope.at({circle.inverse: 0}).at({**circle.running, "x1": 0, "v1": 0})
         k, pull = -multiple(slope.slope(circle.inverse), f2)[0], abs(multiple(drift, f1 * loop.x[1])[0])
         radius = sqrt(circle.square)

@@ -30,7 +30,7 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     loop = AttitudeLoop(claim)
     numbers = claim.numbers
     yield from loop.sound()
-    s = [cases[0].value for cases in loop.read("surface", 3, loop.told) if len(cases) == 1]
+    s = [cases[0].value for cases in loop.read("surface", 3) if len(cases) == 1]
     demand(len(s) == 3, "the surface switches")
     K = slopes(s, "q", {})
     for k, (p, row) in enumerate(zip(s, K, strict=True)):

@@ -8,7 +8,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ..loops import read, wired
+from ..loops import wired
 from ..numbers import RefusedError, Rows, demand
 from ..points import STATE, PointLoop, Side
 from ..polynomials import Poly, dot, multiple, poly, var, variables
@@ -99,10 +99,10 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
         yield f"x is on its own {k}", Vanishes(motion[0] - a * loop.x[0] - b * loop.v[0])
         if away:
             demand(far(circle, side) > 0, "the law may have no bound on a side")
-        slope = -circle.met(loop.along(V, motion)) if away else -loop.along(V, motion)
+        slope = -circle.met(loop.slopes_along(V, motion)) if away else -loop.slopes_along(V, motion)
         z, known = ([poly(1)], [circle.met(p) for p in side.known]) if away else (wrong, [])
         yield f"V decreases {k}", Squares(slope, z, len(z), known)
-    stays = [loop.along(p, loop.acceleration(near[0])).at(circle.running) for p in wrong]
+    stays = [loop.slopes_along(p, loop.acceleration(near[0])).at(circle.running) for p in wrong]
     yield "only the circle", Solves(stays, [circle.errors[0] * p for p in loop.x[1:]])
     yield "x returns", Contracts([[Fraction(0), Fraction(1)], [a, b]], flow=True)
 
@@ -236,7 +236,7 @@ def clipped(loop: PointLoop, limit: Fraction) -> Shown:
     """The limit lets act along X, of all between -limit and limit, what is nearest to what is asked, t: that has
     (t - acts)(w - acts) <= 0 for w = -limit and limit."""
     t = variables("t")
-    for k, case in enumerate(read(loop.claim, "limited", 3, loop.ring, wired("command", t), {"limit": poly(limit)})[0]):
+    for k, case in enumerate(loop.read("limited", 3, wired("command", t), {"limit": poly(limit)})[0]):
         known, acts, asks = Side(case.guards, []).known, case.value, t[0]
         for name, p in (
             ("at least", acts + limit),
@@ -300,7 +300,7 @@ def holds_another_circle(claim: Claim) -> Proof:
     motion, s, f1 = loop.acceleration(away[0]), var(circle.inverse), circle.errors[0]
     yield "the plane is not left", Vanishes(motion[0].at({"x1": 0, "v1": 0}))
     for k, (p, x) in enumerate(zip(circle.errors[1:], loop.x[1:], strict=True)):
-        slope = loop.along(p, motion)
+        slope = loop.slopes_along(p, motion)
         drift = slope.at({circle.inverse: 0}).at({**circle.running, "x1": 0, "v1": 0})
         size, pull = -multiple(slope.slope(circle.inverse), p)[0], multiple(drift, f1 * x)[0]
         yield f"the relay {k}", Vanishes(slope - slope.at({circle.inverse: 0}) + size * s * p)
