@@ -17,7 +17,7 @@ from starhold.kernel.numbers import (
     scalar,
     times,
 )  # fmt: skip
-from starhold.kernel.polynomials import Poly, read_poly, var
+from starhold.kernel.polynomials import horner, read_poly, var
 from starhold.kernel.programs import Exactly, Program, known
 from starhold.kernel.rules import Contracts, Definite, Exceeds, Solves, Squares, Vanishes
 from starhold.kernel.sentences import above, below
@@ -220,8 +220,9 @@ def test_polynomials_and_rounding():
     assert p.at({"x": y, "y": 2}).terms == (y * y - 1).terms
     with pytest.raises(RefusedError, match="twice"):
         read_poly({"x y": "1", "y x": "1"})
-    with pytest.raises(RefusedError, match="multiple"):
-        Poly({("x",): ONE, (): ONE}).over("x")
+    p = 3 * x * x * y + 2 * y + x
+    assert [part.terms for part in p.powers("x")] == [(2 * y).terms, {(): ONE}, (3 * y).terms]
+    assert horner(p.powers("x"), x).terms == p.terms
     third = Fraction(1, 3)
     assert Fraction(below(third)) < third < Fraction(above(third))
     assert below(Fraction(0.01)) == "0.01"

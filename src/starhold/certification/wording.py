@@ -49,8 +49,6 @@ OBLIGATIONS = {
     "rates on target": "the set holds every rate on target that is told",
     "states": "the set holds every state that is told",
     "norm of the torque": "the torque is within the limit on the whole set",
-    "limit of motor": "the motor gives torque",
-    "limit of wheel": "the wheel stores momentum",
     "motor": "no motor gives more than its limit on the whole set",
     "wheel": "no wheel stores more than it can on the whole set",
     "rest on target": "on target at rest the law asks for no torque",

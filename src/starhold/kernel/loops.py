@@ -88,11 +88,14 @@ class AttitudeLoop(Loop):
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
         self.e = variables("e") if self.outside else NONE
         self.r, self.a = (variables(letter) if self.moving else NONE for letter in "ra")
+        places = [[(min(i, k), max(i, k)) for k in AXES] for i in AXES]
         if any_inertia:
-            self.J, self.J_inverse = ([[var(f"{x}{min(i, k)}{max(i, k)}") for k in AXES] for i in AXES] for x in "ji")
+            J, J_inverse = ([[var(f"{x}{i}{k}") for i, k in row] for row in places] for x in "ji")
         else:
-            self.J = [[claim.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in AXES] for i in AXES]
-            self.J_inverse = inverse(self.J)
+            J = [[claim.subject[f"body.inertia.{i}.{k}"] for i, k in row] for row in places]
+            J_inverse = inverse(J)
+        self.J: Matrix = J
+        self.J_inverse: Matrix = J_inverse
         self.rate = [w + r for w, r in zip(self.w, self.r, strict=True)]
         spin = apply(self.J, self.rate)
         self.H = variables("h") if self.wheels else spin

@@ -78,10 +78,12 @@ class Poly:
                 found[m[:place] + m[place + 1 :]] = c * m.count(name)
         return Poly(found)
 
-    def over(self, name: str) -> Poly:
-        """Return the polynomial divided by a variable, which every monomial must have."""
-        demand(all(name in m for m in self.terms), f"a polynomial is not a multiple of {name}")
-        return Poly({m[: m.index(name)] + m[m.index(name) + 1 :]: c for m, c in self.terms.items()})
+    def powers(self, name: str) -> list[Poly]:
+        """Return the coefficients of a polynomial in one variable, from the lowest on."""
+        found = [dict[Monomial, Fraction]() for _ in range(1 + max((m.count(name) for m in self.terms), default=0))]
+        for m, c in self.terms.items():
+            found[m.count(name)][tuple(x for x in m if x != name)] = c
+        return list(map(Poly, found))
 
     def at(self, values: Mapping[str, Poly | Fraction | int]) -> Poly:
         """Return the polynomial with numbers or polynomials in place of variables, all at once."""
@@ -118,6 +120,14 @@ def total(parts: Iterable[Poly]) -> Poly:
 def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) -> Poly:
     """Return the sum of products."""
     return total(poly(x) * y for x, y in zip(a, b, strict=True))
+
+
+def horner(parts: Sequence[Poly], x: Poly) -> Poly:
+    """Return parts[0] + parts[1] x + parts[2] x^2 + ..."""
+    found = Poly({})
+    for part in reversed(parts):
+        found = found * x + part
+    return found
 
 
 def apply(rows: Sequence[Sequence[Poly | Fraction | int]], v: Sequence[Poly]) -> list[Poly]:

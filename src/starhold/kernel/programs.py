@@ -177,9 +177,13 @@ def _quotient(x: Poly, y: Poly) -> Poly:
     return x * (1 / y.number)
 
 
+def _chosen(truth: bool, value: Poly) -> Poly:
+    return value
+
+
 EXACT: dict[str, Callable[..., Any]] = {
     "plus": op.add, "minus": op.sub, "product": op.mul, "negative": op.neg, "divide": _quotient,
-    "select": lambda truth, chosen: chosen, "both": bool.__and__, "either": bool.__or__, "opposite": op.not_,
+    "select": _chosen, "both": bool.__and__, "either": bool.__or__, "opposite": op.not_,
 }  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from functools import partial
 from typing import TypeAlias
 
 from ..reading import Claim
@@ -14,10 +15,10 @@ Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, S
 
 THEOREMS: dict[str, Theorem] = {
     "converges": attitude.converges,
-    "converges strictly": attitude.converges_strictly,
-    "converges whatever the inertia": attitude.converges_whatever_the_inertia,
+    "converges strictly": partial(attitude.converges, strictly=True),
+    "converges whatever the inertia": partial(attitude.converges, any_inertia=True),
     "converges from both quaternions": attitude.converges_evenly,
-    "converges from both quaternions whatever the inertia": attitude.converges_evenly_whatever_the_inertia,
+    "converges from both quaternions whatever the inertia": partial(attitude.converges_evenly, any_inertia=True),
     "converges without a preferred axis": isotropic.converges_without_axes,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,

@@ -11,9 +11,9 @@ from collections.abc import Generator, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
-from ..loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
+from ..loops import HYSTERESIS, NONE, SHORTEST, AttitudeLoop
 from ..numbers import cosine_below, demand
-from ..polynomials import Poly, apply, dot, poly
+from ..polynomials import Poly, apply, dot, horner, poly
 from ..reading import Claim
 from ..rules import Exceeds, Obligation, Shown, Solves, Squares, Vanishes
 from ..sentences import Statement, above, below, enumerated
@@ -23,86 +23,58 @@ Proof: TypeAlias = Generator[tuple[str, Obligation], None, Statement]
 Part: TypeAlias = Generator[tuple[str, Obligation], None, list[str]]
 
 
-def converges(claim: Claim) -> Proof:
-    """Every motion comes to rest on target, or, almost never, on the other quaternion of the same attitude.
-
-    V' <= -c |w|^2 (LaSalle 1960); the other rest is unstable, for V at rest is highest there (Chen and Wimmer 1973)."""
-    loop = AttitudeLoop(claim)
-    yield from least_on_target(loop)
-    said = yield from is_non_increasing(loop, _damped(loop), 3)
-    yield from only_equilibrium(loop)
-    return (yield from concluded(loop, said))
-
-
-def converges_strictly(claim: Claim) -> Proof:
-    """Motions end as in `converges` by a V, of whatever origin, with V' <= -c (|w|^2 + |q|^2): it decreases but at rest
-    at q = 0 (Lyapunov)."""
-    loop = AttitudeLoop(claim)
-    yield from least_on_target(loop)
+def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False) -> Proof:
+    """Every motion comes to rest on target, or, almost never, on the other quaternion of the same attitude. V' <= -c |w|^2,
+    `strictly` -c (|w|^2 + |q|^2). `any_inertia`: so does every body, while the law's own numbers stay."""
+    loop = AttitudeLoop(claim, any_inertia)
     w = loop.w
-    more = [*(q * x for q in loop.q for x in w), *(w[i] * w[k] for i in range(3) for k in range(i, 3))]
-    said = yield from is_non_increasing(loop, [*w, *loop.q[1:], *more], 6)
-    return (yield from concluded(loop, said, strictly=True))
-
-
-def converges_whatever_the_inertia(claim: Claim) -> Proof:
-    """Motions end as in `converges` for every inertia of the body, while the law's own numbers stay: V is the kinetic energy
-    of that inertia and a function of the attitude."""
-    loop = AttitudeLoop(claim, any_inertia=True)
     yield from least_on_target(loop)
-    said = yield from is_non_increasing(loop, _damped(loop), 3)
-    yield from only_equilibrium(loop)
-    return (yield from concluded(loop, said))
+    z = [*w, *loop.q[1:] * strictly, *(q * x for q in loop.q for x in w)]
+    z += [w[i] * w[k] for i in range(3) for k in range(i, 3)] * strictly
+    said = yield from is_non_increasing(loop, z, 6 if strictly else 3)
+    if not strictly:
+        # At rest the law's torque is zero only where q is.
+        resting = [p.at(loop.still) for p in loop.balance(loop.u)]
+        yield "only equilibrium", Solves(resting, loop.q[1:], [loop.sphere])
+    return (yield from concluded(loop, said, strictly))
 
 
-def converges_evenly(claim: Claim) -> Proof:
+def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
     """Every motion comes to rest on target, on either quaternion, or at a half turn, each of which is unstable."""
-    return (yield from _evenly(AttitudeLoop(claim)))
-
-
-def converges_evenly_whatever_the_inertia(claim: Claim) -> Proof:
-    """Motions end as in `converges_evenly` for every inertia of the body, while the law's own numbers stay."""
-    return (yield from _evenly(AttitudeLoop(claim, any_inertia=True)))
-
-
-def _evenly(loop: AttitudeLoop) -> Proof:
-    own, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), loop.claim.numbers.get("level")
+    loop = AttitudeLoop(claim, any_inertia)
+    own, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), claim.numbers.get("level")
     yield from least_on_target(loop, own)
-    said = yield from is_non_increasing(loop, _damped(loop), 3)
-    pull = -dot(own, loop.balance(loop.u)).at(loop.still)
-    yield "rests at half turns only", Squares(pull.over("q0"), own, 3, modulo=[loop.sphere])
+    said = yield from is_non_increasing(loop, [*loop.w, *(q * x for q in loop.q for x in loop.w)], 3)
+    at_half_turns, *pull = (-dot(own, loop.balance(loop.u)).at(loop.still)).powers("q0")
+    demand(not at_half_turns.terms, "the torque at rest is not zero at every half turn")
+    yield "rests at half turns only", Squares(horner(pull, loop.q[0]), own, 3, modulo=[loop.sphere])
     demand(all(len(m) == 2 and "q0" not in m for m in resting.terms), "V at rest is no form of q1, q2, q3")
     if level is None:
         said.append("comes to rest on target or at a half turn, each of which is unstable")
     else:
         yield "half turns are outside", Squares(resting - level, [poly(1), *own], 1, modulo=[dot(own, own) - 1])
         said.append("comes to rest on target")
-    return (yield from finished(loop, said, even=True))
-
-
-def _damped(loop: AttitudeLoop) -> list[Poly]:
-    return [*loop.w, *(q * w for q in loop.q for w in loop.w)]
+    return (yield from finished(loop, said))
 
 
 def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
-    """V >= c (|turned|^2 + |w|^2), turned being (1 - q0, q) unless told: V is zero only on target at rest, and {V <= level}
-    is compact. Of an inertia that is not known V has the kinetic energy, of which only w.Jw > 0 is used."""
+    """V >= c (|turned|^2 + |w|^2), turned being (1 - q0, q) unless told. Of an inertia that is not known V has the kinetic
+    energy, of which only w.Jw > 0 is used."""
     yield from loop.sound()
-    turned, momentum = turned or [1 - loop.q[0], *loop.q[1:]], apply(loop.J, loop.w)
+    z, momentum, energy = [*(turned or [1 - loop.q[0], *loop.q[1:]])], apply(loop.J, loop.w), list[Poly]()
     if loop.any_inertia:
         for k, p in enumerate(momentum):
             yield f"kinetic energy {k}", Vanishes(loop.lyapunov.slope(f"w{k + 1}") - p)
         energy = [dot(loop.w, momentum)]
-        yield "V is least on target", Squares(loop.lyapunov, turned, len(turned), modulo=[loop.sphere], strict=energy)
     else:
-        z = [*turned, *loop.w]
-        yield "V is least on target", Squares(loop.lyapunov, z, len(z), modulo=[loop.sphere])
+        z += loop.w
+    yield "V is least on target", Squares(loop.lyapunov, z, len(z), modulo=[loop.sphere], strict=energy)
 
 
 def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
     """V' <= -c times the squares of the first of z, everywhere or, with a level, on {V <= level}, which is then not left; if
     `fastest` is told, there the rate is at most that."""
-    numbers, V = loop.claim.numbers, loop.lyapunov
+    numbers, V, w = loop.claim.numbers, loop.lyapunov, loop.w
     level, fastest = numbers.get("level"), numbers.get("fastest")
     motion, known = loop.balance(loop.u), list[Poly]()
     loop.autonomous(motion)
@@ -110,102 +82,78 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
     if fastest is not None:
-        slow = fastest * fastest - dot(loop.w, loop.w)
-        yield "rates", Squares(slow, [poly(1), *loop.q, *loop.w], 0, [numbers["level"] - V], [loop.sphere])
-        known = [slow * w * w for w in loop.w]
+        slow = fastest * fastest - dot(w, w)
+        yield "rates", Squares(slow, [poly(1), *loop.q, *w], 0, [numbers["level"] - V], [loop.sphere])
+        known = [slow * x * x for x in w]
         said.append(f"turns no faster than {above(fastest)} rad/s and")
-    if loop.any_inertia:
-        # V = w.Jw/2 + U(q), so that V' = w.Jw' + U'.
-        slope = loop.slopes_along(V, NOTHING) + dot(loop.w, motion)
-    else:
-        slope = loop.slopes_along(V, loop.acceleration)
+    # Of any inertia V = w.Jw/2 + U(q), so that V' = w.Jw' + U'.
+    slope = loop.slopes_along(V, NONE if loop.any_inertia else loop.acceleration)
+    slope = slope + dot(w, motion) * loop.any_inertia
     yield "V is non-increasing", Squares(-slope, z, least, known, [loop.sphere])
     return said
 
 
-NOTHING = [Poly({})] * 3
-
-
-def only_equilibrium(loop: AttitudeLoop) -> Shown:
-    """At rest the law's torque is zero only where q is."""
-    yield "only equilibrium", Solves([p.at(loop.still) for p in loop.balance(loop.u)], loop.q[1:], [loop.sphere])
-
-
 def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Proof:
     """Settle the part that the rest at q0 = -1 and the quaternion's sign play."""
-    claim, V = loop.claim, loop.lyapunov
-    level = claim.numbers.get("level")
-    z = [poly(1), *loop.q, *loop.w]
-    inside = [] if level is None else [level - V]
-    if claim.taken.get(HYSTERESIS):
-        width = claim.numbers["hysteresis"]
+    numbers, V, q, w = loop.claim.numbers, loop.lyapunov, loop.q, loop.w
+    level, assumed = numbers.get("level"), "quaternion-as-fed"
+    away = V.at(loop.opposite | loop.still)
+    if loop.claim.taken.get(HYSTERESIS):
+        width, assumed = numbers["hysteresis"], "sign-at-once"
         yield "width", Exceeds(min(width, 1 - width))
-        jump = V - V.at({f"q{k}": -q for k, q in enumerate(loop.q)})
-        yield "a jump lowers V", Squares(jump, z, 1, [-width - loop.q[0], *inside], [loop.sphere])
+        jump, inside = V - V.at({f"q{k}": -x for k, x in enumerate(q)}), [] if level is None else [level - V]
+        yield "a jump lowers V", Squares(jump, [poly(1), *q, *w], 1, [-width - q[0], *inside], [loop.sphere])
         said.append(f"comes to rest on target, with the quaternion's sign chosen anew at q0 < -{above(width)}")
-    elif claim.taken.get(SHORTEST):
-        border, energy = [loop.sphere.at({"q0": 0})], [dot(loop.w, apply(loop.J, loop.w))] * loop.any_inertia
-        higher = V.at({"q0": 0}) - claim.numbers["level"]
-        yield "the sign never changes", Squares(higher, [poly(1), *loop.q[1:], *loop.w], 1, (), border, energy)
+    elif loop.claim.taken.get(SHORTEST):
+        assumed, energy = "sign-at-once", [dot(w, apply(loop.J, w))] * loop.any_inertia
+        higher, z = V.at({"q0": 0}) - numbers["level"], [poly(1), *q[1:], *w]
+        yield "the sign never changes", Squares(higher, z, 1, (), [loop.sphere.at({"q0": 0})], energy)
         said.append("comes to rest on target by the shorter turn")
     elif level is not None and not loop.any_inertia:
-        yield "the other equilibrium is outside", Exceeds(V.at(loop.opposite | loop.still).number, level)
+        yield "the other equilibrium is outside", Exceeds(away.number, level)
         said.append("comes to rest on target")
     else:
         demand(level is None, "a level for every inertia needs a sign of the quaternion")
         for k, name in enumerate(loop.still if strictly else ()):
             yield f"V is level at the other equilibrium {k}", Vanishes(V.slope(name).at(loop.opposite | loop.still))
-        lower = V.at(loop.opposite | loop.still) - V.at(loop.still)
-        yield "the other equilibrium repels", Squares(lower, [1 + loop.q[0], *loop.q[1:]], 4, modulo=[loop.sphere])
+        repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])
+        yield "the other equilibrium repels", repels
         said.append("comes to rest on target, but for a set of measure zero, which ends on the other quaternion")
-    return (yield from finished(loop, said))
+    return (yield from finished(loop, said, assumed))
 
 
-def finished(loop: AttitudeLoop, said: list[str], even: bool = False) -> Proof:
+def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:
     """Add what the set holds and the limits, and say all that was shown."""
-    claim = loop.claim
     held = yield from contents(loop, loop.lyapunov)
     limited = yield from within_limits(loop)
-    assumptions = ["rigid-body", "exact-measurement", "ideal-actuators", "continuous-torque"]
-    assumptions += [] if loop.any_inertia else ["inertia-as-given"]
-    assumptions += limited.assumptions
-    bounded = claim.numbers.content.keys()
-    words = claim.taken.content
-    assumptions.append("known-outside-torque" if OUTSIDE in words else "no-outside-torque")
-    assumptions.append("known-target" if MOVING in words else "target-at-rest")
-    assumptions += ["bounded-outside-torque"] * ("outside.0" in bounded) + ["bounded-target"] * ("target.rate" in bounded)
-    assumptions.append("frictionless-wheels" if WHEELS in words else "no-wheels")
-    if not even:
-        assumptions.append("sign-at-once" if {SHORTEST, HYSTERESIS} & words.keys() else "quaternion-as-fed")
-    text = f"{' '.join(said)}{''.join(f'; {part}' for part in (enumerated(held), limited.text) if part)}"
-    return Statement(text, tuple(assumptions), limited.label or ("inertia" if loop.any_inertia else "convergence"))
+    text = "; ".join(part for part in (" ".join(said), enumerated(held), limited.text) if part)
+    label = limited.label or ("inertia" if loop.any_inertia else "convergence")
+    return Statement(text, (*loop.assumed, "continuous-torque", *limited.assumptions, *assumed), label)
 
 
 def contents(loop: AttitudeLoop, V: Poly) -> Part:
     """{V <= level} holds every attitude at rest turned by up to `angle`; on target every rate up to `rate`; and every state
     turned by up to `start.angle` at up to `start.rate`."""
-    numbers, said = loop.claim.numbers, list[str]()
-    level, z = numbers.get("level"), [poly(1), *loop.q, *loop.w]
+    numbers, q, w, one = loop.claim.numbers, loop.q, loop.w, poly(1)
+    level, said = numbers.get("level"), list[str]()
 
     def near(angle: Fraction) -> list[Poly]:
         # |q0| and q0 are at least the cosine; for less than a half turn so is q0^2 at least its square.
         cosine = cosine_below(angle / 2)
-        return [loop.q[0] - cosine, *([loop.q[0] * loop.q[0] - cosine * cosine] if cosine >= 0 else [])]
-
-    def slow(rate: Fraction) -> list[Poly]:
-        return [rate * rate - dot(loop.w, loop.w)]
+        return [q[0] - cosine, *([q[0] * q[0] - cosine * cosine] if cosine >= 0 else [])]
 
     if level is None:
         return said
     inside, angle, rate = level - V, numbers.get("angle"), numbers.get("rate")
     if angle is not None:
-        yield "turns from rest", Squares(inside.at(loop.still), z[:5], 0, near(angle), [loop.sphere])
+        yield "turns from rest", Squares(inside.at(loop.still), [one, *q], 0, near(angle), [loop.sphere])
         said.append(f"the set holds every rest turned by up to {below(angle)} rad")
     if rate is not None:
-        yield "rates on target", Squares(inside.at(loop.on_target), [z[0], *loop.w], 0, slow(rate))
+        yield "rates on target", Squares(inside.at(loop.on_target), [one, *w], 0, [rate * rate - dot(w, w)])
         said.append(f"on target every rate up to {below(rate)} rad/s")
     if "start.rate" in numbers:
         angle, rate = numbers["start.angle"], numbers["start.rate"]
-        yield "states", Squares(inside, z, 0, [*near(angle), *slow(rate)], [loop.sphere])
+        starts = [*near(angle), rate * rate - dot(w, w)]
+        yield "states", Squares(inside, [one, *q, *w], 0, starts, [loop.sphere])
         said.append(f"every state turned by up to {below(angle)} rad at up to {below(rate)} rad/s")
     return said

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Generator
 from fractions import Fraction
 
-from ..loops import AttitudeLoop
+from ..loops import AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times
 from ..polynomials import Poly, poly
-from ..programs import Guards, Piecewise
+from ..programs import Piecewise
 from ..reading import Claim
 from ..rules import Contracts, Definite, Exceeds, Obligation, Vanishes
 from ..sentences import Statement, above, below
@@ -16,47 +16,36 @@ from ..sentences import Statement, above, below
 
 def near_rest(cases: Piecewise, rest: dict[str, int]) -> Poly:
     """Return the one case that holds around rest on target, where none of its conditions is on its border."""
-
-    def holds(guards: Guards) -> bool:
-        values = ((Poly(dict(p)).at(rest).number, truth) for p, truth in guards)
-        return all(value != 0 and (value > 0) == truth for value, truth in values)
-
-    found = [case.value for case in cases if holds(case.guards)]
-    demand(len(found) == 1, "the law switches at rest on target")
-    return found[0]
+    sides = [[(Poly(dict(p)).at(rest).number, truth) for p, truth in case.guards] for case in cases]
+    holds = [all(x != 0 and (x > 0) == truth for x, truth in own) for own in sides]
+    demand(holds.count(True) == 1, "the law switches at rest on target")
+    return cases[holds.index(True)].value
 
 
 def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues no larger than the
-    radius, and with `longest` it is for every period up to that.
-
-    With u = -Cw - Kq a step is w+ = w + h J^-1 u, q+ = q + h w/2 + h^2 J^-1 u/4. With z = (1 + x)/(1 - x) its eigenvalues z
-    solve ((J - h C/2) x^2 + (C - h K/4) x + K/2) v = 0 up to a factor of x: where the three matrices are symmetric and
-    positive definite, Re x < 0 and so |z| < 1. The first two are linear
-    in h, and so definite for every h up to the longest if they are for this, for at 0 they then are as well."""
-    loop = AttitudeLoop(claim, quotients=True)
+    radius; with `longest` it is stable for every period up to that, with `other` for that period too."""
+    loop, numbers = AttitudeLoop(claim, quotients=True), claim.numbers
     yield from loop.sound()
     rest: dict[str, int] = loop.on_target | loop.still
     u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
     loop.autonomous(u)
     for k, p in enumerate(u):
         yield f"rest on target {k}", Vanishes(p.at(rest))
-    C, K = ([[-p.slope(f"{letter}{k}").at(rest).number for k in (1, 2, 3)] for p in u] for letter in "wq")
-    J: Rows = [[poly(x).number for x in row] for row in loop.J]
-    push = [[poly(x).number for x in row] for row in loop.J_inverse]
-    h, radius = claim.numbers["period"], claim.numbers["radius"]
-    longest, other = claim.numbers.get("longest"), claim.numbers.get("other")
-    held = times(push, [[*a, *b] for a, b in zip(C, K, strict=True)])
+    C, K = (slopes([-p for p in u], letter, rest) for letter in "wq")
+    J, push = ([[poly(x).number for x in row] for row in own] for own in (loop.J, loop.J_inverse))
+    h, radius, longest, other = numbers["period"], numbers["radius"], numbers.get("longest"), numbers.get("other")
+    held = times(push, beside(C, K))
 
     def step(h: Fraction) -> Rows:
-        upper = plus([[*a, *b] for a, b in zip(scalar(1), scalar(0), strict=True)], held, -h)
-        return upper + plus([[*a, *b] for a, b in zip(scalar(h / 2), scalar(1), strict=True)], held, -h * h / 4)
+        # u = -Cw - Kq, w+ = w + h J^-1 u, q+ = q + h w/2 + h^2 J^-1 u/4.
+        upper, lower = beside(scalar(1), scalar(0)), beside(scalar(h / 2), scalar(1))
+        return plus(upper, held, -h) + plus(lower, held, -h * h / 4)
 
     yield "step", Contracts(step(h), radius)
     yield "radius", Exceeds(Fraction(1), radius)
-    said = (
-        f"near rest, with the torque held for {below(h)} s, the loop is stable, with all eigenvalues within {above(radius)}"
-    )
+    said = f"near rest, with the torque held for {below(h)} s, the loop is stable, "
+    said += f"with all eigenvalues within {above(radius)}"
     if longest is not None:
         demand(longest >= h, "the longest period is shorter than the period")
         yield "stiffness", Definite(K)
@@ -67,5 +56,9 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
         yield "another step", Contracts(step(other))
         said += f", and it is stable for a period of {below(other)} s"
     demand(not claim.taken.content, "the loop is taken with nothing")
-    assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
-    return Statement(said, (*assumptions, "no-outside-torque", "target-at-rest", "no-wheels", "linear-motion"), "sampling")
+    return Statement(said, (*loop.assumed, "linear-motion"), "sampling")
+
+
+def beside(a: Rows, b: Rows) -> Rows:
+    """Return two matrices side by side."""
+    return [[*s, *t] for s, t in zip(a, b, strict=True)]

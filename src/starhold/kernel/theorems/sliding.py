@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
 from fractions import Fraction
 
 from ..loops import AXES, HYSTERESIS, SHORTEST, AttitudeLoop, slopes
@@ -11,69 +10,57 @@ from ..numbers import Rows, demand, plus, scalar, times, transpose
 from ..polynomials import Poly, apply, dot, multiple, poly
 from ..programs import Case
 from ..reading import Claim
-from ..rules import Definite, Exceeds, Obligation, Shown, Squares, Vanishes
+from ..rules import Definite, Exceeds, Obligation, Squares, Vanishes
 from ..sentences import Statement, above, below
 from .attitude import contents
 
-
-@dataclass(frozen=True)
-class Axis:
-    """(J s')_i - e_i is -reach sign(s_i) at most, or where `slope` is told -slope s_i within a boundary layer."""
-
-    reach: Fraction
-    slope: Fraction | None
+Reach = tuple[Fraction, Fraction | None]
+"""(J s')_i - e_i is -reach sign(s_i) at most, or where a slope is told -slope s_i within a boundary layer."""
 
 
 def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     """The motion reaches s = w + Kq = 0 in a finite time, against any torque from outside that is at most as told, and
     slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target."""
-    loop = AttitudeLoop(claim)
-    numbers = claim.numbers
+    loop, numbers = AttitudeLoop(claim), claim.numbers
+    own, J = loop.q[1:], [[poly(x).number for x in row] for row in loop.J]
     yield from loop.sound()
-    s = [cases[0].value for cases in loop.read("surface", 3) if len(cases) == 1]
-    demand(len(s) == 3, "the surface switches")
+    s = loop.single("surface", 3)
     K = slopes(s, "q", {})
     for k, (p, row) in enumerate(zip(s, K, strict=True)):
-        yield f"surface {k}", Vanishes(p - loop.w[k] - dot(row, loop.q[1:]))
-    yield "q0 grows on the surface", Squares(dot(loop.q[1:], apply(K, loop.q[1:])), loop.q[1:], 3)
+        yield f"surface {k}", Vanishes(p - loop.w[k] - dot(row, own))
+    yield "q0 grows on the surface", Squares(dot(own, apply(K, own)), own, 3)
     # J s' = J w' + J K q'.
     without = loop.balance([Poly({})] * 3)
-    moved = [a + b for a, b in zip(without, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
-    axes, outside = list[Axis](), [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
-    for i in AXES:
-        axes.append(taken_apart(loop, i, moved[i] - loop.e[i], s[i]))
-        yield f"reach {i}", Exceeds(axes[i].reach, outside[i])
-    layered = any(axis.slope is not None for axis in axes)
-    squares, ending = Fraction(0), "slides to rest on target, on either quaternion"
-    if layered and any(outside):
-        squares = yield from losses(loop, axes, outside)
-        ending = yield from ending_in_the_layer(loop, squares, K)
-    said, begun = "approaches" if layered else "reaches in a finite time", "every attitude and rate"
+    moved = [a - e + b for a, e, b in zip(without, loop.e, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
+    outside = [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
+    axes = [taken_apart(loop, i, moved[i], s[i]) for i in AXES]
+    for i, (reach, _) in enumerate(axes):
+        yield f"reach {i}", Exceeds(reach, outside[i])
+    layered = any(slope is not None for _, slope in axes)
     signed = bool(claim.taken.get(SHORTEST) or claim.taken.get(HYSTERESIS))
+    said, begun, most = "approaches" if layered else "reaches in a finite time", "every attitude and rate", Fraction(0)
+    if signed or (layered and any(outside)):
+        half = [[x / 2 for x in row] for row in plus(K, transpose(K))]
+        yield "least moment", Definite(plus(J, scalar(1), -numbers["inertia.low"]))
+        yield "least slope", Definite(plus(half, scalar(1), -numbers["surface.low"]))
+    ending = "slides to rest on target, on either quaternion"
+    if layered and any(outside):
+        most = yield from losses(loop, axes, outside)
+        ending = yield from ending_in_the_layer(loop, most, J, K)
     if signed:
-        # At q0 = 0 q0' = (q.Kq - s.q)/2 > 0 while |s| < k, and low |s|^2 <= s.Js.
-        level, low, k = numbers["level"], numbers["inertia.low"], numbers["surface.low"]
-        yield from bounded(loop, K)
-        yield (
-            "the sign never changes",
-            Exceeds(low * k * k, max(2 * level, numbers["inertia.high"] * squares if squares else 0)),
-        )
+        low, k, level = numbers["inertia.low"], numbers["surface.low"], numbers["level"]
+        yield "the sign never changes", Exceeds(low * k * k, max(2 * level, most))
         held = yield from contents(loop, dot(s, apply(loop.J, s)) * Fraction(1, 2))
         begun = " ".join([f"{{s.Js/2 <= {below(level)}}}", *(f"({part})" for part in held)])
-    text = f"from {begun} the motion {said} the law's surface and {ending}"
-    torque = "bounded-outside-torque" if loop.outside else "no-outside-torque"
-    target = "known-target" if loop.moving else "target-at-rest"
-    assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators", "continuous-torque")
+    assumed = ["bounded-outside-torque" if name == "known-outside-torque" else name for name in loop.assumed]
     demand(not loop.wheels, "no law of this kind is taken with wheels")
-    return Statement(
-        text,
-        (*assumptions, "unlimited-torque", torque, target, "no-wheels", "sign-at-once" if signed else "quaternion-as-fed"),
-        "sliding",
-    )
+    assumed += ["continuous-torque", "unlimited-torque", "sign-at-once" if signed else "quaternion-as-fed"]
+    return Statement(f"from {begun} the motion {said} the law's surface and {ending}", tuple(assumed), "sliding")
 
 
-def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
-    """Return the axis: in each case of the law (J s')_i - e_i is a number against the sign of s_i, or -slope s_i."""
+def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Reach:
+    """Return the reach and slope of an axis: in each case of the law (J s')_i - e_i, its torque and what is moved, is a number
+    against the sign of s_i, or -slope s_i."""
     reaches, linear = list[Fraction](), list[Fraction]()
     for case in loop.law[i]:
         found = case.value + moved
@@ -85,7 +72,7 @@ def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
             demand(not (found + slope * s).terms and slope > 0, "the law is neither a switch nor a layer about its surface")
             linear.append(slope)
     demand(bool(reaches), "the law does not switch")
-    return Axis(min(reaches), min(linear) if linear else None)
+    return min(reaches), min(linear) if linear else None
 
 
 def on_side(case: Case, s: Poly) -> bool:
@@ -101,45 +88,35 @@ def on_surface(case: Case, s: Poly) -> bool:
 
 
 def losses(
-    loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]
+    loop: AttitudeLoop, axes: list[Reach], outside: list[Fraction]
 ) -> Generator[tuple[str, Obligation], None, Fraction]:
-    """Show that s.Js/2 falls outside of the box |s_i| <= far_i, and return the sum of far_i^2."""
-    total, squares = Fraction(0), Fraction(0)
-    for axis, m in zip(axes, outside, strict=True):
-        total += m * m / (4 * axis.slope) if axis.slope is not None else 0
-    for i, (axis, m) in enumerate(zip(axes, outside, strict=True)):
-        far = loop.claim.numbers[f"far.{i}"]
-        yield f"beyond the layer {i}", Exceeds((axis.reach - m) * far, total)
-        if axis.slope is not None:
-            yield f"in the layer {i}", Exceeds(axis.slope * far * far - m * far, total)
+    """Show that s.Js/2 falls outside of the box |s_i| <= far_i, and return what s.Js is at most in it."""
+    numbers, squares = loop.claim.numbers, Fraction(0)
+    gain = sum((m * m / (4 * slope) for (_, slope), m in zip(axes, outside, strict=True) if slope is not None), Fraction(0))
+    for i, ((reach, slope), m) in enumerate(zip(axes, outside, strict=True)):
+        far = numbers[f"far.{i}"]
+        yield f"beyond the layer {i}", Exceeds((reach - m) * far, gain)
+        if slope is not None:
+            yield f"in the layer {i}", Exceeds(slope * far * far - m * far, gain)
         squares += far * far
-    return squares
+    return numbers["inertia.high"] * squares
 
 
-def bounded(loop: AttitudeLoop, K: Rows) -> Shown:
-    """low |x|^2 <= x.Jx, and k |x|^2 <= x.Kx."""
-    low, k = loop.claim.numbers["inertia.low"], loop.claim.numbers["surface.low"]
-    J: Rows = [[poly(x).number for x in row] for row in loop.J]
-    yield "least moment", Definite(plus(J, scalar(1), -low))
-    yield "least slope", Definite(plus([[x / 2 for x in row] for row in plus(K, transpose(K))], scalar(1), -k))
-
-
-def ending_in_the_layer(loop: AttitudeLoop, squares: Fraction, K: Rows) -> Generator[tuple[str, Obligation], None, str]:
-    """Show where motions end in a boundary layer."""
+def ending_in_the_layer(
+    loop: AttitudeLoop, most: Fraction, J: Rows, K: Rows
+) -> Generator[tuple[str, Obligation], None, str]:
+    """Show where motions end in a boundary layer, in which s.Js is at most so much."""
     numbers = loop.claim.numbers
-    low, high, k, steep = (numbers[name] for name in ("inertia.low", "inertia.high", "surface.low", "surface.high"))
-    size, angle, rate = numbers["surface"], numbers["end.angle"], numbers["end.rate"]
+    k, steep, size, angle = (numbers[name] for name in ("surface.low", "surface.high", "surface", "end.angle"))
     demand(angle < 3, "an angle is too large")
-    yield from bounded(loop, K)
-    J: Rows = [[poly(x).number for x in row] for row in loop.J]
-    yield "largest moment", Definite(plus(scalar(high), J, -1))
+    yield "largest moment", Definite(plus(scalar(numbers["inertia.high"]), J, -1))
     yield "largest slope", Definite(plus(scalar(steep * steep), times(transpose(K), K), -1))
-    yield "surface", Exceeds(size * size * low, high * squares)
+    yield "surface", Exceeds(size * size * numbers["inertia.low"], most)
     # sin^2 = 1 - cos^2 from below, as cos x <= 1 - x^2/2 + x^4/24.
     half = angle * angle / 4
     cosine = 1 - half / 2 + half * half / 24
     yield "cosine", Exceeds(cosine)
     yield "angle", Exceeds((1 - cosine * cosine) * k * k, size * size)
     yield "less than a half turn", Exceeds(k, size)
-    yield "rate", Exceeds(rate, size + steep * size / k)
-    return f"ends turned by no more than {above(angle)} rad at no more than {above(rate)} rad/s"
+    yield "rate", Exceeds(numbers["end.rate"], size + steep * size / k)
+    return f"ends turned by no more than {above(angle)} rad at no more than {above(numbers['end.rate'])} rad/s"
