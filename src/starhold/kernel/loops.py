@@ -88,14 +88,7 @@ class AttitudeLoop(Loop):
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
         self.e = variables("e") if self.outside else NONE
         self.r, self.a = (variables(letter) if self.moving else NONE for letter in "ra")
-        places = [[(min(i, k), max(i, k)) for k in AXES] for i in AXES]
-        if any_inertia:
-            J, J_inverse = ([[var(f"{x}{i}{k}") for i, k in row] for row in places] for x in "ji")
-        else:
-            J = [[claim.subject[f"body.inertia.{i}.{k}"] for i, k in row] for row in places]
-            J_inverse = inverse(J)
-        self.J: Matrix = J
-        self.J_inverse: Matrix = J_inverse
+        self.J, self.J_inverse = self._inertia()
         self.rate = [w + r for w, r in zip(self.w, self.r, strict=True)]
         spin = apply(self.J, self.rate)
         self.H = variables("h") if self.wheels else spin
@@ -114,6 +107,14 @@ class AttitudeLoop(Loop):
         turned = [self.q[0] * w + c for w, c in zip(self.w, cross(own, self.w), strict=True)]
         self.turning = [-half * dot(self.w, own), *(half * part for part in turned)]
         self.rates = {f"q{k}": rate for k, rate in enumerate(self.turning)}
+
+    def _inertia(self) -> tuple[Matrix, Matrix]:
+        places = [[f"{min(i, k)}.{max(i, k)}" for k in AXES] for i in AXES]
+        if self.any_inertia:
+            pair = ([[var(x + place.replace(".", "")) for place in row] for row in places] for x in "ji")
+            return next(pair), next(pair)
+        J = [[self.claim.subject[f"body.inertia.{place}"] for place in row] for row in places]
+        return J, inverse(J)
 
     def read(self, role: str, count: int, *tables: Wired) -> list[Piecewise]:
         """Return the outputs of a program."""

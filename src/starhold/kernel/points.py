@@ -55,10 +55,21 @@ class PointLoop(Loop):
         """Return v'."""
         return [a + u for a, u in zip(self.field, side.u, strict=True)]
 
+    def asked(self, side: Side) -> set[str]:
+        """Return the variables of the acceleration."""
+        return {name for p in self.acceleration(side) for name in p.names}
+
     @property
-    def linear(self) -> bool:
-        """Return whether the field is linear in the state."""
-        return all(len(m) <= 1 and {*m} <= {*STATE} for p in self.field for m in p.terms)
+    def assumed(self) -> list[str]:
+        """Return what every claim about such a loop assumes."""
+        linear = all(len(m) <= 1 and {*m} <= {*STATE} for p in self.field for m in p.terms)
+        field = "linear-field" if linear else "whole-field"
+        return [field, "circling-bodies", "exact-place", "continuous-control"]
+
+    @property
+    def bodies(self) -> list[str]:
+        """Return what is assumed where the equations have no value everywhere."""
+        return ["off-the-bodies"] if self.ring.roots or self.ring.divisors else []
 
     def relay(self, wrong: list[Poly]) -> tuple[str, str]:
         """Return the names of |wrong| and of its inverse; of none that is asked for where none is."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator, Sequence
 from fractions import Fraction
+from typing import TypeAlias
 
 from ..loops import AttitudeLoop
 from ..numbers import definite, demand, inverse, times, transpose
 from ..polynomials import Poly, apply, dot, poly, variables
 from ..rules import Obligation, Squares
 from ..sentences import Statement, above, below, enumerated
+
+Load: TypeAlias = tuple[str, Fraction, Poly]
+UNIT = variables("d")
 
 
 def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, Statement]:
@@ -36,13 +40,10 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         bounds.append(text.format(below(numbers[name])))
     assumed += ["bounded-target"] * loop.moving + ["bounded-momentum"] * loop.wheels + unlimited
     known.append(numbers["level"] - loop.lyapunov)
-    said, loads, d = list[str](), list[tuple[str, Fraction, Poly]](), variables("d")
+    said, limited = list[str](), list(loads("torque", loop.u, limit, norm))
     if limit is not None:
-        loads += [(f"torque {sign * k:+d}", limit, sign * u) for k, u in enumerate(loop.u, 1) for sign in (1, -1)]
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if norm is not None:
-        # |u| <= limit where d.u <= limit for every unit vector d.
-        loads.append(("norm of the torque", norm, dot(d, loop.u)))
         said.append(f"the law asks for a torque of no more than {above(norm)} N m")
     if motors:
         shares, held = allocated(loop)
@@ -52,17 +53,26 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         stores = [own - p for own, p in zip(held, apply(shares, loop.stored), strict=True)]
         for k in range(len(shares)):
             for name, bound, load in (("motor", most["motors"][k], gives[k]), ("wheel", most["stored"][k], stores[k])):
-                loads += [(f"{name} {sign * (k + 1):+d}", bound, sign * load) for sign in (1, -1) if load.terms]
+                both = [(f"{name} {sign * (k + 1):+d}", bound, sign * load) for sign in (1, -1)]
+                limited += both if load.terms else []
         torques, momenta = (", ".join(map(above, own)) for own in most.values())
         said.append(f"motors give no more than {torques} N m and wheels store no more than {momenta} N m s")
-    for name, bound, load in loads:
+    for name, bound, load in limited:
         # Of what is bounded from outside only what the load depends on.
         z = [poly(1), *q, *w, *(x for x in bounded if x.names <= load.names)]
-        units = "d1" in load.names
-        z += [*d, *(x * rate for x in d for rate in w)] * units
-        yield name, Squares(bound - load, z, 0, known, [loop.sphere, *[dot(d, d) - 1] * units])
+        units = UNIT[0].names <= load.names
+        z += [*UNIT, *(x * rate for x in UNIT for rate in w)] * units
+        yield name, Squares(bound - load, z, 0, known, [loop.sphere, *[dot(UNIT, UNIT) - 1] * units])
     told = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(told + enumerated(said), tuple(assumed), "wheels" if motors else "torque-limit")
+
+
+def loads(name: str, u: Sequence[Poly], axis: Fraction | None, norm: Fraction | None) -> Iterator[Load]:
+    """Yield what is at most `axis` where each component of u is, and `norm` where |u| is: d.u with every unit vector d."""
+    if axis is not None:
+        yield from ((f"{name} {sign * k:+d}", axis, sign * p) for k, p in enumerate(u, 1) for sign in (1, -1))
+    if norm is not None:
+        yield f"norm of the {name}", norm, dot(UNIT, u)
 
 
 def allocated(loop: AttitudeLoop) -> tuple[list[list[Fraction]], list[Fraction]]:

@@ -1,20 +1,21 @@
-"""Theorems of keeping a station near a libration point. Proofs: docs/kernel.md, section 7.
+"""Theorems of keeping a station near a libration point. Proofs: docs/kernel.md, section 8.
 
 All are about the loop of `points`. Assumed of every one: two bodies on circles, a known state, control without lag."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
 from ..loops import wired
-from ..numbers import RefusedError, Rows, demand
+from ..numbers import RefusedError, demand
 from ..points import STATE, PointLoop, Side
-from ..polynomials import Poly, dot, multiple, poly, var, variables
+from ..polynomials import Poly, dot, horner, multiple, poly, var, variables
 from ..reading import Claim
 from ..rules import Contracts, Exceeds, Obligation, Shown, Solves, Squares, Vanishes
 from ..sentences import Statement, above, below, enumerated
+from .limits import UNIT, loads
 
 Proof = Generator[tuple[str, Obligation], None, Statement]
 
@@ -32,6 +33,11 @@ class Circle:
     inverse: str
 
     @property
+    def V(self) -> Poly:
+        """Return V."""
+        return dot(self.weights, [p * p for p in self.errors])
+
+    @property
     def running(self) -> dict[str, Poly]:
         """Return the velocities with f2 = f3 = 0."""
         return {"v2": -self.rate * var("x3"), "v3": self.rate * var("x2")}
@@ -41,34 +47,30 @@ class Circle:
         wrong = self.errors[1:]
         return p.at({self.size: var(self.inverse) * dot(wrong, wrong)})
 
+    def bounds(self, side: Side) -> list[tuple[Fraction, Fraction]]:
+        """Return what a side says of the size n: n >= c for each f > 0 and c, n <= c for each f < 0 and c."""
+        return [multiple(var(self.size), p) for p in side.known]
+
 
 def ends_on_circle(claim: Claim) -> Proof:
-    """Every motion from {V <= level} ends on the circle, with x = 0.
-
-    V is a positive sum of squares of the errors, so that {V <= level} is compact in y, z, y', z'; x moves on its own and
-    returns. On the one side of the law that holds (f2, f3) = 0 V' <= -c (f2^2 + f3^2); on each other one V' <= -c and the
-    law is bounded, for there |(f2, f3)| is above a positive number. Both hold of limits and convex combinations too, and so
-    of every Filippov solution. By the invariance principle (LaSalle 1960; of discontinuous laws Shevitz and Paden 1994)
-    motions end where f2 = f3 = 0 for all time. That leaves f1 y = f1 z = 0: the circle, or y = z = 0, where V is above the
-    level. The set holds circles between two radii, as V is convex in the square of the radius, and errors of the velocity.
-    In the full problem the motion is clear of the bodies, which lie at y = z = 0."""
-    loop = PointLoop(claim)
+    """Every motion from {V <= level} ends on the circle, with x = 0. The set holds circles between two radii, and errors of
+    the velocity; on it the control is limited."""
+    loop, numbers = PointLoop(claim), claim.numbers
     circle = yield from declared(loop)
-    numbers = claim.numbers
-    level, c, heavy = numbers["level"], circle.square, circle.weights[0]
-    inner, outer, velocity = numbers["inner"], numbers["outer"], numbers["velocity"]
+    c, heavy = circle.square, circle.weights[0]
+    level, inner, outer, velocity = (numbers[name] for name in ("level", "inner", "outer", "velocity"))
     yield "the level is positive", Exceeds(level)
     yield "centre outside", Exceeds(heavy * c * c, level)
     yield from falls(loop, circle)
     yield from clear_of_bodies(loop, circle, level)
-    demand(0 <= inner <= outer and velocity >= 0, "the radii are in another order, or an error is negative")
+    demand(inner <= outer, "the radii are in another order")
     yield "inner circles", Exceeds(level, heavy * (inner * inner - c) ** 2)
     yield "outer circles", Exceeds(level, heavy * (outer * outer - c) ** 2)
     yield "errors of the velocity", Exceeds(level, max(circle.weights[1:]) * velocity * velocity)
     limited = yield from within_limit(loop, circle, level)
     text = f"from {{V <= {below(level)}}}, which holds circles of radius {above(inner)} to {below(outer)} at the same rate "
     text += f"and, on the circle, velocities off by {below(velocity)}, the motion ends on the circle{limited}"
-    return Statement(text, (*assumed(loop), "in-the-plane" if limited else "unlimited-control"))
+    return Statement(text, (*loop.assumed, "in-the-plane" if limited else "unlimited-control"))
 
 
 def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]:
@@ -79,43 +81,35 @@ def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]
     for k, p in enumerate((y * y + z * z - square, v + rate * z, w - rate * y)):
         yield f"the errors are those of a circle {k + 1}", Vanishes(errors[k] - p)
     weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
-    yield "V is a sum of squares", Vanishes(V - dot(weights, [p * p for p in errors]))
+    loop.sides  # noqa: B018 (asks for roots)
+    circle = Circle(errors, square, rate, weights, *loop.relay(errors[1:]))
+    yield "V is a sum of squares", Vanishes(V - circle.V)
     yield "V is positive", Exceeds(min(weights))
     yield "the circle is run through", Exceeds(min(square, rate * rate))
-    loop.sides  # noqa: B018 (asks for roots)
-    return Circle(errors, square, rate, weights, *loop.relay(errors[1:]))
+    return circle
 
 
 def falls(loop: PointLoop, circle: Circle) -> Shown:
-    """V decreases on every side of the law, as `ends_on_circle` says, and x returns."""
-    V, wrong = dot(circle.weights, [p * p for p in circle.errors]), circle.errors[1:]
-    near = [side for side in loop.sides if circle.inverse not in asked(loop, side)]
+    """V' <= -c (f2^2 + f3^2) on the one side of the law that holds the circle, V' <= -c on each other one, where the law is
+    bounded; on the circle alone f2 = f3 = 0 for all time, and x returns."""
+    wrong = circle.errors[1:]
+    near = [side for side in loop.sides if circle.inverse not in loop.asked(side)]
     demand(len(near) == 1, "not one side of the law holds the circle")
     along_x = loop.acceleration(near[0])[0]
     a, b = along_x.slope("x1").number, along_x.slope("v1").number
     for k, side in enumerate(loop.sides):
-        motion, away = loop.acceleration(side), side is not near[0]
-        demand(asked(loop, side) <= {*STATE, circle.inverse}, "the motion depends on more than the state")
+        motion, z, known = loop.acceleration(side), wrong, list[Poly]()
+        demand(loop.asked(side) <= {*STATE, circle.inverse}, "the motion depends on more than the state")
         yield f"x is on its own {k}", Vanishes(motion[0] - a * loop.x[0] - b * loop.v[0])
-        if away:
-            demand(far(circle, side) > 0, "the law may have no bound on a side")
-        slope = -circle.met(loop.slopes_along(V, motion)) if away else -loop.slopes_along(V, motion)
-        z, known = ([poly(1)], [circle.met(p) for p in side.known]) if away else (wrong, [])
+        slope = -loop.slopes_along(circle.V, motion)
+        if side is not near[0]:
+            apart = any(f > 0 and c > 0 for f, c in circle.bounds(side))
+            demand(apart, "the law may have no bound on a side")
+            slope, z, known = circle.met(slope), [poly(1)], [circle.met(p) for p in side.known]
         yield f"V decreases {k}", Squares(slope, z, len(z), known)
     stays = [loop.slopes_along(p, loop.acceleration(near[0])).at(circle.running) for p in wrong]
     yield "only the circle", Solves(stays, [circle.errors[0] * p for p in loop.x[1:]])
     yield "x returns", Contracts([[Fraction(0), Fraction(1)], [a, b]], flow=True)
-
-
-def asked(loop: PointLoop, side: Side) -> set[str]:
-    """Return the variables of the acceleration."""
-    return {name for p in loop.acceleration(side) for name in p.names}
-
-
-def far(circle: Circle, side: Side) -> Fraction:
-    """Return a number that |(f2, f3)| is above on a side; negative where none is told."""
-    found = (multiple(var(circle.size), p) for p in side.known)
-    return max((offset for factor, offset in found if factor > 0), default=Fraction(-1))
 
 
 def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
@@ -134,46 +128,34 @@ def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
 
 def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[tuple[str, Obligation], None, str]:
     """On {V <= level} with x = x' = 0, which is not left, the norm of the control is at most `limit.norm`, each axis of it
-    `limit.axis`. With errors f for variables V is a sum of their squares; where |(f2, f3)| = 1/s, s (f2, f3) is a unit."""
-    numbers = loop.claim.numbers
-    norm, axis = numbers.get("limit.norm"), numbers.get("limit.axis")
-    f, d, (_, y, z) = variables("f"), variables("d"), loop.x
+    `limit.axis`. The errors f are variables; where |(f2, f3)| = 1/s, s (f2, f3) is a unit vector."""
+    norm, axis = loop.claim.numbers.get("limit.norm"), loop.claim.numbers.get("limit.axis")
+    f, (_, y, z) = variables("f"), loop.x
     put = {"x1": 0, "v1": 0, "v2": f[1] - circle.rate * z, "v3": f[2] + circle.rate * y}
-    wrong, inverse = dot(f[1:], f[1:]), var(circle.inverse)
+    inside = level - dot(circle.weights, [p * p for p in f])
+
+    def flat(p: Poly) -> Poly:
+        # z^2 = f1 + the circle's square - y^2.
+        parts, square = p.at(put).powers("x3"), f[0] + circle.square - y * y
+        return horner(parts[::2], square) + z * horner(parts[1::2], square)
+
     for k, side in enumerate(loop.sides if norm is not None or axis is not None else ()):
-        away = circle.inverse in asked(loop, side)
-        u = [on_circles((circle.met(p) if away else p).at(put), f[0] + circle.square - y * y) for p in side.u]
-        unit = [inverse * p for p in f[1:]] if away else []
-        known = [circle.met(p).at(put) for p in side.known] if away else [w * w - wrong for w in widths(circle, side)]
-        known.append(level - dot(circle.weights, [p * p for p in f]))
-        relations = [f[0] - y * y - z * z + circle.square, *([dot(unit, unit) - 1] if away else [])]
-        terms = [poly(1), y, z, *f, *unit]
-        if norm is not None:
-            wide = [*terms, *d, *(p * q for p in d for q in (y, z, f[0]))]
-            yield f"norm of the control {k}", Squares(norm - dot(d, u), wide, 0, known, [*relations, dot(d, d) - 1])
-        if axis is not None:
-            for i, p in enumerate(u):
-                for sign in (1, -1):
-                    yield f"control {sign * (i + 1):+d} {k}", Squares(axis - sign * p, terms, 0, known, relations)
+        relations, unit = [f[0] - y * y - z * z + circle.square], list[Poly]()
+        if circle.inverse in loop.asked(side):
+            unit = [var(circle.inverse) * p for p in f[1:]]
+            u, known = [flat(circle.met(p)) for p in side.u], [circle.met(p).at(put) for p in side.known]
+            relations.append(dot(unit, unit) - 1)
+        else:
+            u, wrong = [flat(p) for p in side.u], dot(f[1:], f[1:])
+            known = [most * most - wrong for factor, most in circle.bounds(side) if factor < 0 <= most]
+        for name, bound, load in loads("control", u, axis, norm):
+            z_of, equal = [poly(1), y, z, *f, *unit], relations
+            if UNIT[0].names <= load.names:
+                z_of = [*z_of, *UNIT, *(p * q for p in UNIT for q in (y, z, f[0]))]
+                equal = [*relations, dot(UNIT, UNIT) - 1]
+            yield f"{name} {k}", Squares(bound - load, z_of, 0, [*known, inside], equal)
     said = [f"{above(most)} {how}" for most, how in ((norm, "in norm"), (axis, "on every axis")) if most is not None]
     return f" with no more control than {enumerated(said)}" if said else ""
-
-
-def on_circles(p: Poly, square: Poly) -> Poly:
-    """Return p with z^2 = f1 + the circle's square - y^2 put in wherever z is squared."""
-    found = Poly({})
-    for m, c in p.terms.items():
-        term = Poly({tuple(sorted([*(n for n in m if n != "x3"), *["x3"] * (m.count("x3") % 2)])): c})
-        for _ in range(m.count("x3") // 2):
-            term = term * square
-        found = found + term
-    return found
-
-
-def widths(circle: Circle, side: Side) -> list[Fraction]:
-    """Return the numbers that |(f2, f3)| is at most on a side."""
-    found = (multiple(p, var(circle.size)) for p in side.known if circle.size in p.names)
-    return [offset / -factor for factor, offset in found if factor < 0 <= offset]
 
 
 def comes_to_rest(claim: Claim) -> Proof:
@@ -183,31 +165,26 @@ def comes_to_rest(claim: Claim) -> Proof:
     motion, at = only_side(loop), resting(loop)
     for k, p in enumerate(motion):
         yield f"rest is one {k + 1}", Vanishes(p.at(at))
-    flow: Rows = [[Fraction(k == i + 3) for k in range(6)] for i in range(3)]
+    flow = [[Fraction(k == i + 3) for k in range(6)] for i in range(3)]
     yield "returns", Contracts([*flow, *([p.slope(name).number for name in STATE] for p in motion)], flow=True)
-    return Statement("from everywhere the motion comes to rest", (*assumed(loop), "unlimited-control", *bodies(loop)))
+    return Statement("from everywhere the motion comes to rest", (*loop.assumed, "unlimited-control", *loop.bodies))
 
 
 def only_side(loop: PointLoop) -> list[Poly]:
     """Return the acceleration under a law that does not switch, in which roots and quotients cancel."""
     demand(len(loop.sides) == 1, "the law switches")
-    demand(asked(loop, loop.sides[0]) <= {*STATE}, "the motion depends on more than the state")
+    demand(loop.asked(loop.sides[0]) <= {*STATE}, "the motion depends on more than the state")
     return loop.acceleration(loop.sides[0])
 
 
 def resting(loop: PointLoop) -> Mapping[str, Fraction]:
     """Return the state of rest that the law is for."""
-    return dict(zip(STATE, [*(p.number for p in loop.single("rest", 3)), *[Fraction(0)] * 3], strict=True))
+    return dict.fromkeys(STATE, Fraction(0)) | {f"x{k}": p.number for k, p in enumerate(loop.single("rest", 3), 1)}
 
 
 def returns_with_limited_control(claim: Claim) -> Proof:
-    """With y and z held at rest and each axis of the control within the limit U, motions with |S| <= width and |x| <= reach,
-    S = x + x'/s, s = sqrt(p), stay there and come to x = 0; from |S| >= boundary none does.
-
-    x'' = p x - clip(kx + cx'), so s S' = p S - clip(c s S + e x) with e = k - s c, and x' = s (S - x). Let
-    0 < M = max(|S|/width, |x|/reach) <= 1. Where M is the first, c s S + e x has the sign of S and at least M times the size
-    c s width - |e| reach, more than M p width, and so has what the limit leaves of it, as that is above p width: |S| falls.
-    Where M is the second, |x| falls as reach > width. So M does, in proportion. Beyond, s S' >= p S - U > 0."""
+    """With y and z held at rest and each axis of the control within the limit, motions with |S| <= width and |x| <= reach,
+    S = x + x'/s, s^2 the slope of the field, stay there and come to x = 0; from |S| >= boundary none does."""
     loop, numbers = PointLoop(claim), claim.numbers
     limit, width, reach, boundary = (numbers[name] for name in ("limit", "width", "reach", "boundary"))
     low, high, x, v = numbers["root.low"], numbers["root.high"], loop.x[0], loop.v[0]
@@ -229,7 +206,7 @@ def returns_with_limited_control(claim: Claim) -> Proof:
     yield "nothing returns from beyond", Exceeds(boundary * p, limit)
     text = f"with the control along X within {below(limit)} x returns from |x + x'/s| up to {below(width)} and |x| up to "
     text += f"{below(reach)}; from |x + x'/s| = {above(boundary)} on nothing returns"
-    return Statement(text, (*assumed(loop), "held-aside"))
+    return Statement(text, (*loop.assumed, "held-aside"))
 
 
 def clipped(loop: PointLoop, limit: Fraction) -> Shown:
@@ -238,12 +215,9 @@ def clipped(loop: PointLoop, limit: Fraction) -> Shown:
     t = variables("t")
     for k, case in enumerate(loop.read("limited", 3, wired("command", t), {"limit": poly(limit)})[0]):
         known, acts, asks = Side(case.guards, []).known, case.value, t[0]
-        for name, p in (
-            ("at least", acts + limit),
-            ("at most", limit - acts),
-            ("near from below", (acts - asks) * (limit - acts)),
-            ("near from above", (asks - acts) * (limit + acts)),
-        ):
+        shown = {"at least": acts + limit, "at most": limit - acts}
+        shown |= {"near from below": (acts - asks) * (limit - acts), "near from above": (asks - acts) * (limit + acts)}
+        for name, p in shown.items():
             yield f"limited {name} {k}", Squares(p, [poly(1)], 0, known)
 
 
@@ -252,37 +226,34 @@ def needs_more_control(claim: Claim) -> Proof:
     loop, numbers = PointLoop(claim), claim.numbers
     circle = yield from declared(loop)
     y, z, control = numbers.coordinate("y"), numbers.coordinate("z"), numbers["control"]
-    norm, axis = numbers.get("limit.norm"), numbers.get("limit.axis")
-    demand((norm is None) != (axis is None), "there is not one limit")
+    limits = [numbers.get("limit.norm"), numbers.get("limit.axis")]
+    demand(limits.count(None) == 1, "there is not one limit")
     at = {"x1": 0, "x2": y, "x3": z, "v1": 0, "v2": -circle.rate * z, "v3": circle.rate * y, circle.size: 0}
     for k, p in enumerate(circle.errors):
         yield f"on the circle {k + 1}", Vanishes(p.at(at))
     here = [s for s in loop.sides if all((Poly(dict(p)).at(at).number > 0) == holds for p, holds in s.guards)]
     demand(len(here) == 1, "the law has no side there")
     squares = [p.at(at).number ** 2 for p in here[0].u]
-    yield "control", Exceeds(max(squares) if norm is None else sum(squares, Fraction(0)), control * control)
-    yield "more than the limit", Exceeds(control, norm if norm is not None else axis or 0)
-    return Statement(
-        f"the circle itself asks for a control of {below(control)}, more than the limit", (*assumed(loop), "in-the-plane")
-    )
+    yield "control", Exceeds(max(squares) if limits[0] is None else sum(squares, Fraction(0)), control * control)
+    yield "more than the limit", Exceeds(control, next(x for x in limits if x is not None))
+    text = f"the circle itself asks for a control of {below(control)}, more than the limit"
+    return Statement(text, (*loop.assumed, "in-the-plane"))
 
 
 def does_not_return(claim: Claim) -> Proof:
-    """An axis moves on its own, as x'' = ax + bx' + c with a >= 0 or b >= 0: an eigenvalue is not on the left, and some
-    motions along it, as near as one likes to one that is wanted, stay away."""
+    """An axis moves on its own, as x'' = ax + bx' + c with a >= 0 or b >= 0: some motions along it, as near as one likes to
+    one that is wanted, stay away."""
     loop = PointLoop(claim)
     motions = [loop.acceleration(side) for side in loop.sides]
     for i, (x, v) in enumerate(zip(loop.x, loop.v, strict=True)):
         slopes = [motion[i].slope(name) for motion in motions for name in (f"x{i + 1}", f"v{i + 1}")]
         if any(p.names for p in slopes) or max(slopes[0].number, slopes[1].number) < 0:
             continue
-        a, b = slopes[0].number, slopes[1].number
-        c = motions[0][i].terms.get((), Fraction(0))
+        own = slopes[0] * x + slopes[1] * v + motions[0][i].terms.get((), 0)
         for k, motion in enumerate(motions):
-            yield f"an axis on its own {k}", Vanishes(motion[i] - a * x - b * v - c)
-        return Statement(
-            f"along {'XYZ'[i]} some motions do not return", (*assumed(loop), "unlimited-control", *bodies(loop))
-        )
+            yield f"an axis on its own {k}", Vanishes(motion[i] - own)
+        text = f"along {'XYZ'[i]} some motions do not return"
+        return Statement(text, (*loop.assumed, "unlimited-control", *loop.bodies))
     raise RefusedError("every axis returns")
 
 
@@ -293,10 +264,9 @@ def holds_another_circle(claim: Claim) -> Proof:
     circle = yield from declared(loop)
     radius, needs, of = numbers["radius"], numbers["needs"], numbers["of"]
     demand(len(loop.ring.roots) == 1 and not loop.ring.divisors, "there are more roots than that of a relay")
-    away = [side for side in loop.sides if circle.inverse in asked(loop, side)]
+    away = [side for side in loop.sides if circle.inverse in loop.asked(side)]
     demand(len(away) == 1, "the law is no relay")
-    reaching = [multiple(p, var(circle.size)) for p in away[0].known]
-    demand(all(factor > 0 and offset >= 0 for factor, offset in reaching), "the relay has a layer")
+    demand(all(factor > 0 and least <= 0 for factor, least in circle.bounds(away[0])), "the relay has a layer")
     motion, s, f1 = loop.acceleration(away[0]), var(circle.inverse), circle.errors[0]
     yield "the plane is not left", Vanishes(motion[0].at({"x1": 0, "v1": 0}))
     for k, (p, x) in enumerate(zip(circle.errors[1:], loop.x[1:], strict=True)):
@@ -307,14 +277,4 @@ def holds_another_circle(claim: Claim) -> Proof:
         yield f"the drift {k}", Vanishes(drift - pull * f1 * x)
         demand(size >= of >= needs >= abs(pull * (radius * radius - circle.square)) * radius, "the relay does not hold it")
     yield "another circle", Exceeds(min((radius * radius - circle.square) ** 2, radius))
-    return Statement(f"the relay holds the circle of radius {below(radius)} too", (*assumed(loop), "unlimited-control"))
-
-
-def assumed(loop: PointLoop) -> Sequence[str]:
-    """Return what every claim about such a loop assumes."""
-    return "linear-field" if loop.linear else "whole-field", "circling-bodies", "exact-place", "continuous-control"
-
-
-def bodies(loop: PointLoop) -> Sequence[str]:
-    """Return what is assumed where the equations have no value everywhere."""
-    return ["off-the-bodies"] if loop.ring.roots or loop.ring.divisors else []
+    return Statement(f"the relay holds the circle of radius {below(radius)} too", (*loop.assumed, "unlimited-control"))
