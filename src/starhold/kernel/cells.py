@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -10,8 +10,8 @@ from itertools import combinations
 from math import factorial
 from typing import Any
 
-from .numbers import RefusedError, demand, read_list
-from .polynomials import Poly, dot, poly, var
+from .numbers import demand, read_list
+from .polynomials import Poly, poly, total, var
 from .programs import Condition, Exactly, Guards, joined, known
 from .reading import Claim
 from .rules import Obligation, Shown, Sum
@@ -34,6 +34,11 @@ class Cell:
         """Tell whether both cells meet on a surface only."""
         ends = [cell.signs.get(surface, 2) for cell in (self, other)]
         return 0 in ends or ends[0] == -ends[1]
+
+    def holds(self, state: State) -> bool:
+        """Tell whether the cell holds a state, for some parameters that are left open."""
+        sides = [(Poly(dict(surface)).at(state), sign) for surface, sign in self.signs.items()]
+        return all(x.names or (x.number * sign >= 0 if sign else x.number == 0) for x, sign in sides)
 
 
 class System:
@@ -89,12 +94,11 @@ class System:
 
     def slope(self, V: Poly, rates: Sequence[Poly]) -> Poly:
         """Return V' for these rates."""
-        found = dot([V.slope(name) for name in self.names], rates)
-        for name, rate in zip(self.names, rates, strict=True):
-            if name in self.angles:
-                s, c = f"sin.{name}", f"cos.{name}"
-                found = found + (V.slope(s) * (1 - var(c)) + V.slope(c) * var(s)) * rate
-        return found
+        along = dict(zip(self.names, rates, strict=True))
+        for x in self.angles:
+            along[f"sin.{x}"] = along[x] * (1 - var(f"cos.{x}"))
+            along[f"cos.{x}"] = along[x] * var(f"sin.{x}")
+        return total(V.slope(name) * rate for name, rate in along.items())
 
     def sum(
         self, p: Poly, cells: Sequence[int], more: Sequence[Poly] = (), strict: Sequence[Poly] = (),
@@ -102,26 +106,22 @@ class System:
     ) -> Sum:  # fmt: skip
         """Return that p is not negative (strict: positive where they are) where cells meet, with more that is not negative
         and what is zero, or on a face of the box."""
-        sides = dict[Condition, int]()
-        for k in cells:
-            for surface, sign in self.all[k].signs.items():
-                sides[surface] = sign if sides.get(surface, sign) == sign else 0
+        sides = dict[Poly, int]()
+        surfaces = {surface: Poly(dict(surface)) for k in cells for surface in self.all[k].signs}
+        for surface, q in surfaces.items():
+            ends = {self.all[k].signs[surface] for k in cells if surface in self.all[k].signs}
+            sides[q] = ends.pop() if len(ends) == 1 else 0
         turned = [(var(f"sin.{x}"), 1 - var(f"cos.{x}")) for x in self.angles]
-        circles = [s * s + c * c - 1 for s, c in turned]
-        parts = (
-            [*more, *(Poly(dict(surface)) * sign for surface, sign in sides.items() if sign), *self.facts],
-            [*zero, *(Poly(dict(surface)) for surface, sign in sides.items() if not sign), *circles],
-            strict,
-        )
-        put = face or {}
-        found = [[q.at(put) for q in part] if put else list(part) for part in parts]
-        return Sum(p.at(put) if put else p, *found)
+        known = [*more, *(q * sign for q, sign in sides.items() if sign), *self.facts]
+        zero = [*zero, *(q for q, sign in sides.items() if not sign), *(s * s + c * c - 1 for s, c in turned)]
+        if face:
+            p, known, zero, strict = p.at(face), *([q.at(face) for q in part] for part in (known, zero, strict))
+        return Sum(p, known, zero, strict)
 
     @cached_property
     def apart(self) -> list[tuple[int, ...]]:
         """Return the cells that are told to be empty, and the pairs that are told not to meet."""
-        told = self.claim.evidence.get("apart")
-        found = [tuple(read_list(own)) for own in read_list(told or [])]
+        found = [tuple(read_list(own)) for own in read_list(self.claim.evidence.get("apart") or [])]
         demand(all(len(own) in (1, 2) and self.are_cells(own) for own in found), "there are no such cells")
         return found
 
@@ -153,15 +153,12 @@ class System:
         turned = [f"{f}.{x}" for x in self.angles for f in ("sin", "cos")]
         return dict.fromkeys((*self.names, *turned), Fraction(0))
 
-    def around_point(self) -> Iterator[tuple[Cell, bool]]:
-        """Yield the cells that may hold the equilibrium, and whether they do for all parameters."""
-        for name in self.names:
-            low, high = self.box.get(name, (Fraction(-1), Fraction(1)))
-            demand(low < 0 < high, "the equilibrium is not inside of the box")
-        for cell in self.all:
-            sides = [(Poly(dict(surface)).at(self.origin), sign) for surface, sign in cell.signs.items()]
-            if all(side.names or (side.number * sign >= 0 if sign else side.number == 0) for side, sign in sides):
-                yield cell, not any(side.names for side, _ in sides)
+    @property
+    def around_point(self) -> list[Cell]:
+        """Return the cells that may hold the equilibrium."""
+        sides = (self.box.get(name, (-1, 1)) for name in self.names)
+        demand(all(low < 0 < high for low, high in sides), "the equilibrium is not inside of the box")
+        return [cell for cell in self.all if cell.holds(self.origin)]
 
     def state(self, place: str) -> tuple[Cell, State]:
         """Return the state of the numbers place.x, and a cell that holds it; refuse one outside of the box."""
@@ -169,11 +166,8 @@ class System:
         told = {x: self.claim.numbers.coordinate(f"{place}.{x}") for x in (*self.names, *self.parameters)}
         state = {x: at - self.shift.get(x, 0) for x, at in told.items()}
         demand(all(low <= state[x] <= high for x, (low, high) in self.box.items()), "a state is outside of the box")
-        for cell in self.all:
-            sides = [(Poly(dict(surface)).at(state).number, sign) for surface, sign in cell.signs.items()]
-            if all(x * sign >= 0 if sign else x == 0 for x, sign in sides):
-                return cell, state
-        raise RefusedError("no cell holds a state")
+        # Cells cover every state.
+        return next(cell for cell in self.all if cell.holds(state)), state
 
 
 def signs(guards: Guards) -> dict[Condition, int]:

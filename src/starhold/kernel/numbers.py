@@ -13,7 +13,8 @@ WORK = 4_000_000
 """Units of work that one check may do: a few microseconds each."""
 LONGEST = 20_000
 """Bits of the longest number."""
-_TEXT = re.compile(r"-?[0-9]{1,3000}(/[0-9]{1,3000})?|-?0x[01](\.[0-9a-f]{1,13})?p[+-][0-9]{1,4}", re.ASCII)
+_FLOAT = re.compile(r"(-?)0x([01])(?:\.([0-9a-f]{1,13}))?p([+-][0-9]{1,4})", re.ASCII)
+_QUOTIENT = re.compile(r"(-?[0-9]{1,3000})(?:/([0-9]{1,3000}))?", re.ASCII)
 
 
 class RefusedError(Exception):
@@ -44,29 +45,23 @@ class Account:
         demand(cls.left >= 0, "the check takes too much work")
 
 
-def size(x: Fraction) -> int:
-    """Return the bits of a number."""
-    return x.numerator.bit_length() + x.denominator.bit_length()
-
-
 def longest(numbers: Iterable[Fraction]) -> int:
     """Return the bits of the longest of some numbers."""
-    return max(map(size, numbers), default=0)
+    return max((x.numerator.bit_length() + x.denominator.bit_length() for x in numbers), default=0)
 
 
 def rational(given: Any) -> Fraction:
     """Read an exact number: -2, 3/4, or the hexadecimal form of a float, which is its exact value."""
     text = given if isinstance(given, str) else ""
-    demand(_TEXT.fullmatch(text) is not None, "a number is not written as one")
-    if "x" in text:
-        sign, (mantissa, exponent) = text[0] == "-", text.lstrip("-0").lstrip("x").split("p")
-        digits, _, after = mantissa.partition(".")
+    if found := _FLOAT.fullmatch(text):
+        sign, whole, after, exponent = found.groups(default="")
         demand(abs(int(exponent)) <= 1100, "a float is out of range")
-        size_of = Fraction(int(digits + after, 16), 16 ** len(after)) * Fraction(2) ** int(exponent)
-        return -size_of if sign else size_of
-    upper, _, lower = text.partition("/")
-    demand(lower == "" or int(lower) != 0, "a denominator is zero")
-    return Fraction(int(upper), int(lower or "1"))
+        return Fraction(int(sign + whole + after, 16), 16 ** len(after)) * Fraction(2) ** int(exponent)
+    found = _QUOTIENT.fullmatch(text)
+    upper, lower = found.groups(default="1") if found else ("", "")
+    demand(found is not None, "a number is not written as one")
+    demand(int(lower) != 0, "a denominator is zero")
+    return Fraction(int(upper), int(lower))
 
 
 def read_list(given: Any, count: int | None = None) -> list[Any]:
@@ -115,21 +110,19 @@ def definite(a: Rows, strictly: bool = True) -> bool:
 def inverse(a: Rows) -> Rows:
     """Invert a positive definite matrix exactly, by elimination without exchanges."""
     count = len(a)
-    rest = [[*row, *(Fraction(i == k) for k in range(count))] for i, row in enumerate(a)]
+    rest = [[*row, *unit] for row, unit in zip(a, scalar(1, count), strict=True)]
     for k in range(count):
         demand(rest[k][k] != 0, "a matrix has no inverse")
         Account.spend(2 * count * count, sum(map(longest, rest)))
-        rest[k] = [x / rest[k][k] for x in rest[k]]
-        for i in range(count):
-            if i != k:
-                rest[i] = [x - rest[i][k] * y for x, y in zip(rest[i], rest[k], strict=True)]
+        own = [x / rest[k][k] for x in rest[k]]
+        rest = [plus([row], [own], -row[k])[0] if i != k else own for i, row in enumerate(rest)]
     return [row[count:] for row in rest]
 
 
 def times(a: Rows, b: Rows) -> Rows:
     """Return the product of two matrices."""
-    Account.spend(len(a) * len(b) * len(b[0]), longest(x for row in a for x in row) + longest(x for row in b for x in row))
     columns = transpose(b)
+    Account.spend(len(a) * len(b) * len(columns), max(map(longest, a)) + max(map(longest, b)))
     return [[sum((x * y for x, y in zip(row, column, strict=True)), Fraction(0)) for column in columns] for row in a]
 
 
@@ -151,7 +144,7 @@ def scalar(c: Fraction | int, count: int = 3) -> Rows:
 def cosine_below(angle: Fraction) -> Fraction:
     """Return a number not above the cosine of an angle from 0 to 3: its alternating series, ended after a negative term."""
     demand(0 <= angle <= 3, "an angle is not between 0 and 3")
-    Account.spend(80, 40 * size(angle))
+    Account.spend(80, 40 * longest([angle]))
     total, term = Fraction(0), Fraction(1)
     for k in range(1, 25):
         total, term = total + term, -term * angle * angle / (2 * k * (2 * k - 1))

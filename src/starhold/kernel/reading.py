@@ -46,7 +46,9 @@ class Numbers(Told[Fraction]):
     """The numbers of a claim: bounds, which are not negative, and coordinates of places, which are read as such."""
 
     def __getitem__(self, key: str) -> Fraction:
-        return _bound(super().__getitem__(key))
+        found = self.coordinate(key)
+        demand(found >= 0, "a bound is negative")
+        return found
 
     def get(self, key: str) -> Fraction | None:
         """Return a bound that may be absent."""
@@ -59,8 +61,8 @@ class Numbers(Told[Fraction]):
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim names its theorem, what the loop is taken with, and the loop's programs by their roles; it has the exact
-    numbers of the programs and of the body (subject), those that it claims (numbers), and the evidence by obligations."""
+    """A theorem, words that the loop is taken with, programs by roles, exact numbers of the programs and the body (subject),
+    those that are claimed (numbers), and evidence by obligations."""
 
     theorem: str
     taken: Told[bool]
@@ -79,9 +81,7 @@ def read_certificate(text: str) -> list[Claim]:
     """Read the claims of a certificate."""
     demand(len(text) <= BYTES, "the certificate is too large")
     try:
-        content = json.loads(
-            text, object_pairs_hook=_once, parse_float=_no_number, parse_constant=_no_number, parse_int=_place
-        )
+        content = json.loads(text, object_pairs_hook=_once, parse_float=_stray, parse_constant=_stray, parse_int=_place)
     except json.JSONDecodeError as fault:
         raise RefusedError(f"the certificate is no JSON: {fault.msg} in line {fault.lineno}") from None
     except RecursionError:
@@ -113,11 +113,6 @@ def _claim(given: Any, programs: Told[Program]) -> Claim:
     )
 
 
-def _bound(x: Fraction) -> Fraction:
-    demand(x >= 0, "a bound is negative")
-    return x
-
-
 def _table(given: Any, read: Callable[[Any], _T]) -> dict[str, _T]:
     return {name: read(part) for name, part in read_dict(given, NUMBERS).items()}
 
@@ -128,13 +123,10 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-class _Stray:
-    """A number outside of a text, which no reader takes."""
-
-
-def _no_number(text: str) -> Any:
-    return _Stray()
+def _stray(text: str) -> Any:
+    # A number outside of a text is no value that a reader takes.
+    return object()
 
 
 def _place(text: str) -> Any:
-    return int(text) if len(text) <= 9 else _Stray()
+    return int(text) if len(text) <= 9 else object()

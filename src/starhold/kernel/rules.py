@@ -1,5 +1,4 @@
-"""The rules. Each decides what it says from the evidence that it is given, and searches nothing: `check` refuses evidence
-that does not show it."""
+"""The rules. Each decides what it says from evidence, and searches nothing: `check` refuses what does not show it."""
 
 from __future__ import annotations
 
@@ -15,6 +14,21 @@ from .polynomials import Poly, apply, dot, read_poly
 def combination(cofactors: Any, relations: Sequence[Poly]) -> Poly:
     """Return the sum of relations, each times its cofactor of the evidence."""
     return dot([read_poly(c) for c in read_list(cofactors, len(relations))], relations)
+
+
+def weighted(weights: Any, parts: Sequence[Poly], strict: int) -> Poly:
+    """Return the sum of parts, each times its number of the evidence: none is negative, and the first are positive."""
+    found = [rational(x) for x in read_list(weights, len(parts))]
+    demand(all(x >= 0 for x in found), "a multiplier is negative")
+    demand(all(x > 0 for x in found[:strict]), "a multiplier is not positive")
+    return dot(found, parts)
+
+
+def form(rows: Any, z: Sequence[Poly], strictly: bool) -> Poly:
+    """Return z'Gz, with a G of the evidence that is positive definite, or is nowhere negative."""
+    gram = matrix(rows, len(z), len(z))
+    demand(definite(gram, strictly), "a matrix is not positive definite")
+    return dot(z, apply(gram, z))
 
 
 @dataclass(frozen=True)
@@ -35,8 +49,8 @@ class Squares:
     """p >= 0 wherever the known are not negative and the relations are zero; there even p >= c (z_1^2 + ... + z_n^2) with a
     c > 0 for the first n = `least` of z (of 0: p >= 0 alone). A multiplier of what is `strict` is positive.
 
-    Evidence: multipliers, cofactors, and the matrix G of p = multipliers.known + cofactors.relations + z'Gz, positive
-    definite, or for least = 0 only nowhere negative; it may be about the first of z alone, no fewer than `least`."""
+    Evidence: p = multipliers.known + cofactors.relations + z'Gz. G may be about the first of z alone, no fewer than n; it is
+    positive definite, or for n = 0 only nowhere negative."""
 
     p: Poly
     z: Sequence[Poly]
@@ -47,15 +61,10 @@ class Squares:
 
     def check(self, evidence: Any) -> None:
         multipliers, cofactors, rows = read_table(evidence, "multipliers", "cofactors", "gram")
-        known = [*self.strict, *self.known]
-        weights = [rational(x) for x in read_list(multipliers, len(known))]
-        demand(all(x >= 0 for x in weights), "a multiplier is negative")
-        demand(all(x > 0 for x in weights[: len(self.strict)]), "a multiplier is not positive")
+        rest = self.p - weighted(multipliers, [*self.strict, *self.known], len(self.strict))
         count = len(read_list(rows))
         demand(self.least <= count <= len(self.z), "a matrix has another size")
-        gram, z = matrix(rows, count, count), self.z[:count]
-        demand(definite(gram, self.least > 0), "a matrix is not positive definite")
-        rest = self.p - dot(weights, known) - combination(cofactors, self.modulo) - dot(z, apply(gram, z))
+        rest = rest - combination(cofactors, self.modulo) - form(rows, self.z[:count], self.least > 0)
         demand(not rest.terms, "a sum of squares is another one")
 
 
@@ -64,8 +73,7 @@ class Sum:
     """p >= the sum of the `strict`, each times a positive number, wherever the known are not negative and the relations are
     zero (the easy half of Schmuedgen's Positivstellensatz).
 
-    Evidence: those numbers; the relations' cofactors; parts, each the places of known polynomials, whose product it has
-    for a factor, and a sum of squares z'Gz: p = numbers.strict + cofactors.relations + the sum of parts."""
+    Evidence: p = numbers.strict + cofactors.relations + the sum of parts, each z'Gz times the known of these places."""
 
     p: Poly
     known: Sequence[Poly] = ()
@@ -73,21 +81,16 @@ class Sum:
     strict: Sequence[Poly] = ()
 
     def check(self, evidence: Any) -> None:
-        """Refuse evidence that does not show it."""
         numbers, cofactors, parts = read_table(evidence, "numbers", "cofactors", "parts")
-        weights = [rational(x) for x in read_list(numbers, len(self.strict))]
-        demand(all(x > 0 for x in weights), "a multiplier is not positive")
-        rest = self.p - dot(weights, self.strict) - combination(cofactors, self.modulo)
+        rest = self.p - weighted(numbers, self.strict, len(self.strict)) - combination(cofactors, self.modulo)
         for part in read_list(parts):
             places, names, rows = read_table(part, "of", "z", "gram")
             z = [read_poly({name: "1"} if isinstance(name, str) else name) for name in read_list(names)]
-            gram = matrix(rows, len(z), len(z))
-            demand(definite(gram, False), "a matrix is somewhere negative")
-            form = dot(z, apply(gram, z))
+            found = form(rows, z, False)
             for k in read_list(places):
                 demand(type(k) is int and 0 <= k < len(self.known), "a part has a factor that is not known")
-                form = form * self.known[k]
-            rest = rest - form
+                found = found * self.known[k]
+            rest = rest - found
         demand(not rest.terms, "a sum of squares is another one")
 
 

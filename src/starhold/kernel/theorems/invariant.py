@@ -8,6 +8,7 @@ values of their intervals.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations
@@ -20,8 +21,6 @@ from ..programs import Condition
 from ..reading import Claim
 from ..rules import Shown
 from ..sentences import Statement, below
-
-CELLS, VARIABLES, POWER, TAYLOR = 64, 9, 6, 8
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class Function:
         system = self.system
         demand(self.level is None or self.level > 0, "a level is not positive")
         if self.at_point:
-            demand(all(not cell.V[self.place].at(system.origin).terms for cell, _ in system.around_point()), "V is not zero")
+            demand(all(not cell.V[self.place].at(system.origin).terms for cell in system.around_point), "V is not zero")
             for i in system.cells:
                 yield f"positive {self.place} {i}", system.sum(self.on(i), (i,), strict=self.positive("shape", i))
         else:
@@ -70,12 +69,17 @@ class Function:
             cell, state = system.state("member")
             least = cell.V[self.place].at(state).number
             demand(least <= 0 or least < most, "V is too large at the member of M")
+        bordered = any(x in system.box for x in system.names)
+        demand(self.level is not None or not bordered, "V has no level, but the box has a border")
+        yield from self.border(self.level or 0)
+
+    def border(self, least: Fraction | int, strict: Sequence[Poly] = ()) -> Shown:
+        """V >= least all over the border of the box (strict: larger)."""
+        system = self.system
         for x in (name for name in system.names if name in system.box):
             for k, end in enumerate(system.box[x]):
-                demand(self.level is not None, "V has no level, but the box has a border")
                 for i in system.cells:
-                    above = system.sum(self.on(i) - (self.level or 0), (i,), face={x: end})
-                    yield f"border {self.place} {i} {x} {k}", above
+                    yield f"border {self.place} {i} {x} {k}", system.sum(self.on(i) - least, (i,), (), strict, face={x: end})
 
     def changes(self, strictly: bool = True) -> Shown:
         """V decreases all the time where 0 < V < level, or (not strictly) does not grow there.
@@ -173,7 +177,7 @@ def leaves(claim: Claim) -> Shows:
     demand(all(x in system.box for x in system.names), "a variable has no bounds")
     if V.at_point:
         demand(not system.angles and not system.parameters, "a way out of the equilibrium is not exact")
-        around = [cell for cell, _ in system.around_point()]
+        around = system.around_point
         demand(all(not cell.V[0].at(system.origin).terms for cell in around), "V is not zero at the equilibrium")
         still = (all(not rate.at(system.origin).terms for rate in cell.rates) for cell in around)
         demand(any(still), "the equilibrium is none")
@@ -188,10 +192,7 @@ def leaves(claim: Claim) -> Shows:
     else:
         cell, state = system.state("member")
         demand(cell.V[0].at(state).number <= 0, "V is positive at the member of M")
-        for x in system.names:
-            for k, end in enumerate(system.box[x]):
-                for i in system.cells:
-                    yield f"border 0 {i} {x} {k}", system.sum(V.on(i), (i,), (), [poly(1)], face={x: end})
+        yield from V.border(0, [poly(1)])
     yield from V.changes()
     return stated(f"{V.limit()} is unstable: every motion that starts in the box where V > 0 leaves the box", system)
 

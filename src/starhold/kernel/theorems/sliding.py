@@ -59,7 +59,7 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
 
 
 def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Reach:
-    """Return the reach and slope of an axis: (J s')_i - e_i, the law's torque and what is moved, is in each case of the law a
+    """Return the reach and slope of an axis: in each case of the law (J s')_i - e_i, its torque and what is moved, is a
     number against the sign of s_i, or -slope s_i."""
     reaches, linear = list[Fraction](), list[Fraction]()
     for case in loop.law[i]:

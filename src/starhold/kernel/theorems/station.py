@@ -33,7 +33,7 @@ class Circle:
     inverse: str
 
     @property
-    def V(self) -> Poly:
+    def lyapunov(self) -> Poly:
         """Return V."""
         return dot(self.weights, [p * p for p in self.errors])
 
@@ -83,7 +83,7 @@ def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]
     weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
     loop.sides  # noqa: B018 (asks for roots)
     circle = Circle(errors, square, rate, weights, *loop.relay(errors[1:]))
-    yield "V is a sum of squares", Vanishes(V - circle.V)
+    yield "V is a sum of squares", Vanishes(V - circle.lyapunov)
     yield "V is positive", Exceeds(min(weights))
     yield "the circle is run through", Exceeds(min(square, rate * rate))
     return circle
@@ -101,7 +101,7 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
         motion, z, known = loop.acceleration(side), wrong, list[Poly]()
         demand(loop.asked(side) <= {*STATE, circle.inverse}, "the motion depends on more than the state")
         yield f"x is on its own {k}", Vanishes(motion[0] - a * loop.x[0] - b * loop.v[0])
-        slope = -loop.slopes_along(circle.V, motion)
+        slope = -loop.slopes_along(circle.lyapunov, motion)
         if side is not near[0]:
             apart = any(f > 0 and c > 0 for f, c in circle.bounds(side))
             demand(apart, "the law may have no bound on a side")
