@@ -16,10 +16,10 @@ from functools import cached_property
 from typing import TypeAlias
 
 from .numbers import Rows, demand, inverse
-from .polynomials import Poly, apply, cross, dot, poly, total, var, variables
+from .polynomials import Poly, apply, cross, dot, minus, poly, total, var, variables
 from .programs import Asking, Condition, Exactly, Piecewise, known, single
 from .reading import Claim
-from .rules import Definite, Shown, Vanishes
+from .rules import Definite, Shown, vanish
 
 AXES = range(3)
 OUTSIDE, MOVING, WHEELS = "outside torque", "moving target", "wheels"
@@ -92,7 +92,7 @@ class AttitudeLoop(Loop):
         self.rate = [w + r for w, r in zip(self.w, self.r, strict=True)]
         spin = apply(self.J, self.rate)
         self.H = variables("h") if self.wheels else spin
-        self.stored = [h - own for h, own in zip(self.H, spin, strict=True)]
+        self.stored = minus(self.H, spin)
         fields = {
             "attitude": self.q, "rate": self.w, "body_rate": self.rate, "target_rate": self.r,
             "target_acceleration": self.a, "external_torque": self.e, "position": variables("p"),
@@ -153,8 +153,8 @@ class AttitudeLoop(Loop):
 
     def balance(self, u: Sequence[Poly]) -> list[Poly]:
         """Return J w' under a torque of the law."""
-        columns = zip(u, self.e, cross(self.rate, self.H), apply(self.J, self.a), strict=True)
-        return [torque + outside - gyroscopic - moved for torque, outside, gyroscopic, moved in columns]
+        outside = minus(self.e, apply(self.J, self.a))
+        return [torque + own for torque, own in zip(u, minus(outside, cross(self.rate, self.H)), strict=True)]
 
     @cached_property
     def acceleration(self) -> list[Poly]:
@@ -192,12 +192,11 @@ class AttitudeLoop(Loop):
         pushed = variables("t")
         plant = wired_matrix("craft.inertia", self.J) | wired_matrix("craft.inverse_inertia", self.J_inverse)
         moved = self.single("body", 3, wired("rate", self.w), wired("torque", pushed), plant)
-        wanted = [t - g for t, g in zip(pushed, cross(self.w, apply(self.J, self.w)), strict=True)]
-        for k, (found, p) in enumerate(zip(apply(self.J, moved), wanted, strict=True)):
-            yield f"Euler's equation {k}", Vanishes(found - p, inverses)
-        turned = self.single("turning", 4, wired("q", self.q), wired("rate", self.w))
-        for k, (found, p) in enumerate(zip(turned, self.turning, strict=True)):
-            yield f"turning {k}", Vanishes(found - p)
+        wanted = minus(pushed, cross(self.w, apply(self.J, self.w)))
+        yield from vanish("Euler's equation", minus(apply(self.J, moved), wanted), inverses)
+        yield from vanish(
+            "turning", minus(self.single("turning", 4, wired("q", self.q), wired("rate", self.w)), self.turning)
+        )
 
 
 def slopes(parts: Sequence[Poly], letter: str, at: Mapping[str, Poly | Fraction | int]) -> Rows:

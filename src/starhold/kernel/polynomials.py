@@ -135,6 +135,11 @@ def apply(rows: Sequence[Sequence[Poly | Fraction | int]], v: Sequence[Poly]) ->
     return [dot(row, v) for row in rows]
 
 
+def minus(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
+    """Return the difference of two vectors."""
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
 def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
     """Return the vector product."""
     return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]

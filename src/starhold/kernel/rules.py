@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, TypeAlias
@@ -152,3 +152,8 @@ class Exceeds:
 Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Definite | Exceeds
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
 """Obligations, each with the name under which its evidence stands."""
+
+
+def vanish(name: str, parts: Iterable[Poly], modulo: Sequence[Poly] = (), first: int = 0) -> Shown:
+    """Each of some polynomials is zero; they are numbered."""
+    yield from ((f"{name} {k}", Vanishes(p, modulo)) for k, p in enumerate(parts, first))

@@ -13,9 +13,9 @@ from typing import TypeAlias
 
 from ..loops import HYSTERESIS, NONE, SHORTEST, AttitudeLoop
 from ..numbers import cosine_below, demand
-from ..polynomials import Poly, apply, dot, horner, poly
+from ..polynomials import Poly, apply, dot, horner, minus, poly
 from ..reading import Claim
-from ..rules import Exceeds, Obligation, Shown, Solves, Squares, Vanishes
+from ..rules import Exceeds, Obligation, Shown, Solves, Squares, vanish
 from ..sentences import Statement, above, below, enumerated
 from .limits import within_limits
 
@@ -63,8 +63,7 @@ def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
     yield from loop.sound()
     z, momentum, energy = [*(turned or [1 - loop.q[0], *loop.q[1:]])], apply(loop.J, loop.w), list[Poly]()
     if loop.any_inertia:
-        for k, p in enumerate(momentum):
-            yield f"kinetic energy {k}", Vanishes(loop.lyapunov.slope(f"w{k + 1}") - p)
+        yield from vanish("kinetic energy", minus([loop.lyapunov.slope(name) for name in loop.driven], momentum))
         energy = [dot(loop.w, momentum)]
     else:
         z += loop.w
@@ -114,8 +113,8 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         said.append("comes to rest on target")
     else:
         demand(level is None, "a level for every inertia needs a sign of the quaternion")
-        for k, name in enumerate(loop.still if strictly else ()):
-            yield f"V is level at the other equilibrium {k}", Vanishes(V.slope(name).at(loop.opposite | loop.still))
+        level_there = [V.slope(name).at(loop.opposite | loop.still) for name in loop.driven if strictly]
+        yield from vanish("V is level at the other equilibrium", level_there)
         repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])
         yield "the other equilibrium repels", repels
         said.append("comes to rest on target, but for a set of measure zero, which ends on the other quaternion")

@@ -9,7 +9,7 @@ from ..loops import AttitudeLoop
 from ..numbers import demand
 from ..polynomials import Poly, cross, horner, poly, total, var
 from ..reading import Claim
-from ..rules import Obligation, Squares, Sum, Vanishes
+from ..rules import Obligation, Squares, Sum, vanish
 from ..sentences import Statement, below
 from .attitude import concluded
 
@@ -25,8 +25,7 @@ def converges_without_axes(claim: Claim) -> Generator[tuple[str, Obligation], No
     for name, divisor in loop.divisors.items():
         yield f"divisor {name}", Squares(divisor, [poly(1), *loop.q, *loop.w], 1, modulo=[loop.sphere])
     for name, p in (("V", V), ("V'", slope)):
-        for axis in range(3):
-            yield f"{name} turned about axis {axis}", Vanishes(turned(loop, p, axis))
+        yield from vanish(f"{name} turned about axis", [turned(loop, p, axis) for axis in range(3)])
     u, v, t = map(var, "uvt")
     height, fall, q2 = reduced(V), -reduced(slope), u * (2 - u)
     yield "V is least on target", Sum(height, [q2 - t * t], (), [v * v, u * u, q2])

@@ -60,9 +60,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     for name, bound, load in limited:
         # Of what is bounded from outside only what the load depends on.
         z = [poly(1), *q, *w, *(x for x in bounded if x.names <= load.names)]
-        units = UNIT[0].names <= load.names
-        z += [*UNIT, *(x * rate for x in UNIT for rate in w)] * units
-        yield name, Squares(bound - load, z, 0, known, [loop.sphere, *[dot(UNIT, UNIT) - 1] * units])
+        yield name, within(bound, load, z, w, known, [loop.sphere])
     told = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(told + enumerated(said), tuple(assumed), "wheels" if motors else "torque-limit")
 
@@ -73,6 +71,16 @@ def loads(name: str, u: Sequence[Poly], axis: Fraction | None, norm: Fraction | 
         yield from ((f"{name} {sign * k:+d}", axis, sign * p) for k, p in enumerate(u, 1) for sign in (1, -1))
     if norm is not None:
         yield f"norm of the {name}", norm, dot(UNIT, u)
+
+
+def within(
+    bound: Fraction, load: Poly, z: list[Poly], paired: Sequence[Poly], known: Sequence[Poly], modulo: list[Poly]
+) -> Squares:
+    """Return that a load is at most its bound; terms that the unit vector of a norm is paired with are told."""
+    if not UNIT[0].names <= load.names:
+        return Squares(bound - load, z, 0, known, modulo)
+    more = [*UNIT, *(d * x for d in UNIT for x in paired)]
+    return Squares(bound - load, [*z, *more], 0, known, [*modulo, dot(UNIT, UNIT) - 1])
 
 
 def allocated(loop: AttitudeLoop) -> tuple[list[list[Fraction]], list[Fraction]]:

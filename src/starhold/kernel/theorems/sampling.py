@@ -10,7 +10,7 @@ from ..numbers import Rows, demand, plus, scalar, times
 from ..polynomials import Poly, poly
 from ..programs import Piecewise
 from ..reading import Claim
-from ..rules import Contracts, Definite, Exceeds, Obligation, Vanishes
+from ..rules import Contracts, Definite, Exceeds, Obligation, vanish
 from ..sentences import Statement, above, below
 
 
@@ -30,8 +30,7 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     rest: dict[str, int] = loop.on_target | loop.still
     u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
     loop.autonomous(u)
-    for k, p in enumerate(u):
-        yield f"rest on target {k}", Vanishes(p.at(rest))
+    yield from vanish("rest on target", [p.at(rest) for p in u])
     C, K = (slopes([-p for p in u], letter, rest) for letter in "wq")
     J, push = ([[poly(x).number for x in row] for row in own] for own in (loop.J, loop.J_inverse))
     h, radius, longest, other = numbers["period"], numbers["radius"], numbers.get("longest"), numbers.get("other")

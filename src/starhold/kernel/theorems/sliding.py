@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Generator
 from fractions import Fraction
 
-from ..loops import AXES, HYSTERESIS, SHORTEST, AttitudeLoop, slopes
+from ..loops import AXES, HYSTERESIS, NONE, SHORTEST, AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times, transpose
-from ..polynomials import Poly, apply, dot, multiple, poly
+from ..polynomials import Poly, apply, dot, minus, multiple, poly
 from ..programs import Case
 from ..reading import Claim
-from ..rules import Definite, Exceeds, Obligation, Squares, Vanishes
+from ..rules import Definite, Exceeds, Obligation, Squares, vanish
 from ..sentences import Statement, above, below
 from .attitude import contents
 
@@ -26,12 +26,11 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     yield from loop.sound()
     s = loop.single("surface", 3)
     K = slopes(s, "q", {})
-    for k, (p, row) in enumerate(zip(s, K, strict=True)):
-        yield f"surface {k}", Vanishes(p - loop.w[k] - dot(row, own))
+    yield from vanish("surface", minus(minus(s, loop.w), apply(K, own)))
     yield "q0 grows on the surface", Squares(dot(own, apply(K, own)), own, 3)
     # J s' = J w' + J K q'.
-    without = loop.balance([Poly({})] * 3)
-    moved = [a - e + b for a, e, b in zip(without, loop.e, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
+    without = minus(loop.balance(NONE), loop.e)
+    moved = [a + b for a, b in zip(without, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
     outside = [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
     axes = [taken_apart(loop, i, moved[i], s[i]) for i in AXES]
     for i, (reach, _) in enumerate(axes):

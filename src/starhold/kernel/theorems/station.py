@@ -11,11 +11,11 @@ from fractions import Fraction
 from ..loops import wired
 from ..numbers import RefusedError, demand
 from ..points import STATE, PointLoop, Side
-from ..polynomials import Poly, dot, horner, multiple, poly, var, variables
+from ..polynomials import Poly, dot, horner, minus, multiple, poly, var, variables
 from ..reading import Claim
-from ..rules import Contracts, Exceeds, Obligation, Shown, Solves, Squares, Vanishes
+from ..rules import Contracts, Exceeds, Obligation, Shown, Solves, Squares, Vanishes, vanish
 from ..sentences import Statement, above, below, enumerated
-from .limits import UNIT, loads
+from .limits import loads, within
 
 Proof = Generator[tuple[str, Obligation], None, Statement]
 
@@ -78,8 +78,8 @@ def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]
     errors, (V,) = loop.single("errors", 3), loop.single("lyapunov", 1)
     square, rate = -errors[0].at({"x2": 0, "x3": 0}).number, errors[1].slope("x3").number
     (_, y, z), (_, v, w) = loop.x, loop.v
-    for k, p in enumerate((y * y + z * z - square, v + rate * z, w - rate * y)):
-        yield f"the errors are those of a circle {k + 1}", Vanishes(errors[k] - p)
+    own = [y * y + z * z - square, v + rate * z, w - rate * y]
+    yield from vanish("the errors are those of a circle", minus(errors, own), first=1)
     weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
     loop.sides  # noqa: B018 (asks for roots)
     circle = Circle(errors, square, rate, weights, *loop.relay(errors[1:]))
@@ -149,11 +149,8 @@ def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[
             u, wrong = [flat(p) for p in side.u], dot(f[1:], f[1:])
             known = [most * most - wrong for factor, most in circle.bounds(side) if factor < 0 <= most]
         for name, bound, load in loads("control", u, axis, norm):
-            z_of, equal = [poly(1), y, z, *f, *unit], relations
-            if UNIT[0].names <= load.names:
-                z_of = [*z_of, *UNIT, *(p * q for p in UNIT for q in (y, z, f[0]))]
-                equal = [*relations, dot(UNIT, UNIT) - 1]
-            yield f"{name} {k}", Squares(bound - load, z_of, 0, [*known, inside], equal)
+            terms = [poly(1), y, z, *f, *unit]
+            yield f"{name} {k}", within(bound, load, terms, (y, z, f[0]), [*known, inside], relations)
     said = [f"{above(most)} {how}" for most, how in ((norm, "in norm"), (axis, "on every axis")) if most is not None]
     return f" with no more control than {enumerated(said)}" if said else ""
 
@@ -163,8 +160,7 @@ def comes_to_rest(claim: Claim) -> Proof:
     eigenvalues have negative real parts."""
     loop = PointLoop(claim)
     motion, at = only_side(loop), resting(loop)
-    for k, p in enumerate(motion):
-        yield f"rest is one {k + 1}", Vanishes(p.at(at))
+    yield from vanish("rest is one", [p.at(at) for p in motion], first=1)
     flow = [[Fraction(k == i + 3) for k in range(6)] for i in range(3)]
     yield "returns", Contracts([*flow, *([p.slope(name).number for name in STATE] for p in motion)], flow=True)
     return Statement("from everywhere the motion comes to rest", (*loop.assumed, "unlimited-control", *loop.bodies))
@@ -229,8 +225,7 @@ def needs_more_control(claim: Claim) -> Proof:
     limits = [numbers.get("limit.norm"), numbers.get("limit.axis")]
     demand(limits.count(None) == 1, "there is not one limit")
     at = {"x1": 0, "x2": y, "x3": z, "v1": 0, "v2": -circle.rate * z, "v3": circle.rate * y, circle.size: 0}
-    for k, p in enumerate(circle.errors):
-        yield f"on the circle {k + 1}", Vanishes(p.at(at))
+    yield from vanish("on the circle", [p.at(at) for p in circle.errors], first=1)
     here = [s for s in loop.sides if all((Poly(dict(p)).at(at).number > 0) == holds for p, holds in s.guards)]
     demand(len(here) == 1, "the law has no side there")
     squares = [p.at(at).number ** 2 for p in here[0].u]
@@ -250,8 +245,7 @@ def does_not_return(claim: Claim) -> Proof:
         if any(p.names for p in slopes) or max(slopes[0].number, slopes[1].number) < 0:
             continue
         own = slopes[0] * x + slopes[1] * v + motions[0][i].terms.get((), 0)
-        for k, motion in enumerate(motions):
-            yield f"an axis on its own {k}", Vanishes(motion[i] - own)
+        yield from vanish("an axis on its own", [motion[i] - own for motion in motions])
         text = f"along {'XYZ'[i]} some motions do not return"
         return Statement(text, (*loop.assumed, "unlimited-control", *loop.bodies))
     raise RefusedError("every axis returns")
