@@ -14,6 +14,7 @@ from typing import Any
 
 import typer
 
+from generators.kernel import files_table
 from generators.laws import POINT, laws_table
 from generators.tables import fields_table, first_sentence, signature, table
 from starhold.algebra import quaternion, scalar, several, structured
@@ -148,6 +149,7 @@ TABLES = {
     "parameter": lambda: attributes_table(Parameter),
     "roles": roles_text,
     "limits of models": limits_table,
+    "kernel files": files_table,
     "dice": lambda: methods_table(Dice),
 }
 MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
