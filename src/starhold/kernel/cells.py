@@ -11,7 +11,7 @@ from math import factorial
 from typing import Any
 
 from .numbers import demand, read_list
-from .polynomials import Poly, poly, total, var
+from .polynomials import Poly, minus, poly, total, var
 from .programs import Condition, Exactly, Guards, joined, known
 from .reading import Claim
 from .rules import Obligation, Shown, Sum
@@ -75,7 +75,7 @@ class System:
             outputs += claim.programs[role].run(given, Exactly(), 1)
         found = joined(outputs, CELLS)
         self.all = [Cell(signs(case.guards), case.value[:count], case.value[count:]) for case in found]
-        self.surfaces = sorted({surface for cell in self.all for surface in cell.signs})
+        self.surfaces: list[Condition] = sorted({surface for cell in self.all for surface in cell.signs})
 
     @cached_property
     def facts(self) -> list[Poly]:
@@ -143,9 +143,12 @@ class System:
         for own in self.apart:
             yield f"apart {' '.join(map(str, own))}", self.sum(poly(-1), own)
         for i, j in combinations(self.cells, 2):
-            for k, (V, W) in enumerate(zip(self.all[i].V, self.all[j].V, strict=True)):
-                for sign in (1, -1) if (V - W).terms and self.meet(i, j) else ():
-                    yield f"continuous {k} {i} {j} {sign:+d}", self.sum((V - W) * sign, (i, j))
+            for k, p in enumerate(minus(self.all[i].V, self.all[j].V) if self.meet(i, j) else ()):
+                yield from self.equal(f"continuous {k} {i} {j}", p, (i, j))
+
+    def equal(self, name: str, p: Poly, cells: Sequence[int]) -> Shown:
+        """p is zero where cells meet."""
+        yield from ((f"{name} {sign:+d}", self.sum(p * sign, cells)) for sign in (1, -1) if p.terms)
 
     @property
     def origin(self) -> State:
@@ -166,8 +169,9 @@ class System:
         told = {x: self.claim.numbers.coordinate(f"{place}.{x}") for x in (*self.names, *self.parameters)}
         state = {x: at - self.shift.get(x, 0) for x, at in told.items()}
         demand(all(low <= state[x] <= high for x, (low, high) in self.box.items()), "a state is outside of the box")
-        # Cells cover every state.
-        return next(cell for cell in self.all if cell.holds(state)), state
+        held = [cell for cell in self.all if cell.holds(state)]
+        demand(bool(held), "no cell holds a state")
+        return held[0], state
 
 
 def signs(guards: Guards) -> dict[Condition, int]:

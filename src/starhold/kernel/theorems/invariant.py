@@ -1,9 +1,7 @@
-"""The theorems on invariant sets of a small system x' = f(x), by functions V. Proofs: docs/kernel.md, 7.
+"""The theorems on invariant sets of a small system x' = f(x), by functions V. Proofs: docs/kernel.md, section 7.
 
-Rates f and V are piecewise polynomials, each piece (cell) taken with its border. Where f jumps, motions are those in
-the sense of Filippov, and more: x' is any mean of what the cells have there. M is {V <= 0}, or an equilibrium. A
-variable x may come with its sine and cosine, inputs `sin.x` and `cos.x`; parameters are inputs that stay, and have all
-values of their intervals.
+M is {V <= 0}, or an equilibrium. Where f jumps, x' is any mean of what the cells have there (Filippov). Parameters are
+inputs that stay, and have all values of their intervals.
 """
 
 from __future__ import annotations
@@ -16,8 +14,7 @@ from typing import Any
 
 from ..cells import Shows, System, power
 from ..numbers import RefusedError, demand, read_list
-from ..polynomials import Poly, poly, read_poly, var
-from ..programs import Condition
+from ..polynomials import Poly, minus, poly, read_poly, var
 from ..reading import Claim
 from ..rules import Shown
 from ..sentences import Statement, below
@@ -36,6 +33,10 @@ class Function:
     def hint(self, name: str) -> Any:
         """Return what the evidence tells about this function, None if nothing."""
         return self.system.claim.evidence.get(f"{name} of {self.system.roles[self.place]}")
+
+    def hints(self, name: str) -> list[Any]:
+        """Return a list of the evidence."""
+        return read_list(self.hint(name) or [])
 
     @property
     def at_point(self) -> bool:
@@ -82,47 +83,40 @@ class Function:
                     yield f"border {self.place} {i} {x} {k}", system.sum(self.on(i) - least, (i,), (), strict, face={x: end})
 
     def changes(self, strictly: bool = True) -> Shown:
-        """V decreases all the time where 0 < V < level, or (not strictly) does not grow there.
-
-        Almost always V' = grad V_i.v for every cell i that holds the state, with a mean v of the rates of all that do,
-        and v is along each surface m that does. So it is enough that (grad V_i - c grad m).f_j < 0 for one i and every j,
-        whatever c is. Where it is only <= 0, E is to grow where it vanishes: then E - LV does for a large L on {l <= V},
-        for any l > 0."""
-        system, escape = self.system, self.hint("escape")
-        E = None if escape is None else read_poly(escape)
-        weakly = [tuple(read_list(pair, 2)) for pair in read_list(self.hint("weakly") or [])]
-        across = [tuple(read_list(entry, 3)) for entry in read_list(self.hint("across") or [])]
-        demand(all(system.are_cells((i,)) and type(m) is int for m, i, _ in across), "there are no such cells")
-        demand(all(0 <= m < len(system.surfaces) for m, _, _ in across), "there are no such surfaces")
-        chosen: set[tuple[Condition, int]] = {(system.surfaces[m], i) for m, i, _ in across}
-        every = [(i, i, None, poly(0)) for i in system.cells]
-        every += [(i, j, system.surfaces[m], read_poly(c)) for m, i, c in across for j in system.cells]
-        never = read_list(self.hint("never") or [])
+        """V decreases all the time where 0 < V < level, or (not strictly) does not grow there; or where it weakly decreases
+        a function E grows. Told are pairs of cells where it is weakly so, cells that hold no state with V > 0, and
+        surfaces across which rates differ, each with a cell i and the multiple of the surface that V_i is less."""
+        system, surfaces = self.system, self.system.surfaces
+        escape, weakly = self.hint("escape"), [tuple(read_list(pair, 2)) for pair in self.hints("weakly")]
+        across: list[tuple[Any, ...]] = [tuple(read_list(entry, 3)) for entry in self.hints("across")]
+        never = self.hints("never")
+        demand(system.are_cells([*never, *(i for _, i, _ in across)]), "there are no such cells")
+        demand(all(type(m) is int and 0 <= m < len(surfaces) for m, _, _ in across), "there are no such surfaces")
         for i in never:
-            demand(system.are_cells([i]), "there are no such cells")
             yield f"never {self.place} {i}", system.sum(-self.on(i), (i,))
-        for i, j, surface, c in every:
-            V, rates, m = self.on(i), system.all[j].rates, Poly(dict(surface or ()))
-            if i in never or j in never or not system.meet(i, j):
+        cells = [i for i in system.cells if i not in never]
+        every = [(i, i, "", poly(0), poly(0)) for i in cells]
+        every += [
+            (i, j, f" on {m}", Poly(dict(surfaces[m])), read_poly(c)) for m, i, c in across for j in cells if i in cells
+        ]
+        for i, j, on, m, c in every:
+            if not system.meet(i, j):
                 continue
+            V, rates = self.on(i), system.all[j].rates
             rise = system.slope(V, rates) - c * system.slope(m, rates)
             room = [V] if self.level is None else [V, self.level - V]
-            name = f"changes {self.place} {i} {j}" + (f" on {system.surfaces.index(surface)}" if surface else "")
-            weak, zero = not strictly or (i, j) in weakly, [m] if surface else []
-            gap = [] if weak else self.positive("powers", i)
-            yield name, system.sum(rise * -self.sense, (i, j), room, gap, zero)
+            weak, zero, name = not strictly or (i, j) in weakly, [m] if on else [], f"changes {self.place} {i} {j}{on}"
+            gap = self.positive("powers", i) if strictly else []
+            yield name, system.sum(rise * -self.sense, (i, j), room, [] if weak else gap, zero)
             if weak and strictly:
-                demand(E is not None and self.sense == 1, "no function is told that grows")
-                grows = system.slope(E or poly(0), rates)
-                yield f"{name} escapes", system.sum(grows, (i, j), [*room, rise], self.positive("powers", i), zero)
-        for j, k in combinations(system.cells, 2):
+                demand(escape is not None and self.sense == 1, "no function is told that grows")
+                yield f"{name} escapes", system.sum(system.slope(read_poly(escape), rates), (i, j), [*room, rise], gap, zero)
+        for j, k in combinations(cells, 2):
             one, other = system.all[j], system.all[k]
-            if one.rates == other.rates or not system.meet(j, k) or j in never or k in never:
-                continue
-            if not any(one.on(surface, other) for surface, i in chosen if i in (j, k)):
-                for n, (a, b) in enumerate(zip(one.rates, other.rates, strict=True)):
-                    for sign in (1, -1) if (a - b).terms else ():
-                        yield f"agree {j} {k} {n} {sign:+d}", system.sum((a - b) * sign, (j, k))
+            crossed = any(one.on(surfaces[m], other) for m, i, _ in across if i in (j, k))
+            if not crossed and system.meet(j, k):
+                for n, p in enumerate(minus(one.rates, other.rates)):
+                    yield from system.equal(f"agree {j} {k} {n}", p, (j, k))
 
     def where(self) -> str:
         """Write the set that motions start from."""
@@ -183,12 +177,13 @@ def leaves(claim: Claim) -> Shows:
         demand(any(still), "the equilibrium is none")
         way = {x: var("t") * claim.numbers.coordinate(f"direction.{x}") for x in system.names}
 
-        def leading(p: Poly) -> Fraction:
+        def leads(p: Poly) -> bool:
+            # The first coefficient along the way is positive.
             terms = p.at(way).terms
-            return terms[min(terms, key=len)] if terms else Fraction(0)
+            return bool(terms) and terms[min(terms, key=len)] > 0
 
-        inside = (all(leading(Poly(dict(s))) * sign > 0 for s, sign in cell.signs.items()) for cell in around)
-        demand(any(i and leading(c.V[0]) > 0 for i, c in zip(inside, around, strict=True)), "V is not positive on the way")
+        grows = ([c.V[0], *(Poly(dict(m)) * sign for m, sign in c.signs.items())] for c in around)
+        demand(any(all(map(leads, parts)) for parts in grows), "V is not positive on the way")
     else:
         cell, state = system.state("member")
         demand(cell.V[0].at(state).number <= 0, "V is positive at the member of M")
@@ -220,18 +215,15 @@ def fails(claim: Claim) -> Shows:
     """V is not as one of the theorems needs it, at a state. What of it is the word that the claim is taken with."""
     system = System(claim, "V")
     cell, state = system.state("state")
-    at = {surface: Poly(dict(surface)).at(state).number for surface in system.surfaces}
-    around = [c for c in system.all if all(at[m] * sign >= 0 if sign else at[m] == 0 for m, sign in c.signs.items())]
+    around = [cell for cell in system.all if cell.holds(state)]
     V, slope = cell.V[0].at(state).number, system.slope(cell.V[0], cell.rates).at(state).number
-    inside = V > 0 and all(at.values())
+    inside = V > 0 and all(Poly(dict(surface)).at(state).number for surface in system.surfaces)
     away = system.at_point and any(state[x] for x in system.names)
     border = any(state[x] in system.box.get(x, ()) for x in system.names)
     still = slope == 0 and not any(rate.at(state).number for rate in cell.rates)
+    falls_not = f"V rises, or the state is an equilibrium, where it is {below(V)}"
     ways = {
-        "does not fall": (
-            inside and (slope > 0 or still),
-            f"V rises, or the state is an equilibrium, where it is {below(V)}",
-        ),
+        "does not fall": (inside and (slope > 0 or still), falls_not),
         "does not grow": (inside and slope <= 0, f"V does not grow at a state where it is {below(V)}"),
         "reaches the border": (border, f"V is {below(V)} on the border of the box"),
         "is not positive": (away and V <= 0, "V is not positive at a state that is not the equilibrium"),
