@@ -168,9 +168,9 @@ class Loop:
         return max(*map(abs, values), 1e-300) if V is not None else 1.0
 
     def kinetic(self, V: str | None) -> list[float]:
-        """Return twice the coefficients of the squares of the rates in V."""
+        """Return twice the sizes of the coefficients of the squares of the rates in V."""
         p = self.form(V)
-        return [2.0 * float(p.terms.get((f"w{k}", f"w{k}"), 0.5)) for k in (1, 2, 3)]
+        return [2.0 * abs(float(p.terms.get((f"w{k}", f"w{k}"), 0.5))) for k in (1, 2, 3)]
 
     def try_to_show(self, claim: dict[str, Any], scales: Mapping[str, float]) -> bool:
         """Add a claim if evidence for it is found."""
