@@ -97,7 +97,7 @@ class Function:
         cells = [i for i in system.cells if i not in never]
         every = [(i, i, "", poly(0), poly(0)) for i in cells]
         every += [
-            (i, j, f" on {m}", Poly(dict(surfaces[m])), read_poly(c)) for m, i, c in across for j in cells if i in cells
+            (i, j, f" on {m}", Poly(dict(surfaces[int(m)])), read_poly(c)) for m, i, c in across for j in cells if i in cells
         ]
         for i, j, on, m, c in every:
             if not system.meet(i, j):
@@ -113,7 +113,7 @@ class Function:
                 yield f"{name} escapes", system.sum(system.slope(read_poly(escape), rates), (i, j), [*room, rise], gap, zero)
         for j, k in combinations(cells, 2):
             one, other = system.all[j], system.all[k]
-            crossed = any(one.on(surfaces[m], other) for m, i, _ in across if i in (j, k))
+            crossed = any(one.on(surfaces[int(m)], other) for m, i, _ in across if i in (j, k))
             if not crossed and system.meet(j, k):
                 for n, p in enumerate(minus(one.rates, other.rates)):
                     yield from system.equal(f"agree {j} {k} {n}", p, (j, k))

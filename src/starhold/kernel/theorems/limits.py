@@ -13,7 +13,7 @@ from ..rules import Obligation, Squares
 from ..sentences import Statement, above, below, enumerated
 
 Load: TypeAlias = tuple[str, Fraction, Poly]
-UNIT = variables("d")
+TORQUE, UNIT = "torque-limit", variables("d")
 
 
 def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, Statement]:
@@ -62,7 +62,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         z = [poly(1), *q, *w, *(x for x in bounded if x.names <= load.names)]
         yield name, within(bound, load, z, w, known, [loop.sphere])
     told = f"with {enumerated(bounds)} " if bounds else ""
-    return Statement(told + enumerated(said), tuple(assumed), "wheels" if motors else "torque-limit")
+    return Statement(told + enumerated(said), tuple(assumed), "wheels" if motors else TORQUE)
 
 
 def loads(name: str, u: Sequence[Poly], axis: Fraction | None, norm: Fraction | None) -> Iterator[Load]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from fractions import Fraction
 
 from ..loops import AttitudeLoop, slopes
@@ -22,25 +22,34 @@ def near_rest(cases: Piecewise, rest: dict[str, int]) -> Poly:
     return cases[holds.index(True)].value
 
 
-def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
-    """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues no larger than the
-    radius; with `longest` it is stable for every period up to that, with `other` for that period too."""
-    loop, numbers = AttitudeLoop(claim, quotients=True), claim.numbers
+def linear_loop(
+    claim: Claim,
+) -> Generator[tuple[str, Obligation], None, tuple[AttitudeLoop, tuple[Rows, Rows], Callable[[Fraction], Rows]]]:
+    """Return the loop near rest on target, with u = -Cw - Kq: it, C and K, and the matrix of a step of a period."""
+    loop = AttitudeLoop(claim, quotients=True)
+    demand(not claim.taken.content, "the loop is taken with nothing")
     yield from loop.sound()
     rest: dict[str, int] = loop.on_target | loop.still
     u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
     loop.autonomous(u)
     yield from vanish("rest on target", [p.at(rest) for p in u])
     C, K = (slopes([-p for p in u], letter, rest) for letter in "wq")
-    J, push = ([[poly(x).number for x in row] for row in own] for own in (loop.J, loop.J_inverse))
-    h, radius, longest, other = numbers["period"], numbers["radius"], numbers.get("longest"), numbers.get("other")
-    held = times(push, beside(C, K))
+    held = times([[poly(x).number for x in row] for row in loop.J_inverse], beside(C, K))
 
     def step(h: Fraction) -> Rows:
-        # u = -Cw - Kq, w+ = w + h J^-1 u, q+ = q + h w/2 + h^2 J^-1 u/4.
+        # w+ = w + h J^-1 u, q+ = q + h w/2 + h^2 J^-1 u/4.
         upper, lower = beside(scalar(1), scalar(0)), beside(scalar(h / 2), scalar(1))
         return plus(upper, held, -h) + plus(lower, held, -h * h / 4)
 
+    return loop, (C, K), step
+
+
+def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
+    """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues no larger than the
+    radius; with `longest` it is stable for every period up to that, with `other` for that period too."""
+    loop, (C, K), step = yield from linear_loop(claim)
+    numbers, J = claim.numbers, [[poly(x).number for x in row] for row in loop.J]
+    h, radius, longest, other = numbers["period"], numbers["radius"], numbers.get("longest"), numbers.get("other")
     yield "step", Contracts(step(h), radius)
     yield "radius", Exceeds(Fraction(1), radius)
     said = f"near rest, with the torque held for {below(h)} s, the loop is stable, "
@@ -54,7 +63,6 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     if other is not None:
         yield "another step", Contracts(step(other))
         said += f", and it is stable for a period of {below(other)} s"
-    demand(not claim.taken.content, "the loop is taken with nothing")
     return Statement(said, (*loop.assumed, "linear-motion"), "sampling")
 
 

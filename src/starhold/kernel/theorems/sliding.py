@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from fractions import Fraction
+from typing import NamedTuple
 
 from ..loops import AXES, HYSTERESIS, NONE, SHORTEST, AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times, transpose
@@ -14,8 +15,12 @@ from ..rules import Definite, Exceeds, Obligation, Squares, vanish
 from ..sentences import Statement, above, below
 from .attitude import contents
 
-Reach = tuple[Fraction, Fraction | None]
-"""(J s')_i - e_i is -reach sign(s_i) at most, or where a slope is told -slope s_i within a boundary layer."""
+
+class Axis(NamedTuple):
+    """(J s')_i - e_i is -reach sign(s_i) at most, or where `slope` is told -slope s_i within a boundary layer."""
+
+    reach: Fraction
+    slope: Fraction | None
 
 
 def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
@@ -23,14 +28,8 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target."""
     loop, numbers = AttitudeLoop(claim), claim.numbers
     own, J = loop.q[1:], [[poly(x).number for x in row] for row in loop.J]
-    yield from loop.sound()
-    s = loop.single("surface", 3)
-    K = slopes(s, "q", {})
-    yield from vanish("surface", minus(minus(s, loop.w), apply(K, own)))
+    s, K, moved = yield from declared(loop)
     yield "q0 grows on the surface", Squares(dot(own, apply(K, own)), own, 3)
-    # J s' = J w' + J K q'.
-    without = minus(loop.balance(NONE), loop.e)
-    moved = [a + b for a, b in zip(without, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
     outside = [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
     axes = [taken_apart(loop, i, moved[i], s[i]) for i in AXES]
     for i, (reach, _) in enumerate(axes):
@@ -57,8 +56,19 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     return Statement(f"from {begun} the motion {said} the law's surface and {ending}", tuple(assumed), "sliding")
 
 
-def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Reach:
-    """Return the reach and slope of an axis: in each case of the law (J s')_i - e_i, its torque and what is moved, is a
+def declared(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, tuple[list[Poly], Rows, list[Poly]]]:
+    """Show that the law's surface is s = w + Kq, and return s, K, and J s' less the torques of the law and from outside."""
+    yield from loop.sound()
+    s = loop.single("surface", 3)
+    K = slopes(s, "q", {})
+    yield from vanish("surface", minus(minus(s, loop.w), apply(K, loop.q[1:])))
+    # J s' = J w' + J K q'.
+    without = minus(loop.balance(NONE), loop.e)
+    return s, K, [a + b for a, b in zip(without, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
+
+
+def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
+    """Return the axis: in each case of the law (J s')_i - e_i, its torque and what is moved, is a
     number against the sign of s_i, or -slope s_i."""
     reaches, linear = list[Fraction](), list[Fraction]()
     for case in loop.law[i]:
@@ -71,7 +81,7 @@ def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Reach:
             demand(not (found + slope * s).terms and slope > 0, "the law is neither a switch nor a layer about its surface")
             linear.append(slope)
     demand(bool(reaches), "the law does not switch")
-    return min(reaches), min(linear) if linear else None
+    return Axis(min(reaches), min(linear) if linear else None)
 
 
 def on_side(case: Case, s: Poly) -> bool:
@@ -87,7 +97,7 @@ def on_surface(case: Case, s: Poly) -> bool:
 
 
 def losses(
-    loop: AttitudeLoop, axes: list[Reach], outside: list[Fraction]
+    loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]
 ) -> Generator[tuple[str, Obligation], None, Fraction]:
     """Show that s.Js/2 falls outside of the box |s_i| <= far_i, and return what s.Js is at most in it."""
     numbers, squares = loop.claim.numbers, Fraction(0)
