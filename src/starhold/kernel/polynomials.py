@@ -46,9 +46,6 @@ class Poly:
         Account.spend(len(self.terms))
         return Poly({m: -c for m, c in self.terms.items()})
 
-    def __pos__(self) -> Poly:
-        return self
-
     def __sub__(self, other: Poly | Fraction | int) -> Poly:
         return self + -poly(other)
 
