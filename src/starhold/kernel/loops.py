@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from .numbers import Rows, demand, inverse
 from .polynomials import Poly, apply, cross, dot, minus, poly, total, var, variables
-from .programs import Asking, Condition, Exactly, Piecewise, known, single
+from .programs import Asking, Exactly, Piecewise, known, single
 from .reading import Claim
 from .rules import Definite, Shown, vanish
 
@@ -82,7 +82,7 @@ class AttitudeLoop(Loop):
     driven = ("w1", "w2", "w3")
 
     def __init__(self, claim: Claim, any_inertia: bool = False, quotients: bool = False) -> None:
-        super().__init__(claim, Asking() if quotients else Exactly())
+        super().__init__(claim, Asking(nested=False) if quotients else Exactly())
         self.any_inertia = any_inertia
         self.q, self.w = variables("q", 0), variables("w")
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
@@ -116,19 +116,10 @@ class AttitudeLoop(Loop):
         J = [[self.claim.subject[f"body.inertia.{place}"] for place in row] for row in places]
         return J, inverse(J)
 
-    def read(self, role: str, count: int, *tables: Wired) -> list[Piecewise]:
-        """Return the outputs of a program."""
-        found = super().read(role, count, *tables)
-        demand(not isinstance(self.ring, Asking) or not self.ring.roots, "a program takes a root of the state")
-        nested = any(divisor.names & self.divisors.keys() for divisor in self.divisors.values())
-        demand(not nested, "a program divides by a quotient")
-        return found
-
     @property
     def divisors(self) -> dict[str, Poly]:
         """Return the polynomials that variables are inverses of."""
-        found = self.ring.inverses if isinstance(self.ring, Asking) else dict[Condition, str]()
-        return {name: Poly(dict(own)) for own, name in found.items()}
+        return {name: Poly(dict(own)) for own, name in self.ring.inverses.items()}
 
     @property
     def assumed(self) -> list[str]:

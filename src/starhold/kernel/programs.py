@@ -144,6 +144,9 @@ def positive(guards: Guards, p: Poly) -> bool | None:
 class Exactly:
     """A program is read over exact polynomials, case by case. Roots and quotients by the state are refused."""
 
+    def __init__(self) -> None:
+        self.inverses = dict[Condition, str]()
+
     def apply(self, operation: str, operands: list[Piecewise]) -> Piecewise:
         """Return the cases of an operation's value."""
         chosen = [operands]
@@ -188,18 +191,22 @@ EXACT: dict[str, Callable[..., Any]] = {
 
 
 class Asking(Exactly):
-    """A program is read over polynomials in which roots n >= 0 and inverses s are variables, named by what they are of."""
+    """A program is read over polynomials in which roots n >= 0 and inverses s are variables, named by what they are of.
+    Unless `nested`, no root is taken, and nothing is divided by a quotient."""
 
-    def __init__(self) -> None:
-        self.roots, self.inverses = dict[Condition, str](), dict[Condition, str]()
+    def __init__(self, nested: bool = True) -> None:
+        super().__init__()
+        self.nested, self.roots = nested, dict[Condition, str]()
         self.divisors: list[Poly] = []
         """What is divided by where no guard says that it is positive."""
 
     def value(self, guards: Guards, operation: str, x: list[Any]) -> Any:
         """Return the value of an operation; of a root or quotient by the state a variable."""
         if operation == "sqrt" and x[0].names:
+            demand(self.nested, "a program takes a root of the state")
             return self._named(self.roots, "n", x[0])
         if operation == "divide" and x[1].names:
+            demand(self.nested or x[1].names.isdisjoint(self.inverses.values()), "a program divides by a quotient")
             if positive(guards, x[1]) is not True:
                 self.divisors.append(x[1])
             return x[0] * self._named(self.inverses, "s", x[1])
