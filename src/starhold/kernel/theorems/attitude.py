@@ -105,7 +105,8 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
     numbers, V = loop.claim.numbers, loop.lyapunov
     level, fastest = numbers.get("level"), numbers.get("fastest")
     motion, known = loop.balance(loop.u), list[Poly]()
-    loop.autonomous(motion)
+    # With nothing from outside H is constant in the axes of a target at rest: a function of the attitude.
+    loop.autonomous(motion, kept="" if loop.outside or loop.moving else "h")
     said = ["from every attitude and rate the body"]
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
@@ -119,6 +120,7 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
         slope = loop.slopes_along(V, NOTHING) + dot(loop.w, motion)
     else:
         slope = loop.slopes_along(V, loop.acceleration)
+    loop.autonomous([slope])
     yield "V is non-increasing", Squares(-slope, z, least, known, [loop.sphere])
     return said
 
