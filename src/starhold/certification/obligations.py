@@ -1,4 +1,4 @@
-"""What has to be shown of claims, in words."""
+"""The obligations of claims, each as what it says."""
 
 OBLIGATIONS = {
     "inertia": "the inertia is symmetric and positive definite",

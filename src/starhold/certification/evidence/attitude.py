@@ -269,6 +269,9 @@ class Loop:
             numbers |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
         if WHEELS in words:
             numbers["momentum"] = float(known.total_momentum)
+            if self.too_little_momentum():
+                self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
+                return False
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
         if wheels is not None and wheels.allocation == 0 and isfinite(max(*wheels.torque_limit, *wheels.momentum_limit)):
             for k, (torque, momentum) in enumerate(zip(wheels.torque_limit, wheels.momentum_limit, strict=True)):
@@ -293,6 +296,13 @@ class Loop:
             if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
                 return True
         return False
+
+    def too_little_momentum(self) -> bool:
+        """Tell whether a body at rest on a target that turns has more momentum than is told."""
+        loop, known = self.loop, self.known
+        stored = np.array(loop.rotors) @ np.array(loop.wheels.axes) if loop.wheels is not None else np.zeros(3)
+        least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0]) * (1.0 - 1e-12)
+        return float(known.total_momentum) + float(np.linalg.norm(stored)) < least * float(known.target_rate)
 
     def cap(self, theorem: str, words: list[str], V: str) -> float:
         """Return a level below V where other rests are, or where the sign of the quaternion changes."""

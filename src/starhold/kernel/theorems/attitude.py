@@ -76,7 +76,8 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
     numbers, V, w = loop.claim.numbers, loop.lyapunov, loop.w
     level, fastest = numbers.get("level"), numbers.get("fastest")
     motion, known = loop.balance(loop.u), list[Poly]()
-    loop.autonomous(motion)
+    # With nothing from outside H is constant in the axes of a target at rest: a function of the attitude.
+    loop.autonomous(motion, kept="" if loop.outside or loop.moving else "h")
     said = ["from every attitude and rate the body"]
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
@@ -88,6 +89,7 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
     # Of any inertia V = w.Jw/2 + U(q), so that V' = w.Jw' + U'.
     slope = loop.slopes_along(V, NONE if loop.any_inertia else loop.acceleration)
     slope = slope + dot(w, motion) * loop.any_inertia
+    loop.autonomous([slope])
     yield "V is non-increasing", Squares(-slope, z, least, known, [loop.sphere])
     return said
 
