@@ -44,8 +44,8 @@ def wired_matrix(name: str, value: Matrix) -> dict[str, Poly]:
 
 
 class Loop:
-    """What loops share: programs read over one ring, and the rates (name of a variable: its derivative) that do not depend
-    on the law. Programs have what `told` names for inputs, and what is wired to the one that is read."""
+    """A loop reads its programs over one ring. `told` names their inputs, beside what is wired to the one that is read;
+    `rates` has the derivatives that do not depend on the law, `driven` the variables of those that do."""
 
     told: Wired
     rates: Mapping[str, Poly]
