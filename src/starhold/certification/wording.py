@@ -35,7 +35,7 @@ OBLIGATIONS = {
     "turning": "the program of its turning is that of a unit quaternion",
     "V is least on target": "V grows at least as the squares of attitude and rate, so that every level set is bounded",
     "kinetic energy": "V is the kinetic energy of whatever inertia and a function of the attitude",
-    "V falls": "V falls wherever the body turns, on the whole set",
+    "V is non-increasing": "V falls wherever the body turns, on the whole set",
     "rates": "no motion from the set turns faster than told",
     "the other equilibrium repels": "V at rest is highest on the other quaternion, where only a set of measure zero ends",
     "the other equilibrium is outside": "the set does not hold the other quaternion's equilibrium",

@@ -58,6 +58,8 @@ class Loop:
     """The numbers that a V which is not the law's own is made of, by its digest."""
     eigenvalues: list[list[float]] = field(default_factory=list[list[float]])
     """Those of a step near rest, in floats."""
+    pushed_at: list[float] | None = None
+    """Where on the orbit (m) the gravity gradient pushes the motion off the law's surface."""
 
     @property
     def loop(self) -> ClosedLoop:
