@@ -56,6 +56,8 @@ class Loop:
 
     written_by: dict[str, dict[str, float | None]] = field(default_factory=dict[str, dict[str, float | None]])
     """The numbers that a V which is not the law's own is made of, by its digest."""
+    forms: dict[str, Poly] = field(default_factory=dict[str, Poly])
+    """The polynomials V, by their digests."""
     eigenvalues: list[list[float]] = field(default_factory=list[list[float]])
     """Those of a step near rest, in floats."""
     pushed_at: list[float] | None = None
@@ -157,7 +159,9 @@ class Loop:
         """Return V as a polynomial."""
         if V is None:
             return Poly({})
-        return AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
+        if V not in self.forms:
+            self.forms[V] = AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
+        return self.forms[V]
 
     def potential(self, V: str | None) -> float:
         """Return the largest of V at rest."""
@@ -308,7 +312,8 @@ class Loop:
         limits = [
             o
             for name, o in wanted.items()
-            if isinstance(o, Squares) and name.startswith(("torque", "norm", "motor", "wheel"))
+            # What a lost wheel keeps is a number, at any level.
+            if isinstance(o, Squares) and o.p.names and name.startswith(("torque", "norm", "motor", "wheel"))
         ]
         level = cap
         for _ in range(3):
