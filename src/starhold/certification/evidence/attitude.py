@@ -64,6 +64,8 @@ class Loop:
     """The polynomials V, by their digests."""
     eigenvalues: list[list[float]] = field(default_factory=list[list[float]])
     """Those of a step near rest, in floats."""
+    pushed_at: list[float] | None = None
+    """Where on the orbit (m) the gravity gradient pushes the motion off the law's surface."""
 
     @property
     def loop(self) -> ClosedLoop:
