@@ -192,6 +192,11 @@ class Loop:
         """Find where motions end, by the law's own V or by the kinetic energy in its place. turn: what the set within the
         limits is to hold (rad)."""
         V, signs = self.lyapunov(), sign_words(self.loop)
+        try:
+            self.form(V)
+        except RefusedError as reason:
+            self.failed[CONVERGES] = str(reason)
+            return
         widths = {"hysteresis": self.loop.hysteresis_width} if HYSTERESIS in signs else {}
         ways = [
             (theorem, words)
@@ -335,8 +340,7 @@ class Loop:
         """Return a level below V where other rests are, or where the sign of the quaternion changes."""
         p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
         values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        half = theorem == EVENLY or SHORTEST in words
-        return inf if HYSTERESIS in words else min(values[1:]) if half else values[0]
+        return min(values[1:]) if theorem == EVENLY or SHORTEST in words else inf
 
     def largest_level(self, claim: dict[str, Any], V: str, cap: float) -> Fraction | None:
         """Return the largest level that keeps all limits of a claim, and stays below the cap."""
@@ -367,11 +371,12 @@ class Loop:
         P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
-            angle = 2.0 * acos(max(1.0 - float(level) / s, -0.98))
+            angle = 2.0 * acos(max(1.0 - float(level) / s, -1.0))
         else:
             angle = 2.0 * asin(min(sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
-        return {"angle": angle * less, "rate": rate * less}
+        # Above V at the other rest every turn is in the set.
+        return {"angle": angle if float(level) > 2.0 * s > 0.0 else angle * less, "rate": rate * less}
 
 
 def curvature(form: Poly, x: str) -> Any:
