@@ -75,7 +75,7 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
         everywhere = {"rate_everywhere": None, "everything": True}
         claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
-        proved, failed = proved_claims(subject, wanted.slew_angle)
+        proved, failed = proved_claims(subject, wanted.slew_angle, wanted.rate)
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted, proved))
         else:
@@ -96,7 +96,7 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) 
     pushed = subject.disturbance != 0 or subject.modelled_norm != 0
     wheeled = subject.loop.wheels is not None
     limit, box = proved.get("wheels" if wheeled else "torque-limit"), proved.get("inertia")
-    if main is not None and rate != "best" and not main.numbers["everything"]:
+    if main is not None and main.outcome == "proved" and rate != "best" and not main.numbers["everything"]:
         main = None
     if main is None or limit is None or box is None or pushed:
         derived, found, own = converge(subject, rate)

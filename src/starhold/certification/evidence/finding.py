@@ -57,7 +57,11 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
         {name: x for name, x in claim[part].items() if name not in told.unread}
         for part, told in (("subject", known.subject), ("programs", known.programs))
     )
-    return claim | {"subject": subject, "programs": programs, "evidence": {name: x for name, x in found.items() if x is not None}}
+    return claim | {
+        "subject": subject,
+        "programs": programs,
+        "evidence": {name: x for name, x in found.items() if x is not None},
+    }
 
 
 def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[str, float]) -> Any:

@@ -110,11 +110,13 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         higher, z = V.at({"q0": 0}) - numbers["level"], [poly(1), *q[1:], *w]
         yield "the sign never changes", Squares(higher, z, 1, (), [loop.sphere.at({"q0": 0})], energy)
         said.append("comes to rest on target by the shorter turn")
-    elif level is not None and not loop.any_inertia:
+    elif level is not None and not loop.any_inertia and away.number > level:
         yield "the other equilibrium is outside", Exceeds(away.number, level)
         said.append("comes to rest on target")
     else:
-        demand(level is None, "a level for every inertia needs a sign of the quaternion")
+        demand(level is None or not loop.any_inertia, "a level for every inertia needs a sign of the quaternion")
+        if level is not None:
+            yield "the other equilibrium is inside", Exceeds(level, away.number)
         level_there = [V.slope(name).at(loop.opposite | loop.still) for name in loop.driven if strictly]
         yield from vanish("V is level at the other equilibrium", level_there)
         repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])
@@ -140,7 +142,7 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part:
 
     def near(angle: Fraction) -> list[Poly]:
         # |q0| and q0 are at least the cosine; for less than a half turn so is q0^2 at least its square.
-        cosine = cosine_below(angle / 2)
+        cosine = cosine_below(angle / 2) if angle <= 6 else Fraction(-1)
         return [q[0] - cosine, *([q[0] * q[0] - cosine * cosine] if cosine >= 0 else [])]
 
     if level is None:

@@ -110,9 +110,9 @@ def exceeds_limit(claim: Claim) -> Proof:
     low, high = (loop.lyapunov.at(one.values).number for one in (state, rest))
     demand(low <= high, "V is larger at the state than at the rest")
     squares, most = [x * x for x in torque(loop, state)], limit or norm or Fraction(0)
-    yield "more than the limit", Exceeds(max(squares) if norm is None else sum(squares, Fraction(0)), most * most)
+    yield "torque", Exceeds(max(squares) if norm is None else sum(squares, Fraction(0)), most * most)
     text = f"every set of V that holds all rests turned by up to {above(angle)} rad holds a state where the law asks for "
-    return Statement(f"{text}more than {below(most)} N m", (*MOTION, *CALM), TORQUE, True)
+    return Statement(f"{text}more than {below(most)} N m", (*MOTION[:5], *CALM), TORQUE, True)
 
 
 def does_not_settle(claim: Claim) -> Proof:
@@ -125,14 +125,17 @@ def does_not_settle(claim: Claim) -> Proof:
 
 
 def is_pushed_off(claim: Claim) -> Proof:
-    """A torque from outside of `outside.i` exceeds what the law switches about axis i: it pushes s_i away from zero."""
-    loop = AttitudeLoop(claim)
+    """A torque from outside of `outside.i` exceeds what the law switches about axis i: it pushes s_i away from zero, as at a
+    state where s_i > 0."""
+    loop, state = AttitudeLoop(claim), State.told(claim)
     s, _, moved = yield from declared(loop)
     told = [i for i in AXES if f"outside.{i}" in claim.numbers]
     demand(len(told) == 1, "there is not one axis")
     i = told[0]
-    push = claim.numbers[f"outside.{i}"]
+    push, here = claim.numbers[f"outside.{i}"], state.values
     yield f"reach {i}", Exceeds(push, taken_apart(loop, i, moved[i], s[i]).reach)
+    yield "beside the surface", Exceeds(s[i].at(here).number)
+    yield "pushed away", Exceeds(push + torque(loop, state)[i] + moved[i].at(here).number)
     text = f"a torque from outside of {below(push)} N m about axis {i + 1} exceeds what the law switches"
     return Statement(text, (*MOTION, "bounded-outside-torque", *CALM[1:]), "sliding", True)
 
