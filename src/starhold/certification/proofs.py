@@ -80,7 +80,9 @@ def proved_claims(
         return {}, found.failed
     content = certificate(found.programs, found.claims)
     claims = [made(proved, given, found) for proved, given in zip(check(json.dumps(content)), found.claims, strict=True)]
-    return {claim.kind: claim for claim in reversed(claims)}, found.failed
+    # What is refuted is what was asked for, where less may be proved.
+    against = [claim for claim in claims if claim.outcome == "refuted"]
+    return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
 
 
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
