@@ -52,7 +52,7 @@ class Numbers(Told[Fraction]):
 
     def get(self, key: str) -> Fraction | None:
         """Return a bound that may be absent."""
-        return None if super().get(key) is None else self[key]
+        return self[key] if key in self.content else None
 
     def coordinate(self, key: str) -> Fraction:
         """Return a number that may have either sign."""
