@@ -126,7 +126,8 @@ def _proofs(content: Any) -> list[Proved]:
     told: list[Any] = [
         claim["proof"] for claims in listed for claim in claims if isinstance(claim, dict) and "proof" in claim
     ]
-    demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
+    told += [place for given in content["certificates"] for place in given.get("proof", [])]
+    demand(sorted(told) == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
     if not told:
         demand(not content["programs"], "there are programs without a proof")
         return []
@@ -148,7 +149,7 @@ def _certificate(given: Mapping[str, Any], proofs: Sequence[Proved]) -> Iterator
         yield Finding(name, "", "", "fails", fault)
         return
     if isinstance(subject, StationSubject):
-        found, fault = _guarded(partial(_of_station, name, subject, given))
+        found, fault = _guarded(partial(_of_station, name, subject, given, proofs))
         yield from found or []
         if fault:
             yield Finding(name, "", "", "fails", fault)
@@ -185,13 +186,15 @@ def _of_unknown_body(given: Any) -> None:
     demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
 
 
-def _of_station(name: str, subject: StationSubject, given: Any) -> list[Finding]:
+def _of_station(name: str, subject: StationSubject, given: Any, proofs: Sequence[Proved]) -> list[Finding]:
     for claim in given["claims"]:
         shaped(claim, CLAIM, "the claim")
         for obligation in claim["obligations"]:
             shaped(obligation, OBLIGATION, "an obligation")
     absent = [f"without the {name}" for name in given["subject"]["assumed_away"]]
-    return [Finding(name, *one) for one in station_findings(subject, given, absent)]
+    demand(not any("proof" in claim for claim in given["claims"]), "a claim of a station tells of a proof")
+    own = [proofs[place] for place in given.get("proof", [])]
+    return [Finding(name, *one) for one in station_findings(subject, given, absent, own)]
 
 
 def _subject(given: Any) -> LoopSubject | StationSubject:
