@@ -17,7 +17,7 @@ from starhold.kernel.check import Proved
 from starhold.kernel.numbers import Account, Rows, definite, matrix, plus, rational, scalar, times, transpose
 from starhold.kernel.polynomials import Poly, apply, dot, poly, read_poly, total, var
 
-WORDS = set("as at cofix else end exists fix for forall fun if in let match mod return then using where with I R Z".split())
+WORDS = set(["as", "at", "cofix", "else", "end", "exists", "fix", "for", "forall", "fun", "if", "in", "let", "match", "mod", "return", "then", "using", "where", "with", "I", "R", "Z"])
 """What no variable is called."""
 
 

@@ -122,12 +122,11 @@ def _known(content: Any) -> None:
 
 def _proofs(content: Any) -> list[Proved]:
     """Return what the kernel proves of a file, each claim of which has to be told of once, in order."""
-    listed: list[Any] = [given["claims"] for given in content["certificates"] if isinstance(given.get("claims"), list)]
-    told: list[Any] = [
-        claim["proof"] for claims in listed for claim in claims if isinstance(claim, dict) and "proof" in claim
-    ]
-    told += [place for given in content["certificates"] for place in given.get("proof", [])]
-    demand(sorted(told) == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
+    told: list[Any] = []
+    for given in content["certificates"]:
+        claims, own = (part if isinstance(part, list) else [] for part in (given.get("claims"), given.get("proof")))
+        told += [claim["proof"] for claim in claims if isinstance(claim, dict) and "proof" in claim] + own
+    demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
     if not told:
         demand(not content["programs"], "there are programs without a proof")
         return []
