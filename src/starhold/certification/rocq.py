@@ -17,7 +17,10 @@ from starhold.kernel.check import Proved
 from starhold.kernel.numbers import Account, Rows, definite, matrix, plus, rational, scalar, times, transpose
 from starhold.kernel.polynomials import Poly, apply, dot, poly, read_poly, total, var
 
-WORDS = set(["as", "at", "cofix", "else", "end", "exists", "fix", "for", "forall", "fun", "if", "in", "let", "match", "mod", "return", "then", "using", "where", "with", "I", "R", "Z"])
+WORDS = {
+    *("as", "at", "cofix", "else", "end", "exists", "fix", "for", "forall", "fun", "if", "in", "let", "match", "mod"),
+    *("return", "then", "using", "where", "with", "I", "R", "Z"),
+}
 """What no variable is called."""
 
 
@@ -30,8 +33,8 @@ class Part(NamedTuple):
 
 
 class Lemma(NamedTuple):
-    """p >= low, or p = 0 where low is None, wherever the known are not negative and the zeros are zero: p - low is the sum of
-    cofactors times zeros, and of parts."""
+    """p >= low, or p = 0 where low is None, wherever the known are not negative and the zeros are zero: p - low is the sum
+    of cofactors times zeros, and of parts."""
 
     p: Poly
     low: Poly | None
@@ -146,22 +149,25 @@ def _text(given: Lemma) -> str:
         own, whole = _whole(*z)
         share = size / own / own / prod(known[k][0] for k in of)
         parts.append(Part(of, whole, [[share * x for x in row] for row in gram]))
-    K = lcm(*(x.denominator for c in cofactors for x in c.terms.values()), *(x.denominator for q in parts for x in chain(*q.gram)))
-    polys = [p, *low, *(r for _, (r,) in zeros), *(g for _, (g,) in known.values()), *(x for part in parts for x in part.z)]
-    write = Writer(_names({name for q in [*polys, *cofactors] for name in q.names}))
-    rule = f"{_number(K)} {write.terms(p)} {''.join(map(write.terms, low))} {write.list(c * K for c in cofactors)} {write.list(r for _, (r,) in zeros)}"
-    if low:
-        rule += f" [{'; '.join(write.part(part, [known[k][1][0] for k in part.of], K) for part in parts)}]"
-    given_known = _all(_all(f"K{k}" for k in part.of) for part in parts) if low else ""
-    told = [f"{write.sum(r)} = 0" for _, (r,) in zeros] + [f"0 <= {write.sum(g)}" for _, (g,) in known.values()]
+    fractions = chain(*(c.terms.values() for c in cofactors), *(row for part in parts for row in part.gram))
+    K = lcm(*(x.denominator for x in fractions))
+    relations, sides = [r for _, (r,) in zeros], {k: g for k, (_, (g,)) in known.items()}
+    polys = [p, *low, *relations, *sides.values(), *cofactors, *(x for part in parts for x in part.z)]
+    write = Writer(_names({name for q in polys for name in q.names}))
+    variables, hypotheses = list(write.names.values()), [f"Z{k}" for k in range(len(zeros))]
+    told = [*(f"{write.sum(r)} = 0" for r in relations), *(f"0 <= {write.sum(g)}" for g in sides.values())]
     told.append(f"{write.sum(low[0])} <= {write.sum(p)}" if low else f"{write.sum(p)} = 0")
-    variables, hypotheses = " ".join(write.names.values()), [f"Z{k}" for k in range(len(zeros))]
-    names = " ".join([variables, *hypotheses, *(f"K{k}" for k in known)])
-    return (
-        f"{f'forall {variables} : R, ' if variables else ''}{' -> '.join(told)}.\nProof.\n  intros {names}.\n  refine ("
-        f"{'exceeds' if low else 'vanishes'} [{variables.replace(' ', '; ')}] {rule}%Z _ {_all(hypotheses)} {given_known}).\n"
-        "  vm_cast_no_check (eq_refl true).\nQed."
-    )
+    rule = ["exceeds" if low else "vanishes", f"[{'; '.join(variables)}]", _number(K), *map(write.terms, [p, *low])]
+    rule += [write.list(c * K for c in cofactors), write.list(relations)]
+    if low:
+        rule.append(f"[{'; '.join(write.part(part, [sides[k] for k in part.of], K) for part in parts)}]")
+    rule += ["_", _all(hypotheses)]
+    if low:
+        rule.append(_all(_all(f"K{k}" for k in part.of) for part in parts))
+    before = f"forall {' '.join(variables)} : R, " if variables else ""
+    named = " ".join([*variables, *hypotheses, *(f"K{k}" for k in sides)])
+    proof = f"intros {named}.\n  refine ({' '.join(rule)}).\n  vm_cast_no_check (eq_refl true)."
+    return f"{before}{' -> '.join(told)}.\nProof.\n  {proof}\nQed."
 
 
 class Writer:
@@ -197,8 +203,8 @@ def _number(x: Fraction | int) -> str:
 
 
 def _shorter(gram: Rows) -> tuple[int, int]:
-    """Return the largest power m of two, and d, such that the matrix divided by m less d on its diagonal, in whole numbers, is
-    nowhere negative still; zeros where there is none, or numbers are short."""
+    """Return the largest power m of two, and d, such that the matrix divided by m, in whole numbers, less d on its diagonal,
+    is nowhere negative still; zeros where there is none, or numbers are short."""
     bits, d = max((int(x).bit_length() for row in gram for x in row), default=0), len(gram) - 1
     for s in range(bits - 30, 30, -30):
         short = [[Fraction(x // 2**s - d * (i == k)) for k, x in enumerate(row)] for i, row in enumerate(gram)]

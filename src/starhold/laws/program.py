@@ -1,5 +1,5 @@
-"""A law as a program of the proof kernel. Its digest stands in certificates, exported C, runs and the report, and so ties what
-flies to what is proved."""
+"""A law as a program of the proof kernel. Its digest stands in certificates, exported C, runs and the report, and so ties
+what flies to what is proved."""
 
 from __future__ import annotations
 
