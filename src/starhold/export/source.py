@@ -116,7 +116,7 @@ def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
               "Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:",
               "compile with -std=c99 -ffp-contract=off, never with -ffast-math."]  # fmt: skip
     program = law_digest(loop.law, loop.gains, loop.known, loop.period)
-    lines += ["", *([f"The law as certificates name it: program sha256 {program}"] if program else [])]
+    lines += ["", *([f"Program of the law: sha256 {program}"] if program else [])]
     if proof.warning:
         lines += ["*" * 100, *(f"WARNING  {line}" for line in proof.warning.splitlines()), "*" * 100]
     if proof.file:

@@ -33,6 +33,8 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
     from starhold.studies.bodies.rigid_body import certified_loops
 
     content: Any = json.loads(path.read_text(encoding="utf-8"))
+    if not content["claims"] or "certificates" not in content:
+        raise InputError(str(path), "", "no proofs about loops of a scenario", "a certificate that has some, or no --scenario")
     loops: dict[str, ClosedLoop] = {}
     for entry in scenario.laws:
         loop = build(scenario, entry)
