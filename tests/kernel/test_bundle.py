@@ -75,4 +75,6 @@ def test_one_digest_names_the_law_in_certificate_code_run_and_page(scenario, law
     assert sh.simulate(given.with_({"simulation.duration": 10 * loop.period}), law).attrs["law_program"] == digest
     same = starhold("check", "c/certificate.json", "--scenario", scenario, cwd=tmp_path, code=0)
     assert "The programs of its proofs are those of" in same.stdout
-    assert starhold("check", "c/certificate.json", "--scenario", other, cwd=tmp_path, code=1).stdout.startswith("another loop")
+    assert starhold("check", "c/certificate.json", "--scenario", other, cwd=tmp_path, code=1).stdout.startswith(
+        "another loop"
+    )

@@ -124,7 +124,8 @@ def _proofs(content: Any) -> list[Proved]:
     """Return what the kernel proves of a file, each claim of which has to be told of once, in order."""
     told: list[Any] = []
     for given in content["certificates"]:
-        claims, own = (part if isinstance(part, list) else [] for part in (given.get("claims"), given.get("proof")))
+        parts: list[Any] = [given.get(key) if isinstance(given.get(key), list) else [] for key in ("claims", "proof")]
+        claims, own = parts
         told += [claim["proof"] for claim in claims if isinstance(claim, dict) and "proof" in claim] + own
     demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
     if not told:
@@ -192,7 +193,8 @@ def _of_station(name: str, subject: StationSubject, given: Any, proofs: Sequence
             shaped(obligation, OBLIGATION, "an obligation")
     absent = [f"without the {name}" for name in given["subject"]["assumed_away"]]
     demand(not any("proof" in claim for claim in given["claims"]), "a claim of a station tells of a proof")
-    own = [proofs[place] for place in given.get("proof", [])]
+    places: list[int] = given.get("proof", [])
+    own = [proofs[place] for place in places]
     return [Finding(name, *one) for one in station_findings(subject, given, absent, own)]
 
 

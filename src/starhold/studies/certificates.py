@@ -34,7 +34,9 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
 
     content: Any = json.loads(path.read_text(encoding="utf-8"))
     if not content["claims"] or "certificates" not in content:
-        raise InputError(str(path), "", "no proofs about loops of a scenario", "a certificate that has some, or no --scenario")
+        raise InputError(
+            str(path), "", "no proofs about loops of a scenario", "a certificate that has some, or no --scenario"
+        )
     loops: dict[str, ClosedLoop] = {}
     for entry in scenario.laws:
         loop = build(scenario, entry)
