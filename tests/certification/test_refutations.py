@@ -128,7 +128,7 @@ def test_no_proof_is_relabelled_with_the_evidence_of_a_refutation(refuted, proof
     evidences += [{"state": state, "V": 0.0}, {"state": state, "V'": 1e-9}, {"state": state, "torque at rest": 0.0}]
     for content in proofs.values():
         for kind, claim in claims_of(content).items():
-            if claim["outcome"] != "proved":
+            if claim["outcome"] != "proved" or "proof" in claim:
                 continue
             for place in range(len(claim["obligations"])):
                 for evidence in random.choice(np.array(evidences, dtype=object), 2, replace=False):
@@ -165,19 +165,7 @@ def test_v_may_rise_far_away_where_it_proves_a_set_of_its_own():
         assert passed(check(content)) == holds, numbers
 
 
-# --- what proofs tell beside ------------------------------------------------------------------------------------------
-
-
-def test_each_eigenvalue_is_told_as_often_as_it_is_one(proofs):
-    for name in ("lqr-I", "lqr-II-uneven", "pd-0"):
-        content = alone(proofs[name], "sampling")
-        told = claims_of(content)["sampling"]["numbers"]["eigenvalues"]
-        assert passed(check(content))
-        for value in told:
-            assert not passed(check(edited(content, ("sampling", "numbers", "eigenvalues"), [value] * 6))), name
-        others = [*told[1:], told[0]]
-        assert passed(check(edited(content, ("sampling", "numbers", "eigenvalues"), others)))
-        assert not passed(check(edited(content, ("sampling", "numbers", "eigenvalues"), [*told[1:], told[-1]])))
+# --- what is told beside ----------------------------------------------------------------------------------------------
 
 
 def test_two_claims_of_one_kind_or_of_unknown_obligations_fail():
@@ -216,11 +204,6 @@ def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
     loop = loop.with_parts(making.rotors(loop.wheels))
     whole = certify(loop)
     assert whole.claim("wheels").outcome == "proved"
-    write([whole], "made", tmp_path / "c.json")
-    content = alone(json.loads((tmp_path / "c.json").read_text(encoding="utf-8")), "wheels")
-    assert passed(check(content))
-    empty = edited(edited(content, ("wheels", "numbers", "momentum"), 0.0), ("", "wheels", "total_momentum"), 0.0)
-    assert any("the claim is empty" in reason for reason in reasons(empty))
     asked = certify(loop, "", Wanted(momentum=0.0)).claim("wheels")
     assert asked.outcome == "undecided"
     assert "so little momentum" in asked.obligations[0].evidence["reason"]
@@ -262,7 +245,8 @@ def test_mutations_neither_stumble_nor_pass_for_what_they_are_not(refuted, proof
     names = random.choice(list(CASES), 2, replace=False)
     pool = [refuted(name)[0] for name in names]
     for name in random.choice(list(proofs), 2, replace=False):
-        pool.append(alone(proofs[name], random.choice(list(claims_of(proofs[name])))))
+        derived = [kind for kind, claim in claims_of(proofs[name]).items() if "proof" not in claim]
+        pool += [alone(proofs[name], random.choice(derived))] if derived else []
     for content in pool:
         paths = [path for path in spots(content) if "versions" not in path]
         for _ in range(12):

@@ -111,7 +111,7 @@ def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, 
     assert certificate.outcome == "proved"
     main = certificate.claim("convergence")
     assert main.numbers["everything"]
-    assert [o.name for o in main.obligations][-2:] == ["only equilibrium", "half turns repel"]
+    assert [o.name for o in main.obligations][-1] == "rests at half turns only"
     assert certificate.claim("inertia").numbers["tolerance"] is None
     assert "half turns" in sentence(main, certificate.subject)
 
@@ -150,9 +150,6 @@ def test_claims_that_are_not_built_say_so():
     loop = rotors("wheel", EVEN)
     found = certify(loop, "", Wanted(disturbance=1e-4)).claim("disturbance")
     assert found.outcome == "undecided"
-    uneven = certify(rotors("wheel", UNEVEN), "", Wanted(slew_angle=0.1)).claim("wheels")
-    assert uneven.outcome == "undecided"
-    assert "weights" in uneven.obligations[0].evidence["reason"]
     peak = on_wheels(loop, allocation=1)
     assert certify(peak).claim("wheels") is None
     assert certify(peak, "", Wanted(slew_angle=0.1)).claim("wheels").outcome == "undecided"

@@ -10,9 +10,8 @@ import pytest
 from starhold.certification.invariant import builtin_names, certify, load, write
 from starhold.certification.rocq import printed
 from starhold.kernel.check import check
-from tests.kernel.certificates import contents, text
+from tests.kernel.certificates import LAWS, contents, text
 from tests.kernel.stations import flown
-from tests.kernel.test_claims import LAWS
 
 SECONDS = 60
 """What a lemma may take."""

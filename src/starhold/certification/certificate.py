@@ -119,7 +119,7 @@ class Certificate:
     @property
     def law(self) -> str:
         """Return the digest of the law's program that the proofs are about; empty where there are none."""
-        return next((proof.claim["programs"]["law"] for proof in self.proofs), "")
+        return next((proof.claim["programs"]["law"] for proof in self.proofs if "law" in proof.claim["programs"]), "")
 
     def claim(self, kind: str) -> Claim | None:
         """The claim of a kind, where one is made."""

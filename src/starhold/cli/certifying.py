@@ -90,7 +90,7 @@ def check(
         findings = check_file(path)
         whole = passed(findings)
         others = compare_programs(path, load(scenario)) if whole and scenario is not None else []
-    if scenario is not None or any(found.reason == BY_THE_KERNEL for found in findings):
+    if scenario is not None or any(finding.reason == BY_THE_KERNEL for finding in findings):
         print_compared(others, scenario if whole else None)
     print_findings(findings)
     console.print(f"kernel.pyz of this version: sha256 {hashlib.sha256(kernel_bundle()).hexdigest()}", soft_wrap=True)

@@ -91,7 +91,7 @@ def _exported(folder: Path) -> list[str]:
 
 def _lemma_files(folder: Path) -> dict[str, list[int]]:
     """The files for Rocq of a folder's certificates, each with the places of its proofs in certificate.json."""
-    found = dict[str, list[int]]()
+    files = dict[str, list[int]]()
     try:
         content: Any = json.loads((folder / CERTIFICATES).read_text(encoding="utf-8"))
         alone = [{"name": "lemmas", "claims": [], "proof": [*range(len(content["claims"]))]}]
@@ -99,10 +99,10 @@ def _lemma_files(folder: Path) -> dict[str, list[int]]:
             places = [claim["proof"] for claim in given["claims"] if "proof" in claim] + given.get("proof", [])
             name = re.sub(r"\W", "_", given["name"], flags=re.ASCII)
             if places:
-                found[f"{name}.v" if name[:1].isalpha() else f"law_{name}.v"] = places
+                files[f"{name}.v" if name[:1].isalpha() else f"law_{name}.v"] = places
     except (OSError, ValueError, KeyError, TypeError):
         return {}
-    return found
+    return files
 
 
 def write_lemmas(folder: Path) -> list[Path]:

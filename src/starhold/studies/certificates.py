@@ -41,21 +41,23 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
     for entry in scenario.laws:
         loop = build(scenario, entry)
         loops |= certified_loops(scenario, entry, loop) if scenario.body == "rigid-body" else {entry.name: loop}
-    found: list[str] = []
+    differing: list[str] = []
     for given in content["certificates"]:
         station = "proof" in given
         places = given["proof"] if station else [claim["proof"] for claim in given["claims"] if "proof" in claim]
         if places and given["name"] not in loops:
-            found.append(f"{given['name']}: the scenario has no such law")
+            differing.append(f"{given['name']}: the scenario has no such law")
+            continue
+        if not places:
             continue
         loop = loops[given["name"]]
         if station != (loop.body.name == "libration-point"):
-            found.append(f"{given['name']}: the scenario is about another body")
+            differing.append(f"{given['name']}: the scenario is about another body")
             continue
         compare = station_differences if station else differences
-        own = [text for place in places for text in compare(content["claims"][place], loop)]
-        found += [f"{given['name']}: {text}" for text in dict.fromkeys(own)]
-    return found
+        texts = [text for place in places for text in compare(content["claims"][place], loop)]
+        differing += [f"{given['name']}: {text}" for text in dict.fromkeys(texts)]
+    return differing
 
 
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from fractions import Fraction
 
 from ..loops import AttitudeLoop
@@ -26,6 +26,29 @@ def near_rest(cases: Piecewise, rest: dict[str, int]) -> Poly:
     return found[0]
 
 
+def linear_loop(
+    claim: Claim,
+) -> Generator[tuple[str, Obligation], None, tuple[AttitudeLoop, tuple[Rows, Rows], Callable[[Fraction], Rows]]]:
+    """Return the loop near rest on target, with u = -Cw - Kq: it, C and K, and the matrix of a step of a period."""
+    loop = AttitudeLoop(claim, quotients=True)
+    demand(not claim.taken.content, "the loop is taken with nothing")
+    yield from loop.sound()
+    rest: dict[str, int] = loop.on_target | loop.still
+    u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
+    loop.autonomous(u)
+    for k, p in enumerate(u):
+        yield f"rest on target {k}", Vanishes(p.at(rest))
+    C, K = ([[-p.slope(f"{letter}{k}").at(rest).number for k in (1, 2, 3)] for p in u] for letter in "wq")
+    push = [[poly(x).number for x in row] for row in loop.J_inverse]
+    held = times(push, [[*a, *b] for a, b in zip(C, K, strict=True)])
+
+    def step(h: Fraction) -> Rows:
+        upper = plus([[*a, *b] for a, b in zip(scalar(1), scalar(0), strict=True)], held, -h)
+        return upper + plus([[*a, *b] for a, b in zip(scalar(h / 2), scalar(1), strict=True)], held, -h * h / 4)
+
+    return loop, (C, K), step
+
+
 def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues no larger than the
     radius, and with `longest` it is for every period up to that.
@@ -34,24 +57,10 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     solve ((J - h C/2) x^2 + (C - h K/4) x + K/2) v = 0 up to a factor of x: where the three matrices are symmetric and
     positive definite, Re x < 0 and so |z| < 1. The first two are linear
     in h, and so definite for every h up to the longest if they are for this, for at 0 they then are as well."""
-    loop = AttitudeLoop(claim, quotients=True)
-    yield from loop.sound()
-    rest: dict[str, int] = loop.on_target | loop.still
-    u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
-    loop.autonomous(u)
-    for k, p in enumerate(u):
-        yield f"rest on target {k}", Vanishes(p.at(rest))
-    C, K = ([[-p.slope(f"{letter}{k}").at(rest).number for k in (1, 2, 3)] for p in u] for letter in "wq")
+    loop, (C, K), step = yield from linear_loop(claim)
     J: Rows = [[poly(x).number for x in row] for row in loop.J]
-    push = [[poly(x).number for x in row] for row in loop.J_inverse]
     h, radius = claim.numbers["period"], claim.numbers["radius"]
     longest, other = claim.numbers.get("longest"), claim.numbers.get("other")
-    held = times(push, [[*a, *b] for a, b in zip(C, K, strict=True)])
-
-    def step(h: Fraction) -> Rows:
-        upper = plus([[*a, *b] for a, b in zip(scalar(1), scalar(0), strict=True)], held, -h)
-        return upper + plus([[*a, *b] for a, b in zip(scalar(h / 2), scalar(1), strict=True)], held, -h * h / 4)
-
     yield "step", Contracts(step(h), radius)
     yield "radius", Exceeds(Fraction(1), radius)
     said = (
@@ -66,6 +75,5 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     if other is not None:
         yield "another step", Contracts(step(other))
         said += f", and it is stable for a period of {below(other)} s"
-    demand(not claim.taken.content, "the loop is taken with nothing")
     assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
     return Statement(said, (*assumptions, "no-outside-torque", "target-at-rest", "no-wheels", "linear-motion"), "sampling")
