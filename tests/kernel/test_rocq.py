@@ -4,12 +4,16 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
+from fractions import Fraction
 
 import pytest
 
 from starhold.certification.invariant import builtin_names, certify, load, write
 from starhold.certification.rocq import printed
 from starhold.kernel.check import check
+from starhold.kernel.reading import Told
+from starhold.kernel.rules import Persists
 from tests.kernel.certificates import LAWS, contents, text
 from tests.kernel.stations import flown
 
@@ -62,6 +66,16 @@ def test_rocq_refuses_evidence_that_does_not_show_it(small, tmp_path):
     number = re.compile(r"<= \((\d+)\)").search(lemmas, place)[1]
     other = lemmas[:place] + lemmas[place:end].replace(number, f"-{number}") + lemmas[end:]
     assert "Cannot" in (told := accepted(other, tmp_path)) or "unify" in told or "type" in told
+
+
+def test_rocq_accepts_that_motions_persist(small, tmp_path):
+    A, P = [[Fraction(3, 2), Fraction(1, 3)], [Fraction(0), Fraction(1, 2)]], [["1", "1/3"], ["1/3", "1/9"]]
+    rule = Persists(A)
+    rule.check(P)
+    claim = replace(small[0].claim, evidence=Told("evidence", {"step": P}))
+    lemmas = printed([replace(small[0], claim=claim, obligations=(("step", rule),))])
+    assert lemmas.count("\nLemma claim0_") == 2
+    assert accepted(lemmas, tmp_path) == ""
 
 
 @pytest.mark.slow

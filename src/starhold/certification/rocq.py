@@ -12,9 +12,11 @@ from itertools import chain
 from math import lcm, prod
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from starhold.kernel import rules
 from starhold.kernel.check import Proved
-from starhold.kernel.numbers import Account, Rows, definite, matrix, plus, rational, scalar, times, transpose
+from starhold.kernel.numbers import Account, Rows, definite, demand, matrix, plus, rational, scalar, times, transpose
 from starhold.kernel.polynomials import Poly, apply, dot, poly, read_poly, total, var
 
 WORDS = {
@@ -89,6 +91,8 @@ def lemmas(o: rules.Obligation, evidence: Any) -> Iterator[Lemma]:
         yield _form(o.a)
     elif isinstance(o, rules.Contracts):
         yield from _contracting(o, matrix(evidence, len(o.A), len(o.A)))
+    elif isinstance(o, rules.Persists):
+        yield from _persisting(o.A, matrix(evidence, len(o.A), len(o.A)))
     else:
         raise NotImplementedError(f"{type(o).__name__} has no lemma")
 
@@ -112,6 +116,23 @@ def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma]:
         falls = plus([[square * b for b in row] for row in P], times(transpose(o.A), PA), -1)
         turned = [-(a + b) for a, b in zip(Py, apply(P, Ax), strict=True)]
         yield _form(falls, square * dot(x, Px) - dot(y, Py), turned, zeros)
+
+
+def _persisting(A: Rows, P: Rows) -> Iterator[Lemma]:
+    """Yield that where y = Ax the form y'Py is no less than x'Px, and that this is positive at some x."""
+    x, y = _vector("x", len(P)), _vector("y", len(P))
+    Ax, Px, Py = apply(A, x), apply(P, x), apply(P, y)
+    turned = [a + b for a, b in zip(Py, apply(P, Ax), strict=True)]
+    zeros = [b - a for a, b in zip(Ax, y, strict=True)]
+    gains = plus(times(transpose(A), times(P, A)), P, -1)
+    yield Lemma(dot(y, Py) - dot(x, Px), Poly({}), turned, zeros, (), [Part([], x, gains)])
+    largest: Any = np.linalg.eigh(np.array([[float(p) for p in row] for row in P]))[1][:, -1]
+    v = [poly(Fraction(float(part))) for part in largest]
+    near = [a - b for a, b in zip(x, v, strict=True)]
+    sums = [a + b for a, b in zip(Px, apply(P, v), strict=True)]
+    low = dot(v, apply(P, v))
+    demand(low.number > 0, "no state was found at which a form is positive")
+    yield Lemma(dot(x, Px), low, sums, near)
 
 
 def _least(gram: Rows, count: int) -> tuple[Fraction, Rows]:

@@ -19,16 +19,16 @@ from starhold.trace.straight_line import labelled, straight_line
 def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: str) -> dict[str, dict[str, Any]]:
     """Return the programs by role: the field, the law, how its control is limited, and what it declares to make attractive:
     errors that vanish with their V, or a place of rest."""
-    state = ASKED["libration-point"]
+    measurement = ASKED["libration-point"]
     programs = {
         "field": straight_line(nonlinear if full else linear, position=ZERO, velocity=ZERO, plant=craft),
         "law": law_program(law, gains, craft, 0.0),
         "limited": straight_line(LIMITS[limit], command=ZERO, limit=0.0),
     }
     if errors := law.hook("errors"):
-        programs["errors"] = straight_line(errors, measurement=state, gains=gains)
+        programs["errors"] = straight_line(errors, measurement=measurement, gains=gains)
     if law.lyapunov is not None:
-        programs["lyapunov"] = straight_line(law.lyapunov, measurement=state, gains=gains, craft=craft)
+        programs["lyapunov"] = straight_line(law.lyapunov, measurement=measurement, gains=gains, craft=craft)
     if rest := law.hook("rest"):
         programs["rest"] = straight_line(rest, gains=gains)
     return programs
