@@ -72,8 +72,8 @@ def proved_claims(
     subject: Subject, turn: float | None = None, rate: float | None = None
 ) -> tuple[dict[str, Claim], dict[str, str]]:
     """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: what is proved,
-    and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within the limits
-    is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any)."""
+    and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within the
+    limits is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any)."""
     found = find_claims(subject, turn)
     find_refuted(found, turn, rate)
     if not found.claims:

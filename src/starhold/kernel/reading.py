@@ -50,7 +50,8 @@ class Numbers(Told[Fraction]):
 
     def get(self, key: str) -> Fraction | None:
         """Return a bound that may be absent."""
-        return self[key] if key in self else None
+        found = super().get(key)
+        return None if found is None else _bound(found)
 
     def coordinate(self, key: str) -> Fraction:
         """Return a number that may have either sign."""
