@@ -1,7 +1,5 @@
 """The region of attraction of the modal law: what is claimed, attacked by states that nobody chose."""
 
-import math
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize

@@ -50,8 +50,7 @@ class Numbers(Told[Fraction]):
 
     def get(self, key: str) -> Fraction | None:
         """Return a bound that may be absent."""
-        found = super().get(key)
-        return None if found is None else _bound(found)
+        return self[key] if key in self.content else None
 
     def coordinate(self, key: str) -> Fraction:
         """Return a number that may have either sign."""
