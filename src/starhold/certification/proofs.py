@@ -72,7 +72,7 @@ def proved_claims(
     subject: Subject, turn: float | None = None, rate: float | None = None
 ) -> tuple[dict[str, Claim], dict[str, str]]:
     """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: what is proved,
-    and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within the limits
+    and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within limits
     is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any)."""
     found = find_claims(subject, turn)
     find_refuted(found, turn, rate)
@@ -80,7 +80,9 @@ def proved_claims(
         return {}, found.failed
     content = certificate(found.programs, found.claims)
     claims = [made(proved, given, found) for proved, given in zip(check(json.dumps(content)), found.claims, strict=True)]
-    return {claim.kind: claim for claim in reversed(claims)}, found.failed
+    # What is refuted is what was asked for, where less may be proved.
+    against = [claim for claim in claims if claim.outcome == "refuted"]
+    return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
 
 
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
