@@ -1,6 +1,5 @@
 """The checker: what it accepts, and what of another loop it does not."""
 
-import json
 import math
 from dataclasses import replace
 

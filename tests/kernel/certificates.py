@@ -17,6 +17,16 @@ LQR = {"type": "lqr", "form": "II", "q": [0.01] * 3 + [0.004] * 3, "r": [50.0, 6
 PD = {"type": "pd", "k_rate": 0.09, "k_attitude": 0.009}
 BY_HAND = {"strict": LQR, "norm": PD}
 
+LAWS = [
+    ("three-laws", "lyapunov"), ("cubesat-slew", "lyapunov"), ("three-laws", "sliding"), ("cubesat-slew", "pd"),
+    ("cubesat-slew", "sliding"), ("flexible-slew", "pd"), ("flexible-slew", "stiff"), ("geostationary", "pd"),
+    ("geostationary", "matrix-pd"), ("geostationary", "lyapunov"), ("geostationary", "sliding"), ("wheels-orbital", "wheel"),
+    ("wheels-orbital", "uncompensated"), ("cubesat-nadir", "wheel"), ("cubesat-nadir", "lyapunov"),
+    ("landing", "fit"), ("landing", "rounded"), ("landing", "searched"), ("landing-limits", "published"),
+    ("landing-limits", "own-fit"),
+]  # fmt: skip
+"""Laws of built-in scenarios of which something is proved."""
+
 
 @cache
 def found(scenario, law):

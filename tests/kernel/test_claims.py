@@ -13,7 +13,7 @@ from starhold.certification.evidence.bundle import kernel_bundle
 from starhold.kernel.check import check, main
 from starhold.kernel.numbers import WORK, Account
 from starhold.kernel.sentences import ASSUMPTIONS
-from tests.kernel.certificates import contents, found, text
+from tests.kernel.certificates import LAWS, contents, found, text
 from tests.kernel.oracle import Oracle, number
 from tests.tiers import leading
 
@@ -29,14 +29,6 @@ KINDS = {
 LEFT = {
     "disturbance": "not yet among the theorems",
 }
-LAWS = [
-    ("three-laws", "lyapunov"), ("cubesat-slew", "lyapunov"), ("three-laws", "sliding"), ("cubesat-slew", "pd"),
-    ("cubesat-slew", "sliding"), ("flexible-slew", "pd"), ("flexible-slew", "stiff"), ("geostationary", "pd"),
-    ("geostationary", "matrix-pd"), ("geostationary", "lyapunov"), ("geostationary", "sliding"), ("wheels-orbital", "wheel"),
-    ("wheels-orbital", "uncompensated"), ("cubesat-nadir", "wheel"), ("cubesat-nadir", "lyapunov"),
-    ("landing", "fit"), ("landing", "rounded"), ("landing", "searched"), ("landing-limits", "published"),
-    ("landing-limits", "own-fit"),
-]  # fmt: skip
 
 
 @pytest.fixture(scope="session")

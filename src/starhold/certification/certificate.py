@@ -108,6 +108,19 @@ class Certificate:
         ends = any(claim.kind not in BESIDE for claim in self.claims)
         return "proved" if ends and found == {"proved"} else "undecided"
 
+    @property
+    def proofs(self) -> list[Proof]:
+        """Return the proofs in the order in which a file holds them: those of the claims, and those told for all of them."""
+        whole = self.proof or {"claims": [], "programs": {}}
+        found = [claim.proof for claim in self.claims if claim.proof is not None]
+        roles = [(claim, claim["programs"].values()) for claim in whole["claims"]]
+        return found + [Proof(claim, {name: whole["programs"][name] for name in names}) for claim, names in roles]
+
+    @property
+    def law(self) -> str:
+        """Return the digest of the law's program that the proofs are about; empty where there are none."""
+        return next((proof.claim["programs"]["law"] for proof in self.proofs if "law" in proof.claim["programs"]), "")
+
     def claim(self, kind: str) -> Claim | None:
         """The claim of a kind, where one is made."""
         return next((claim for claim in self.claims if claim.kind == kind), None)
@@ -118,7 +131,7 @@ def write(certificates: Sequence[Certificate], scenario: str, path: Path) -> Non
     stand there as the kernel reads them; what it does not read stands beside them."""
     versions = {"starhold": __version__, "python": platform.python_version()}
     versions |= {name: metadata.version(name) for name in ("python-flint", "numpy", "scipy")}
-    proofs = [claim.proof for certificate in certificates for claim in certificate.claims if claim.proof is not None]
+    proofs = [proof for certificate in certificates for proof in certificate.proofs]
     places = count()
     content = {
         "format": FORMAT,
@@ -142,5 +155,5 @@ def _plain(certificate: Certificate, places: Iterator[int]) -> dict[str, Any]:
             claims.append(shown | {part: value for part, value in asdict(claim).items() if part != "proof"})
     kinds = [claim["kind"] for claim in claims]
     about = {"outcome": certificate.outcome, "subject": certificate.subject, "kinds": kinds}
-    proof = {} if certificate.proof is None else {"proof": certificate.proof}
+    proof = {} if certificate.proof is None else {"proof": [next(places) for _ in certificate.proof["claims"]]}
     return {"name": certificate.name, **about, "claims": claims, **proof}

@@ -13,6 +13,7 @@ from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
+from starhold.certification.evidence.attitude import SLIDING
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import needed, torque_limit
@@ -21,8 +22,7 @@ from starhold.certification.openness import bounded_torque, named
 from starhold.certification.proofs import proved_claims
 from starhold.certification.sampling import APART, sampling
 from starhold.certification.saturation import FREE, saturation
-from starhold.certification.sliding import surface_claim
-from starhold.certification.subject import Subject, described, make_subject
+from starhold.certification.subject import Subject, above, described, make_subject
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
@@ -81,8 +81,9 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
         else:
             if loop.law.hook("single_root") is not None:
                 claims.append(proved.get("region") or _undecided("region", {}, subject, failed[ISOTROPIC]))
-            slides = proved.get("sliding") or (surface_claim(subject) if loop.wheels is None else None)
-            claims.extend([] if slides is None else [slides])
+            if loop.law.hook("surface") is not None and loop.wheels is None:
+                torque = {"torque": [above(m + subject.disturbance) for m in subject.modelled]}
+                claims.append(proved.get("sliding") or _undecided("sliding", torque, subject, failed[SLIDING]))
             claims.extend(_unshown(subject, wanted))
         sampled = proved.get("sampling") or sampling(Motion(subject))
         claims.extend([] if sampled is None else [sampled])
@@ -134,6 +135,8 @@ def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
 def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
     limits = {"torque-limit": (), "wheels": FREE}
     assumptions = assumed(subject, limits=limits[kind]) if kind in limits else assumed(subject)
+    if kind == "sliding":
+        assumptions = assumed(subject, outside=("torque from outside bounded on each axis",))
     if kind == "inertia":
         assumptions = told(subject, numbers["tolerance"])
     return Claim(kind, numbers, {}, assumptions, (Obligation("form", EXACT, "undecided", {"reason": reason}),))

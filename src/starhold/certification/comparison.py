@@ -9,6 +9,7 @@ from typing import Any
 
 from starhold.certification.evidence.attitude import CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
 from starhold.certification.evidence.refuted import REFUTING
+from starhold.certification.evidence.station import Station
 from starhold.certification.subject import make_subject
 from starhold.kernel.loops import HYSTERESIS, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
@@ -20,6 +21,21 @@ def differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
     """Return how a claim, which the kernel has checked, is about another loop than this one; nothing where it is not."""
     own = Loop(make_subject(loop))
     return [*_programs(claim, own), *_numbers(claim, own), *_words(claim, own)]
+
+
+def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
+    """Return the same of a claim about keeping a craft near a libration point."""
+    own, limit = Station(loop).claim(claim["theorem"]), loop.saturation_limit()
+    roles = [role for role, digest in own["programs"].items() if claim["programs"][role] != digest]
+    names = [n for n, x in claim["subject"].items() if n not in own["subject"] or rational(own["subject"][n]) != rational(x)]
+    kinds = {"limit.axis": "axis", "limit.norm": "norm", "limit": "axis"}
+    told = {kinds[name]: rational(x) for name, x in claim["numbers"].items() if name in kinds}
+    other = any(kind != loop.limit or not isfinite(limit) or x != Fraction(limit) for kind, x in told.items())
+    return [
+        *(f"the program of the {role} is another one" for role in roles),
+        *(f"{name} is another number" for name in names),
+        *(["the limit is another one"] if other else []),
+    ]
 
 
 def _programs(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:

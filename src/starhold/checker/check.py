@@ -121,10 +121,11 @@ def _known(content: Any) -> None:
 
 def _proofs(content: Any) -> list[Proved]:
     """Return what the kernel proves of a file, each claim of which has to be told of once, in order."""
-    listed: list[Any] = [given["claims"] for given in content["certificates"] if isinstance(given.get("claims"), list)]
-    told: list[Any] = [
-        claim["proof"] for claims in listed for claim in claims if isinstance(claim, dict) and "proof" in claim
-    ]
+    told: list[Any] = []
+    for given in content["certificates"]:
+        parts: list[Any] = [given.get(key) if isinstance(given.get(key), list) else [] for key in ("claims", "proof")]
+        claims, own = parts
+        told += [claim["proof"] for claim in claims if isinstance(claim, dict) and "proof" in claim] + own
     demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
     if not told:
         demand(not content["programs"], "there are programs without a proof")
@@ -147,7 +148,7 @@ def _certificate(given: Mapping[str, Any], proofs: Sequence[Proved]) -> Iterator
         yield Finding(name, "", "", "fails", fault)
         return
     if isinstance(subject, StationSubject):
-        found, fault = _guarded(partial(_of_station, name, subject, given))
+        found, fault = _guarded(partial(_of_station, name, subject, given, proofs))
         yield from found or []
         if fault:
             yield Finding(name, "", "", "fails", fault)
@@ -184,13 +185,16 @@ def _of_unknown_body(given: Any) -> None:
     demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
 
 
-def _of_station(name: str, subject: StationSubject, given: Any) -> list[Finding]:
+def _of_station(name: str, subject: StationSubject, given: Any, proofs: Sequence[Proved]) -> list[Finding]:
     for claim in given["claims"]:
         shaped(claim, CLAIM, "the claim")
         for obligation in claim["obligations"]:
             shaped(obligation, OBLIGATION, "an obligation")
     absent = [f"without the {name}" for name in given["subject"]["assumed_away"]]
-    return [Finding(name, *one) for one in station_findings(subject, given, absent)]
+    demand(not any("proof" in claim for claim in given["claims"]), "a claim of a station tells of a proof")
+    places: list[int] = given.get("proof", [])
+    own = [proofs[place] for place in places]
+    return [Finding(name, *one) for one in station_findings(subject, given, absent, own)]
 
 
 def _subject(given: Any) -> LoopSubject | StationSubject:

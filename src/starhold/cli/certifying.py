@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from starhold.cli.arguments import FAILED_CHECK, REFUTED, UNDECIDED, CertifyOutput, Force, OneLaw, ScenarioFile, Unstable
+from starhold.cli.arguments import (
+    FAILED_CHECK,
+    REFUTED,
+    UNDECIDED,
+    CertifyOutput,
+    Force,
+    OneLaw,
+    Rocq,
+    ScenarioFile,
+    Unstable,
+)
 
 
 def certify(
@@ -15,6 +25,7 @@ def certify(
     law: OneLaw = None,
     output: CertifyOutput = None,
     force: Force = False,
+    rocq: Rocq = False,
     allow_unstable: Unstable = False,
 ) -> None:
     """Prove what each law guarantees on this spacecraft: a table and certificate.json.
@@ -24,7 +35,7 @@ def certify(
     from starhold.certification.wording import recheck
     from starhold.cli.console import console
     from starhold.cli.show_certificates import print_certificate
-    from starhold.report.results import open_folder, write_proofs
+    from starhold.report.results import open_folder, write_lemmas, write_proofs
     from starhold.scenario.reading import load
     from starhold.studies.certificates import certify_scenario
 
@@ -36,6 +47,8 @@ def certify(
     certificates = [one.certificate for one in tried]
     path = write_proofs(certificates, scenario.name, folder)
     console.print(f"Certificate: {path}. Re-check it: {recheck(certificates, path)}", soft_wrap=True)
+    for file_of_lemmas in write_lemmas(folder) if rocq else ():
+        console.print(f"For Rocq: coqc {file_of_lemmas}", soft_wrap=True)
     outcomes = {certificate.outcome for certificate in certificates}
     if outcomes != {"proved"}:
         raise typer.Exit(REFUTED if "refuted" in outcomes else UNDECIDED)
@@ -56,10 +69,13 @@ def check(
 
     Proofs are checked by the kernel, which kernel.pyz beside the file holds too; other claims are derived again.
     """
+    import hashlib
     from contextlib import ExitStack
 
+    from starhold.certification.evidence.bundle import kernel_bundle
     from starhold.checker import check_file, passed
     from starhold.checker.check import BY_THE_KERNEL
+    from starhold.cli.console import console
     from starhold.cli.show_certificates import print_compared, print_findings
     from starhold.conformance.suite import find_law
     from starhold.laws.catalogue import adopted
@@ -74,8 +90,9 @@ def check(
         findings = check_file(path)
         whole = passed(findings)
         others = compare_programs(path, load(scenario)) if whole and scenario is not None else []
-    if any(finding.reason == BY_THE_KERNEL for finding in findings):
+    if scenario is not None or any(finding.reason == BY_THE_KERNEL for finding in findings):
         print_compared(others, scenario if whole else None)
     print_findings(findings)
+    console.print(f"kernel.pyz of this version: sha256 {hashlib.sha256(kernel_bundle()).hexdigest()}", soft_wrap=True)
     if others or not whole:
         raise typer.Exit(FAILED_CHECK)

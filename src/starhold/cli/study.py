@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from starhold.cli.arguments import REFUTED, UNDECIDED, Force, Unstable, results_in
+from starhold.cli.arguments import REFUTED, UNDECIDED, Force, Rocq, Unstable, results_in
 from starhold.errors import InputError
 from starhold.report.commands import Command, command
 
@@ -21,10 +21,12 @@ def command_of(name: str) -> Any:
     """The command of a name."""
     declared = command(name)
 
-    def run(output: Path | None = None, force: bool = False, allow_unstable: bool = False, **given: Any) -> None:
+    def run(
+        output: Path | None = None, force: bool = False, allow_unstable: bool = False, rocq: bool = False, **given: Any
+    ) -> None:
         from starhold.cli.console import console
         from starhold.cli.show import print_blocks
-        from starhold.report.results import open_folder, write_part, write_result
+        from starhold.report.results import open_folder, write_lemmas, write_part, write_result
         from starhold.scenario.reading import load
 
         file_options = {
@@ -53,6 +55,7 @@ def command_of(name: str) -> Any:
         for key, path in paths.items():
             kind = declared.options[key].file
             written["Table" if kind == "csv" else key.capitalize()] = write_part(result, kind, path)
+        written |= {f"For Rocq, coqc {path.name}": path for path in (write_lemmas(folder) if rocq else ())}
         if written:
             console.print(". ".join(f"{what}: {path}" for what, path in written.items()), soft_wrap=True)
         if result.outcome in CODES:
@@ -61,7 +64,7 @@ def command_of(name: str) -> Any:
     kinds = _parameters(declared)
     defaults: dict[str, Any] = {key: option.default for key, option in declared.options.items()}
     defaults |= {"file": inspect.Parameter.empty} if declared.listed is None else {}
-    defaults |= {"force": False, "allow_unstable": False}
+    defaults |= {"force": False, "allow_unstable": False, "rocq": False}
     parameters = [
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=defaults.get(key))
         for key, kind in kinds.items()
@@ -88,6 +91,8 @@ def _parameters(declared: Command) -> dict[str, Any]:
     if declared.suffix:
         subject = "SCENARIO" if declared.read is None else "SYSTEM"
         kinds["output"] = Annotated[Path | None, results_in(f"{subject}-{declared.suffix}")]
+    if declared.proofs:
+        kinds["rocq"] = Rocq
     if "output" in kinds:
         kinds["force"] = Force
     return kinds | ({"allow_unstable": Unstable} if declared.unstable else {})

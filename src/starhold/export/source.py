@@ -14,6 +14,7 @@ from starhold.algebra.structured import Buffer
 from starhold.export.code import Code
 from starhold.export.proof import UNPROVED, Proof
 from starhold.export.types import Member, Type, comment
+from starhold.laws.program import law_digest
 from starhold.parts.contract import fields
 from starhold.trace.c99 import GUARD
 from starhold.trace.source import TIE
@@ -114,7 +115,8 @@ def _banner(code: Code, scenario: str, law: str, proof: Proof) -> list[str]:
     lines += ["", f"A step does at most {done}.",
               "Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:",
               "compile with -std=c99 -ffp-contract=off, never with -ffast-math."]  # fmt: skip
-    lines += [""]
+    program = law_digest(loop.law, loop.gains, loop.known, loop.period)
+    lines += ["", *([f"Program of the law: sha256 {program}"] if program else [])]
     if proof.warning:
         lines += ["*" * 100, *(f"WARNING  {line}" for line in proof.warning.splitlines()), "*" * 100]
     if proof.file:

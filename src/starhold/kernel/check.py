@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from .numbers import Account, RefusedError, demand
 from .reading import BYTES, Claim, read_certificate
+from .rules import Obligation
 from .sentences import Statement
 from .theorems import THEOREMS
 
@@ -15,11 +16,16 @@ UNREAD = "The programs were not compared with those of a scenario; what stands u
 
 @dataclass(frozen=True)
 class Proved:
-    """A claim that is proved, what it says, and the obligations that were checked, each with the name of its rule."""
+    """A claim that is proved, what it says, and the obligations that were checked."""
 
     claim: Claim
     statement: Statement
-    shown: tuple[tuple[str, str], ...]
+    obligations: tuple[tuple[str, Obligation], ...]
+
+    @property
+    def shown(self) -> tuple[tuple[str, str], ...]:
+        """The names of the obligations, each with the name of its rule."""
+        return tuple((name, type(obligation).__name__) for name, obligation in self.obligations)
 
 
 def check(text: str) -> list[Proved]:
@@ -31,7 +37,7 @@ def check(text: str) -> list[Proved]:
 def prove(claim: Claim) -> Proved:
     """Check each obligation of a claim's theorem; RefusedError where one is not shown."""
     demand(claim.theorem in THEOREMS, "there is no such theorem")
-    needed, shown = THEOREMS[claim.theorem](claim), list[tuple[str, str]]()
+    needed, shown = THEOREMS[claim.theorem](claim), list[tuple[str, Obligation]]()
     while True:
         try:
             name, obligation = next(needed)
@@ -42,7 +48,7 @@ def prove(claim: Claim) -> Proved:
             obligation.check(claim.evidence.get(name))
         except RefusedError as fault:
             raise RefusedError(f"{claim.theorem}, {name}: {fault}") from None
-        shown.append((name, type(obligation).__name__))
+        shown.append((name, obligation))
 
 
 def main(arguments: list[str]) -> int:

@@ -10,32 +10,25 @@ from starhold.algebra.vector import ZERO
 from starhold.kernel.check import Proved
 from starhold.kernel.sentences import ASSUMPTIONS
 from starhold.laws.catalogue import Law
-from starhold.laws.point import PointMeasurement
+from starhold.laws.program import ASKED, law_program
 from starhold.parts.actuators.limits import LIMITS
 from starhold.parts.bodies.libration_point import Libration, linear, nonlinear
 from starhold.trace.straight_line import labelled, straight_line
-
-ASKED = PointMeasurement(ZERO, ZERO, 0.0, 0.0)
-"""A measurement of which every number is an input."""
 
 
 def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: str) -> dict[str, dict[str, Any]]:
     """Return the programs by role: the field, the law, how its control is limited, and what it declares to make attractive:
     errors that vanish with their V, or a place of rest."""
-    memory = law.remember(gains, craft, 0.0)
-
-    def control(measurement: PointMeasurement, gains: Any, craft: Any) -> Any:
-        return law.command(measurement, gains, craft, memory)[0]
-
+    measurement = ASKED["libration-point"]
     programs = {
         "field": straight_line(nonlinear if full else linear, position=ZERO, velocity=ZERO, plant=craft),
-        "law": straight_line(control, measurement=ASKED, gains=gains, craft=craft),
+        "law": law_program(law, gains, craft, 0.0),
         "limited": straight_line(LIMITS[limit], command=ZERO, limit=0.0),
     }
     if errors := law.hook("errors"):
-        programs["errors"] = straight_line(errors, measurement=ASKED, gains=gains)
+        programs["errors"] = straight_line(errors, measurement=measurement, gains=gains)
     if law.lyapunov is not None:
-        programs["lyapunov"] = straight_line(law.lyapunov, measurement=ASKED, gains=gains, craft=craft)
+        programs["lyapunov"] = straight_line(law.lyapunov, measurement=measurement, gains=gains, craft=craft)
     if rest := law.hook("rest"):
         programs["rest"] = straight_line(rest, gains=gains)
     return programs

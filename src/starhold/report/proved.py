@@ -79,6 +79,10 @@ def _law(flight: Flight, number: int, place: int) -> str:
     if not claims:
         why = escape(unclaimed(certificate.subject))
         claims = f'<p class="note">Nothing is claimed, so nothing is proved: {why}.</p>'
+    if certificate.law:
+        claims += (
+            f'<p class="note">Program of the law, in its C code and its run too: SHA-256 <code>{certificate.law}</code>.</p>'
+        )
     return f'<section class="law">{head}{claims}</section>\n'
 
 

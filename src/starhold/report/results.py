@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -66,6 +67,8 @@ def _clear(folder: Path) -> None:
         (folder / Path(name).name / "run.nc").unlink(missing_ok=True)
         if (folder / name).is_dir() and not any((folder / name).iterdir()):
             (folder / name).rmdir()
+    for name in _lemma_files(folder):
+        (folder / name).unlink(missing_ok=True)
     for name in _exported(folder):
         (folder / name).unlink(missing_ok=True)
         for above in (folder / name).parents:
@@ -84,6 +87,35 @@ def _exported(folder: Path) -> list[str]:
         return [str(name) for name in names if not name.is_absolute() and ".." not in name.parts]
     except (OSError, ValueError, KeyError, TypeError):
         return []
+
+
+def _lemma_files(folder: Path) -> dict[str, list[int]]:
+    """The files for Rocq of a folder's certificates, each with the places of its proofs in certificate.json."""
+    files = dict[str, list[int]]()
+    try:
+        content: Any = json.loads((folder / CERTIFICATES).read_text(encoding="utf-8"))
+        alone = [{"name": "lemmas", "claims": [], "proof": [*range(len(content["claims"]))]}]
+        for given in content.get("certificates", alone):
+            places = [claim["proof"] for claim in given["claims"] if "proof" in claim] + given.get("proof", [])
+            name = re.sub(r"\W", "_", given["name"], flags=re.ASCII)
+            if places:
+                files[f"{name}.v" if name[:1].isalpha() else f"law_{name}.v"] = places
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    return files
+
+
+def write_lemmas(folder: Path) -> list[Path]:
+    """Write what the kernel checks of a folder's certificate.json as lemmas for Rocq, a file for each certificate in it."""
+    from starhold.certification.rocq import printed
+    from starhold.kernel.check import check
+
+    files = _lemma_files(folder)
+    proved = check((folder / CERTIFICATES).read_text(encoding="utf-8")) if files else []
+    for name, places in files.items():
+        with atomic_write(folder / name) as hidden:
+            hidden.write_text(printed([proved[place] for place in places]), encoding="utf-8")
+    return [folder / name for name in files]
 
 
 def write_run(run: Recording, path: Path) -> None:
@@ -121,6 +153,8 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
         written["Certificate"] = folder / CERTIFICATES
         with atomic_write(written["Certificate"]) as hidden:
             result.certificate(hidden)
+        if json.loads(written["Certificate"].read_text(encoding="utf-8"))["claims"]:
+            _write_kernel(folder)
     if result.figure is not None:
         written["Picture"] = write_part(result, "png", folder / f"{name}.png")
     return written
@@ -141,15 +175,19 @@ def write_part(result: commands.Result, kind: str, path: Path) -> Path:
 
 def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:
     """Certificates as one file of a folder, and beside it the kernel that checks those with proofs; returns its path."""
-    from starhold.certification.evidence.bundle import kernel_bundle
-
     path = folder / CERTIFICATES
     with atomic_write(path) as hidden:
         write_certificates(certificates, name, hidden)
-    if any(claim.proof for certificate in certificates for claim in certificate.claims):
-        with atomic_write(folder / KERNEL) as hidden:
-            hidden.write_bytes(kernel_bundle())
+    if any(certificate.proofs for certificate in certificates):
+        _write_kernel(folder)
     return path
+
+
+def _write_kernel(folder: Path) -> None:
+    from starhold.certification.evidence.bundle import kernel_bundle
+
+    with atomic_write(folder / KERNEL) as hidden:
+        hidden.write_bytes(kernel_bundle())
 
 
 def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:

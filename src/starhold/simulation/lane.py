@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from starhold.algebra.quantity import Quantity, quantities
 from starhold.algebra.structure import flatten
 from starhold.errors import InputError
+from starhold.laws.program import law_digest
 from starhold.loop.closed_loop import Carry, ClosedLoop, is_recorded
 from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, one, state_of
 
@@ -172,6 +173,7 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
     attrs: dict[str, Any] = {
         "body": loop.body.name,
         "law": loop.law.name,
+        "law_program": law_digest(loop.law, loop.gains, loop.known, loop.period),
         "control_period": loop.period,
         "record_every": record_every,
         f"{loop.body.module.COMMAND}_limit": loop.saturation_limit(),

@@ -29,20 +29,33 @@ class Tried(NamedTuple):
 
 def compare_programs(path: Path, scenario: Scenario) -> list[str]:
     """How the proofs of a file that was checked are about other loops than a scenario has; nothing where they are not."""
-    from starhold.certification.comparison import differences
+    from starhold.certification.comparison import differences, station_differences
     from starhold.studies.bodies.rigid_body import certified_loops
 
     content: Any = json.loads(path.read_text(encoding="utf-8"))
+    if not content["claims"] or "certificates" not in content:
+        raise InputError(
+            str(path), "", "no proofs about loops of a scenario", "a certificate that has some, or no --scenario"
+        )
     loops: dict[str, ClosedLoop] = {}
     for entry in scenario.laws:
-        loops |= certified_loops(scenario, entry, build(scenario, entry)) if scenario.body == "rigid-body" else {}
+        loop = build(scenario, entry)
+        loops |= certified_loops(scenario, entry, loop) if scenario.body == "rigid-body" else {entry.name: loop}
     differing: list[str] = []
     for given in content["certificates"]:
-        places = [claim["proof"] for claim in given["claims"] if "proof" in claim]
+        station = "proof" in given
+        places = given["proof"] if station else [claim["proof"] for claim in given["claims"] if "proof" in claim]
         if places and given["name"] not in loops:
             differing.append(f"{given['name']}: the scenario has no such law")
             continue
-        texts = [text for place in places for text in differences(content["claims"][place], loops[given["name"]])]
+        if not places:
+            continue
+        loop = loops[given["name"]]
+        if station != (loop.body.name == "libration-point"):
+            differing.append(f"{given['name']}: the scenario is about another body")
+            continue
+        compare = station_differences if station else differences
+        texts = [text for place in places for text in compare(content["claims"][place], loop)]
         differing += [f"{given['name']}: {text}" for text in dict.fromkeys(texts)]
     return differing
 

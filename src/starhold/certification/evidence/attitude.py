@@ -21,6 +21,7 @@ from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
 from starhold.kernel.rules import Solves, Squares
+from starhold.laws import program
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies import rigid_body
@@ -31,8 +32,7 @@ from starhold.trace.straight_line import labelled, straight_line
 V3, Q4 = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 FULL = (V3, V3, V3)
 NOWHERE: dict[str, int] = dict.fromkeys(("q0", "q1", "q2", "q3", "w1", "w2", "w3"), 0)
-ASKED = Measurement(Q4, V3, V3, V3, V3, V3, V3, 0.0, V3, V3)
-"""A measurement of which every number is an input."""
+ASKED = program.ASKED["rigid-body"]
 TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
 """The other quaternion of the target, and half turns."""
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
@@ -75,22 +75,20 @@ class Loop:
     @cached_property
     def roles(self) -> dict[str, str]:
         """The digests of the programs that every claim is about."""
-        loop, law = self.loop, self.loop.law
-        memory = law.remember(loop.gains, loop.known, loop.period)
+        loop = self.loop
         plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
-
-        def torque(measurement: Any, gains: Any, craft: Any) -> Any:
-            return law.command(measurement, gains, craft, memory)[0]
-
         return {
-            "law": self.add(torque, measurement=ASKED, gains=loop.gains, craft=loop.known),
+            "law": self.keep(program.law_program(loop.law, loop.gains, loop.known, loop.period)),
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
 
     def add(self, equation: Callable[..., Any], **given: Any) -> str:
         """Record a program, and return its digest."""
-        program = straight_line(equation, **given)
+        return self.keep(straight_line(equation, **given))
+
+    def keep(self, program: dict[str, Any]) -> str:
+        """Take a program, and return its digest."""
         self.programs.append(program)
         return digest(program)
 

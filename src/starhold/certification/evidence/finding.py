@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from fractions import Fraction
 from importlib import import_module
@@ -124,7 +125,10 @@ def contracts(o: rules.Contracts) -> list[list[str]]:
     A = np.array([[float(x) for x in row] for row in o.A])
     size = np.eye(len(A))
     solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
-    found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
+    with warnings.catch_warnings():
+        # The kernel decides of what an ill-conditioned matrix gives.
+        warnings.simplefilter("ignore", linalg.LinAlgWarning)
+        found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
     return [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
 
 

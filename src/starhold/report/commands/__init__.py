@@ -124,7 +124,7 @@ class Command(NamedTuple):
     with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
     whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
     command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
-    a scenario and a law, from FILE and options.
+    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq.
     """
 
     summary: str
@@ -140,6 +140,7 @@ class Command(NamedTuple):
     file: str | None = "a scenario file or the name of a built-in scenario"
     listed: Callable[[], Sequence[Block]] | None = None
     read: Callable[..., tuple[Any, ...]] | None = None
+    proofs: bool = False
 
     def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
         """The arguments of `study`: the scenario changed as options say, and the law; or those that `read` gives."""

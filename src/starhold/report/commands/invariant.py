@@ -87,4 +87,5 @@ COMMAND = Command(
     file="a file with a system, or the name of a built-in one; none: list these",
     listed=listed,
     read=read,
+    proofs=True,
 )

@@ -1,0 +1,260 @@
+"""Prints what the kernel checked for Rocq (Coq 8.16 and later): each obligation is a lemma about real numbers, proved from
+its evidence by the rules in rocq.v. Polynomials are multiplied by positive numbers, so that their coefficients are whole."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import reduce
+from importlib import resources
+from itertools import chain
+from math import lcm, prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from starhold.kernel import rules
+from starhold.kernel.check import Proved
+from starhold.kernel.numbers import Account, Rows, definite, demand, matrix, plus, rational, scalar, times, transpose
+from starhold.kernel.polynomials import Poly, apply, dot, poly, read_poly, total, var
+
+WORDS = {
+    *("as", "at", "cofix", "else", "end", "exists", "fix", "for", "forall", "fun", "if", "in", "let", "match", "mod"),
+    *("return", "then", "using", "where", "with", "I", "R", "Z"),
+}
+"""What no variable is called."""
+
+
+class Part(NamedTuple):
+    """Places of polynomials that are not negative, and the sum of squares z'Gz that is a factor of their product."""
+
+    of: Sequence[int]
+    z: Sequence[Poly]
+    gram: Rows
+
+
+class Lemma(NamedTuple):
+    """p >= low, or p = 0 where low is None, wherever the known are not negative and the zeros are zero: p - low is the sum
+    of cofactors times zeros, and of parts."""
+
+    p: Poly
+    low: Poly | None
+    cofactors: Sequence[Poly]
+    zeros: Sequence[Poly]
+    known: Sequence[Poly] = ()
+    parts: Sequence[Part] = ()
+
+
+def printed(proved: Sequence[Proved]) -> str:
+    """Return the text of a file that coqc accepts, with a lemma, or some, for each obligation that was checked."""
+    Account.left = 10**12
+    lines = [resources.files("starhold.certification").joinpath("rocq.v").read_text(encoding="utf-8")]
+    for i, one in enumerate(proved):
+        lines.append(f"(* {_remark(one.statement.written())} *)\n")
+        for k, (name, obligation) in enumerate(one.obligations):
+            lines.append(f"(* {_remark(name)} *)")
+            evidence = one.claim.evidence.content.get(name)
+            for j, text in enumerate(_texts(obligation, evidence)):
+                lines.append(f"Lemma claim{i}_{k}_{j} : {text}\n")
+    return "\n".join(lines)
+
+
+def _texts(o: rules.Obligation, evidence: Any) -> Iterator[str]:
+    if isinstance(o, rules.Exceeds):
+        small, large = (f"{x.numerator} # {x.denominator}" for x in (Fraction(o.small), o.large))
+        yield f"({small} < {large})%Q.\nProof. reflexivity. Qed."
+    else:
+        yield from map(_text, lemmas(o, evidence))
+
+
+def lemmas(o: rules.Obligation, evidence: Any) -> Iterator[Lemma]:
+    """Yield what an obligation says, with its evidence."""
+    if isinstance(o, rules.Vanishes):
+        yield Lemma(o.p, None, _polys(evidence or []), o.modulo)
+    elif isinstance(o, rules.Solves):
+        rows = matrix(evidence["matrix"], len(o.wanted), len(o.given))
+        for p, row, own in zip(o.wanted, rows, evidence["cofactors"], strict=True):
+            yield Lemma(p, None, [*map(poly, row), *(-c for c in _polys(own))], [*o.given, *o.modulo])
+    elif isinstance(o, rules.Squares):
+        known, count = [*o.strict, *o.known], len(evidence["gram"])
+        weights = [rational(x) for x in evidence["multipliers"]]
+        gram, z = matrix(evidence["gram"], count, count), list(o.z[:count])
+        c, rest = _least(gram, o.least)
+        low = dot(weights[: len(o.strict)], o.strict) + c * total(x * x for x in z[: o.least])
+        parts = [Part([k], [poly(1)], [[x]]) for k, x in enumerate(weights) if x and k >= len(o.strict)]
+        yield Lemma(o.p, low, _polys(evidence["cofactors"]), o.modulo, known, [*parts, Part([], z, rest)])
+    elif isinstance(o, rules.Sum):
+        low = dot([rational(x) for x in evidence["numbers"]], o.strict)
+        yield Lemma(o.p, low, _polys(evidence["cofactors"]), o.modulo, o.known, [*map(_part, evidence["parts"])])
+    elif isinstance(o, rules.Definite):
+        yield _form(o.a)
+    elif isinstance(o, rules.Contracts):
+        yield from _contracting(o, matrix(evidence, len(o.A), len(o.A)))
+    elif isinstance(o, rules.Persists):
+        yield from _persisting(o.A, matrix(evidence, len(o.A), len(o.A)))
+    else:
+        raise NotImplementedError(f"{type(o).__name__} has no lemma")
+
+
+def _form(a: Rows, p: Poly | None = None, cofactors: Sequence[Poly] = (), zeros: Sequence[Poly] = ()) -> Lemma:
+    """Return that x'ax, or what is the same but for zeros, exceeds a multiple of |x|^2."""
+    x, (c, rest) = _vector("x", len(a)), _least(a, len(a))
+    return Lemma(p or dot(x, apply(a, x)), c * dot(x, x), cofactors, zeros, (), [Part([], x, rest)])
+
+
+def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma]:
+    """Yield that x'Px is positive, and that where y = Ax it is less for y than rate^2 times that for x, or falls."""
+    x, y, PA = _vector("x", len(P)), _vector("y", len(P)), times(P, o.A)
+    Ax, Px, Py = apply(o.A, x), apply(P, x), apply(P, y)
+    zeros = [b - a for a, b in zip(Ax, y, strict=True)]
+    yield _form(P)
+    if o.flow:
+        yield _form(plus(scalar(0, len(P)), plus(PA, transpose(PA)), -1), dot(x, Py) * -2, [p * -2 for p in Px], zeros)
+    else:
+        square = o.rate * o.rate
+        falls = plus([[square * b for b in row] for row in P], times(transpose(o.A), PA), -1)
+        turned = [-(a + b) for a, b in zip(Py, apply(P, Ax), strict=True)]
+        yield _form(falls, square * dot(x, Px) - dot(y, Py), turned, zeros)
+
+
+def _persisting(A: Rows, P: Rows) -> Iterator[Lemma]:
+    """Yield that where y = Ax the form y'Py is no less than x'Px, and that this is positive at some x."""
+    x, y = _vector("x", len(P)), _vector("y", len(P))
+    Ax, Px, Py = apply(A, x), apply(P, x), apply(P, y)
+    turned = [a + b for a, b in zip(Py, apply(P, Ax), strict=True)]
+    zeros = [b - a for a, b in zip(Ax, y, strict=True)]
+    gains = plus(times(transpose(A), times(P, A)), P, -1)
+    yield Lemma(dot(y, Py) - dot(x, Px), Poly({}), turned, zeros, (), [Part([], x, gains)])
+    largest: Any = np.linalg.eigh(np.array([[float(p) for p in row] for row in P]))[1][:, -1]
+    v = [poly(Fraction(float(part))) for part in largest]
+    near = [a - b for a, b in zip(x, v, strict=True)]
+    sums = [a + b for a, b in zip(Px, apply(P, v), strict=True)]
+    low = dot(v, apply(P, v))
+    demand(low.number > 0, "no state was found at which a form is positive")
+    yield Lemma(dot(x, Px), low, sums, near)
+
+
+def _least(gram: Rows, count: int) -> tuple[Fraction, Rows]:
+    """Return a c > 0 that may be taken from the first entries of a positive definite matrix's diagonal, and what is left."""
+    c = Fraction(1)
+    while count:
+        rest = [[x - c * (i == k < count) for k, x in enumerate(row)] for i, row in enumerate(gram)]
+        if definite(rest, False):
+            return c, rest
+        c /= 16
+    return c, gram
+
+
+def _polys(given: Any) -> list[Poly]:
+    return [read_poly(p) for p in given]
+
+
+def _part(given: Any) -> Part:
+    z = [read_poly({name: "1"} if isinstance(name, str) else name) for name in given["z"]]
+    return Part(given["of"], z, matrix(given["gram"], len(z), len(z)))
+
+
+def _vector(letter: str, count: int) -> list[Poly]:
+    return [var(f"{letter}{k}") for k in range(count)]
+
+
+def _text(given: Lemma) -> str:
+    """Return what a lemma says and its proof, in which every number is whole."""
+    size, (p, *low) = _whole(given.p, *([] if given.low is None else [given.low]))
+    used = [(c, r) for c, r in zip(given.cofactors, given.zeros, strict=True) if c.terms]
+    zeros, known = [_whole(r) for _, r in used], {k: _whole(given.known[k]) for part in given.parts for k in part.of}
+    cofactors = [c * (size / of) for (c, _), (of, _) in zip(used, zeros, strict=True)]
+    parts = list[Part]()
+    for of, z, gram in given.parts:
+        own, whole = _whole(*z)
+        share = size / own / own / prod(known[k][0] for k in of)
+        parts.append(Part(of, whole, [[share * x for x in row] for row in gram]))
+    fractions = chain(*(c.terms.values() for c in cofactors), *(row for part in parts for row in part.gram))
+    K = lcm(*(x.denominator for x in fractions))
+    relations, sides = [r for _, (r,) in zeros], {k: g for k, (_, (g,)) in known.items()}
+    polys = [p, *low, *relations, *sides.values(), *cofactors, *(x for part in parts for x in part.z)]
+    write = Writer(_names({name for q in polys for name in q.names}))
+    variables, hypotheses = list(write.names.values()), [f"Z{k}" for k in range(len(zeros))]
+    told = [*(f"{write.sum(r)} = 0" for r in relations), *(f"0 <= {write.sum(g)}" for g in sides.values())]
+    told.append(f"{write.sum(low[0])} <= {write.sum(p)}" if low else f"{write.sum(p)} = 0")
+    rule = ["exceeds" if low else "vanishes", f"[{'; '.join(variables)}]", _number(K), *map(write.terms, [p, *low])]
+    rule += [write.list(c * K for c in cofactors), write.list(relations)]
+    if low:
+        rule.append(f"[{'; '.join(write.part(part, [sides[k] for k in part.of], K) for part in parts)}]")
+    rule += ["_", _all(hypotheses)]
+    if low:
+        rule.append(_all(_all(f"K{k}" for k in part.of) for part in parts))
+    before = f"forall {' '.join(variables)} : R, " if variables else ""
+    named = " ".join([*variables, *hypotheses, *(f"K{k}" for k in sides)])
+    proof = f"intros {named}.\n  refine ({' '.join(rule)}).\n  vm_cast_no_check (eq_refl true)."
+    return f"{before}{' -> '.join(told)}.\nProof.\n  {proof}\nQed."
+
+
+class Writer:
+    """Writes polynomials as sums, and as lists of their terms, in which a variable is its place."""
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        self.names, self.places = names, {name: k for k, name in enumerate(names)}
+
+    def sum(self, p: Poly) -> str:
+        """Write a polynomial for reading."""
+        return " + ".join(" * ".join([_number(c), *(self.names[x] for x in m)]) for m, c in p.terms.items()) or "0"
+
+    def terms(self, p: Poly) -> str:
+        """Write a polynomial for the rules."""
+        rows = (f"({_number(c)}, [{'; '.join(f'{self.places[x]}' for x in m)}]%nat)" for m, c in p.terms.items())
+        return f"[{'; '.join(rows)}]%Z"
+
+    def list(self, polys: Iterable[Poly]) -> str:
+        """Write polynomials for the rules."""
+        return f"[{'; '.join(map(self.terms, polys))}]"
+
+    def part(self, part: Part, known: Sequence[Poly], K: int) -> str:
+        """Write a part of a sum, times K, for the rules."""
+        gram = [[K * x for x in row] for row in part.gram]
+        rows = (f"[{'; '.join(map(_number, row[i:]))}]" for i, row in enumerate(gram))
+        long, less = _shorter(gram)
+        return f"Build_part {self.list(known)} {self.list(part.z)} [{'; '.join(rows)}]%Z {_number(long)} {less}"
+
+
+def _number(x: Fraction | int) -> str:
+    """Write a whole number; Rocq reads long ones far sooner from hexadecimal digits."""
+    return f"({int(x)})" if abs(x) < 10**30 else f"({int(x):#x})"
+
+
+def _shorter(gram: Rows) -> tuple[int, int]:
+    """Return the largest power m of two, and d, such that the matrix divided by m, in whole numbers, less d on its diagonal,
+    is nowhere negative still; zeros where there is none, or numbers are short."""
+    bits, d = max((int(x).bit_length() for row in gram for x in row), default=0), len(gram) - 1
+    for s in range(bits - 30, 30, -30):
+        short = [[Fraction(x // 2**s - d * (i == k)) for k, x in enumerate(row)] for i, row in enumerate(gram)]
+        if definite(short, False):
+            return 2**s, d
+    return 0, 0
+
+
+def _all(proofs: Iterable[str]) -> str:
+    """Join proofs to one of all."""
+    return reduce(lambda rest, one: f"(conj {one} {rest})", reversed([*proofs]), "I")
+
+
+def _whole(*polys: Poly) -> tuple[Fraction, list[Poly]]:
+    """Return the least whole number that makes polynomials' coefficients whole, and them times it."""
+    size = Fraction(lcm(*(c.denominator for p in polys for c in p.terms.values())))
+    return size, [p * size for p in polys]
+
+
+def _names(variables: Iterable[str]) -> dict[str, str]:
+    """Name variables as Rocq may."""
+    found = dict[str, str]()
+    for variable in sorted(variables):
+        name = variable.replace(".", "_")
+        while name in WORDS or name in found.values():
+            name += "_"
+        found[variable] = name
+    return found
+
+
+def _remark(text: str) -> str:
+    return re.sub(r'[("*)]', " ", text)

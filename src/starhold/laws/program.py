@@ -1,0 +1,42 @@
+"""A law as a program of the proof kernel. Its digest stands in certificates, exported C, runs and the report, and so ties
+what flies to what is proved."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starhold.algebra.structure import leaves
+from starhold.algebra.vector import ZERO
+from starhold.errors import InputError
+from starhold.kernel.programs import digest
+from starhold.laws.catalogue import Law
+from starhold.laws.interface import Measurement
+from starhold.laws.point import PointMeasurement
+from starhold.trace.straight_line import straight_line
+
+ASKED: dict[str, Any] = {
+    "rigid-body": Measurement((1.0, *ZERO), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO, ZERO),
+    "libration-point": PointMeasurement(ZERO, ZERO, 0.0, 0.0),
+}
+"""By body a measurement of which every number is an input."""
+
+
+def law_program(law: Law, gains: Any, craft: Any, period: float) -> dict[str, Any]:
+    """Return a law's command as a program; gains and craft are inputs but for choices and whole numbers. InputError where it
+    has loops, buffers or words."""
+    memory = law.remember(gains, craft, period)
+
+    def command(measurement: Any, gains: Any, craft: Any) -> Any:
+        return law.command(measurement, gains, craft, memory)[0]
+
+    return straight_line(command, measurement=ASKED[law.body], gains=gains, craft=craft)
+
+
+def law_digest(law: Law, gains: Any, craft: Any, period: float) -> str:
+    """Return the SHA-256 of a law's program; empty for a law that keeps a memory, or has no such program."""
+    if law.body not in ASKED or any(True for _ in leaves(law.remember(gains, craft, period))):
+        return ""
+    try:
+        return digest(law_program(law, gains, craft, period))
+    except InputError:
+        return ""
