@@ -13,7 +13,7 @@ from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
-from starhold.certification.evidence.attitude import SLIDING
+from starhold.certification.evidence.attitude import SAMPLED, SLIDING
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import needed, torque_limit
@@ -86,6 +86,10 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
                 claims.append(proved.get("sliding") or _undecided("sliding", torque, subject, failed[SLIDING]))
             claims.extend(_unshown(subject, wanted))
         sampled = proved.get("sampling") or sampling(Motion(subject))
+        if sampled is not None and sampled.proof is None and sampled.outcome != "undecided":
+            numbers = {"period": loop.period, "longest": None, "every_shorter": False}
+            reason = Obligation("form", EXACT, "undecided", {"reason": failed[SAMPLED]})
+            sampled = replace(sampled, numbers=numbers, obligations=(reason,))
         claims.extend([] if sampled is None else [sampled])
         claims = needed(claims, Motion(subject)) if loop.law.lyapunov is not None else claims
     return claims
@@ -99,9 +103,10 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) 
     limit, box = proved.get("wheels" if wheeled else "torque-limit"), proved.get("inertia")
     if main is not None and main.outcome == "proved" and rate != "best" and not main.numbers["everything"]:
         main = None
-    if main is None or limit is None or box is None or pushed:
+    if main is None or main.outcome != "proved" or limit is None or box is None or pushed:
         derived, found, own = converge(subject, rate)
-        main = main or derived
+        # What refutes one V refutes no other.
+        main = derived if main is None or derived.outcome == "proved" != main.outcome else main
         # The law's own V, where it serves, gives the larger sets.
         basin = own or found
     if basin is not None:

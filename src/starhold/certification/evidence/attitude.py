@@ -10,6 +10,7 @@ from math import acos, asin, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
@@ -273,8 +274,8 @@ class Loop:
     def leaning(self, share: float) -> str:
         """Record the law's own V and epsilon q.Jw, at most this share of it."""
         loop, own = self.loop, self.form(self.lyapunov())
-        rates = curvature(own, "w")
-        most = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(rates), tensor(loop.craft.inertia)), 2)
+        scaled: Any = np.linalg.solve(np.linalg.cholesky(curvature(own, "w")), tensor(loop.craft.inertia))
+        most = float(np.linalg.norm(scaled, 2))
         epsilon = float(f"{share * sqrt(-float(own.terms.get(('q0',), 0)) / 2.0) / most:.3g}")
 
         def energy(measurement: Measurement, gains: Any, craft: Any) -> Any:
@@ -377,10 +378,10 @@ class Loop:
         return {"angle": angle if float(level) > 2.0 * s > 0.0 else angle * less, "rate": rate * less}
 
 
-def curvature(form: Poly, x: str) -> Any:
+def curvature(form: Poly, x: str) -> NDArray[np.float64]:
     """Return the second derivative of V by the rate (w) or the attitude (q) where both vanish."""
     slopes = [[form.slope(f"{x}{i}").slope(f"{x}{k}").at(NOWHERE).number for k in (1, 2, 3)] for i in (1, 2, 3)]
-    return np.array(slopes, dtype=float)
+    return np.array(slopes, dtype=np.float64)
 
 
 def highest(o: Squares, scales: Mapping[str, float]) -> float | None:

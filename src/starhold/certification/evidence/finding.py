@@ -51,7 +51,10 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
     try:
         wanted, known = obligations(claim, programs)
         Account.left = 10**12
-        found = {name: evidence(name, wanted, scales) for name in wanted}
+        with warnings.catch_warnings():
+            # The kernel decides of what an ill-conditioned matrix gives.
+            warnings.simplefilter("ignore", linalg.LinAlgWarning)
+            found = {name: evidence(name, wanted, scales) for name in wanted}
     except RefusedError as reason:
         raise NotFoundError(str(reason)) from None
     subject, programs = (
@@ -125,10 +128,7 @@ def contracts(o: rules.Contracts) -> list[list[str]]:
     A = np.array([[float(x) for x in row] for row in o.A])
     size = np.eye(len(A))
     solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
-    with warnings.catch_warnings():
-        # The kernel decides of what an ill-conditioned matrix gives.
-        warnings.simplefilter("ignore", linalg.LinAlgWarning)
-        found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
+    found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
     return [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
 
 
