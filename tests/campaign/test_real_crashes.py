@@ -77,28 +77,6 @@ def resumed(place, name, *words):
 
 
 @pytest.mark.slow
-def test_a_killed_driver_is_resumed_to_the_same_digest(place, expected):
-    child = start(place, "killed", "--threads", "1")
-    wait_for_chunks(child, place / "killed", 1)
-    child.kill()
-    child.communicate()
-    held = chunks(place / "killed")
-    assert 1 <= len(held) < 3
-    assert not (place / "killed" / "campaign.json").exists()
-    # And one of them spoiled, by a bit in its middle.
-    data = bytearray(held[0].read_bytes())
-    data[len(data) // 2] ^= 1
-    held[0].write_bytes(data)
-    found, said = resumed(place, "killed")
-    assert found == expected
-    assert said.count("\n") == 1
-    assert (
-        f"{held[0].relative_to(place)}: its bytes are not those that were written; runs 0 to {BLOCK - 1} are flown again"
-        in said
-    )
-
-
-@pytest.mark.slow
 def test_a_full_disk_is_told_and_resumed_to_the_same_digest(place, expected):
     """The manifest has room, a block of runs has none."""
 
@@ -130,15 +108,6 @@ def workers_of(child):
             if "spawn_main" in " ".join(process.cmdline()):
                 found.append(process)
     return found
-
-
-@pytest.mark.slow
-def test_a_killed_worker_changes_nothing(place, expected):
-    child = start(place, "workers", "--workers", "2")
-    wait_for_chunks(child, place / "workers", 1)
-    workers_of(child)[0].kill()
-    assert done(child)[1] == ""
-    assert digest(place / "workers") == expected
 
 
 @pytest.mark.slow
