@@ -9,11 +9,10 @@ from starhold.laws.catalogue import catalogue
 from starhold.parts.catalogue import read_module
 from starhold.parts.contract import Parameter
 from starhold.scenario.writing import law_table
-from tests.parts.files import ACTUATOR, BODY, EFFECTOR, ENVIRONMENT, LAW, PARTS, PD, SENSOR, TARGET, part
+from tests.parts.files import BODY, EFFECTOR, PARTS, PD, POINT, TARGET, part
 from tests.refusals import complains
 from tests.running import starhold
 
-POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simulation]\nduration = 1.0\n'
 CIRCLE = law_table(catalogue("libration-point")["l2-circle"], catalogue("libration-point")["l2-circle"].examples()[0])
 GYRO, FILTER = part('type = "gyro"\n'), part('type = "complementary-filter"\nattitude_gain = 0.1\nbias_gain = 0.01\n')
 TRACKER = part('type = "star-tracker"\ncross = 1e-5\nroll = 1e-4\n')
@@ -90,6 +89,10 @@ COMPOSED = {
     "too fast a lag": (BODY + part('type = "lag"\nlag = 0.001\n') + PD, "simulation.substeps", "at least 200 substeps"),
     "file and type": (BODY + part(MINE + 'type = "gyro"\n') + PD, "part[1].file", "either a type or a file, not both"),
     "a file's name that is a number": (BODY + part("file = 3\n") + PD, "part[1].file: found 3", "the name of a Python file"),
+    "rows of other lengths": (
+        BODY + part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n') + PD,
+        "allowed: rows of time, x, y, z, or the name of a CSV file",
+    ),
     "no such file": (BODY + part('file = "nope.py"\n') + PD, '"nope.py": No such file', "a Python file that holds a part"),
 }
 
@@ -218,24 +221,6 @@ def test_a_file_that_is_no_part_or_fails(kind, tmp_path):
     assert said in told(tmp_path, BODY + before + part(MINE + keys) + PD)
 
 
-def test_a_branch_that_kernels_cannot_take(tmp_path):
-    line = "return tuple(where(less(absolute(u), params.width), 0.0, u) for u in command)"
-    assert line in ACTUATOR
-    (tmp_path / "mine.py").write_text(ACTUATOR.replace(line, "return command if command[0] > 0.1 else (0.0, 0.0, 0.0)"))
-    (tmp_path / "own.toml").write_text(BODY + part(MINE + "width = 1e-3\n") + PD)
-    complains(starhold("run", "own.toml", cwd=tmp_path), "mine.py")
-
-
-def test_a_part_and_a_law_from_files_are_told_apart(tmp_path):
-    (tmp_path / "mine.py").write_text(ENVIRONMENT)
-    (tmp_path / "own_law.py").write_text(LAW.replace("measurement.rate)", "measurement.rates)"))
-    law = '[[law]]\nfile = "own_law.py"\nk = 0.1\n'
-    assert "own_law.py, line 17: AttributeError" in told(tmp_path, BODY + part(MINE + "drag = 0.1\n") + law)
-    (tmp_path / "own_law.py").write_text(LAW)
-    (tmp_path / "mine.py").write_text(SENSOR.replace("state.rate,", "state.rates,"))
-    assert "part mine: mine.py, line 27: AttributeError" in told(tmp_path, BODY + part(MINE + "noise = 0.1\n") + law)
-
-
 ENDLESS = {
     "a part": part('file = "/dev/zero"\n') + PD,
     "rows": TABLE.replace("rows.csv", "/dev/zero") + PD,
@@ -260,12 +245,6 @@ def test_a_long_list_in_place_of_a_matrix_costs_no_memory():
     assert most < 2**22
 
 
-def test_a_file_named_as_an_installed_part(tmp_path):
-    (tmp_path / "gyro.py").write_text(SENSOR)
-    line = told(tmp_path, BODY + part('file = "gyro.py"\nnoise = 1e-4\n') + PD)
-    assert "a part named gyro is installed already; rename the file" in line
-
-
 ROWS = {
     "missing": (None, "rows.csv: No such file"),
     "words": ("time,x,y,z\n0,0,0,much\n1,0,0,0\n", "rows.csv: could not convert string to float"),
@@ -285,11 +264,6 @@ def test_a_table_that_is_none(kind, tmp_path):
     if text is not None:
         (tmp_path / "rows.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
     assert said in told(tmp_path, BODY + TABLE + PD)
-
-
-def test_rows_of_other_lengths_in_the_scenario_itself(tmp_path):
-    rows = part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n')
-    assert "allowed: rows of time, x, y, z, or the name of a CSV file" in told(tmp_path, BODY + rows + PD)
 
 
 def test_a_link_that_hides_a_file_of_python_is_not_run(tmp_path):
