@@ -3,7 +3,6 @@ digest. Each is of the command line, in processes of its own."""
 
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -18,7 +17,7 @@ from starhold.campaign.campaign import CHUNK
 from tests.campaign.flown import ASKED, OVER, SMALL
 
 COMMAND = [sys.executable, "-m", "starhold", "campaign", "long.toml", "--law", "pd", "--no-search", "-o"]
-RUNS, BLOCK = 2 * CHUNK + 3000, CHUNK
+RUNS = 2 * CHUNK + 3000
 """Three blocks, half a second each or more."""
 
 
@@ -74,21 +73,6 @@ def resumed(place, name, *words):
     code, said = done(start(place, name, "--resume", *(words or ("--threads", "2"))))
     assert code in (0, 3, 4), said
     return digest(place / name), said
-
-
-@pytest.mark.slow
-def test_a_full_disk_is_told_and_resumed_to_the_same_digest(place, expected):
-    """The manifest has room, a block of runs has none."""
-
-    def limited():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
-
-    code, said = done(start(place, "full", "--threads", "1", preexec_fn=limited))
-    assert code == 2
-    assert said.count("\n") == 1
-    assert "cannot be written: File too large; what was computed is kept, --resume goes on from there" in said
-    assert not list((place / "full").rglob(".writing-*"))
-    assert resumed(place, "full") == (expected, "")
 
 
 @pytest.mark.slow

@@ -238,12 +238,3 @@ def test_a_message_begins_at_the_epoch_of_the_orbit(tmp_path):
     ):
         sh.export_aem(run, tmp_path / "run.aem", **words)
         assert sh.read_aem(tmp_path / "run.aem").epoch == epoch
-
-
-def test_a_run_is_written_as_parquet(tmp_path):
-    pd = pytest.importorskip("pandas")
-    pytest.importorskip("pyarrow", reason="pyarrow comes with the campaign extra")
-    run = sh.simulate(sh.load("three-laws").with_({"simulation.duration": 2.0}), "lyapunov")
-    sh.to_pandas(run).to_parquet(tmp_path / "run.parquet")
-    back = pd.read_parquet(tmp_path / "run.parquet")
-    np.testing.assert_array_equal(back["rate_x"], run["rate"].to_numpy()[:, 0])
