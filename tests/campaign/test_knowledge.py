@@ -52,11 +52,7 @@ def test_a_drawn_inertia_is_not_told_to_the_law_unless_it_is_said():
 
 
 CASES = {
-    "form": (
-        (DESIGNED, LYAPUNOV),
-        {},
-        {"spacecraft.inertia": INERTIA, "initial.rate": normal(0.01)},
-    ),
+    "form": ((DESIGNED, LYAPUNOV), {}, {"spacecraft.inertia": INERTIA, "initial.rate": normal(0.01)}),
     "limit": ((LYAPUNOV,), {}, {"spacecraft.torque_limit": LIMIT, "spacecraft.inertia": INERTIA | {"known_to_law": True}}),
     "fault": (
         (LYAPUNOV,),

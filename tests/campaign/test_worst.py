@@ -99,10 +99,7 @@ def test_rounding_contradicts_nothing():
 
 def test_what_cannot_be_is_worst_in_no_sense(tmp_path, brief):
     """Within three sigma lie inertias that no body has, and noises below nothing; the few runs draw none of them."""
-    over = {
-        "spacecraft.inertia": normal("9 %", relative=True),
-        "sensor.rate_noise": normal(4e-5),
-    }
+    over = {"spacecraft.inertia": normal("9 %", relative=True), "sensor.rate_noise": normal(4e-5)}
     for _ in range(2):
         asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
         found = fly(tmp_path / "c", scenario=short(), over=over, requirement=asked, runs=6, search=True, resume=True)

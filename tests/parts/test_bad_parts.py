@@ -46,60 +46,66 @@ def told(folder, text):
 
 
 COMPOSED = {
+    "an estimator without its sensors": (FILTER, "no attitude", "a sensor that measures attitude"),
+    "an estimator without one of its sensors": (TRACKER + FILTER, "no rate", "a sensor that measures rate"),
+    "two estimators": (GYRO + TRACKER + FILTER * 2, "a second estimator", "one estimator"),
+    "two sensors of the rate": (GYRO * 2, "a second sensor of rate, beside gyro", "one of each"),
+    "a sensor beside [sensor]": ("[sensor]\nrate_noise = 1e-4\n" + GYRO, "a second sensor of rate"),
+    "a part that is about the Earth elsewhere": (
+        MARS + part('type = "residual-dipole"\ndipole = [0, 0, 0.01]\n'),
+        "part residual-dipole: found an orbit about Mars",
+        "one about Earth",
+    ),
+    "a target about the Earth elsewhere": (MARS + part('type = "sun"\n'), "part sun: found an orbit about Mars"),
+    "an unknown type": (part('type = "gyroo"\n'), 'part[1].type: found "gyroo"', "did you mean gyro?"),
+    "no type": (part("noise = 1\n"), "part[1].type: found nothing", "or a file"),
+    "what another table gives": (part('type = "wheels"\n'), '"wheels"', "the [wheels] table, which gives it"),
+    "single brackets": ('[part]\ntype = "gyro"\n', "part: found", "[[part]] tables, with double brackets"),
+    "an unknown key": (part('type = "gyro"\nnoice = 1\n'), "part[1].noice: found an unknown key", "noise"),
+    "a missing key": (part('type = "lag"\n'), "part[1].lag: found nothing", "this key is required"),
+    "another unit": (part('type = "gyro"\nnoise = "1 N m"\n'), 'part[1].noise: found "1 N m"', "rad"),
+    "below the bound": (part('type = "gyro"\nnoise = -1\n'), "part[1].noise: found -1", "at least 0"),
+    "two numbers of three": (part('type = "gyro"\nbias = [0, 1]\n'), "part[1].bias", "3 numbers"),
+    "a name twice": (GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n'), "part[2].name", "a name that"),
+    "too late a tracker": (
+        part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 100\n'),
+        "part star-tracker",
+        "the delay must be at most 64 control periods",
+    ),
+    "a blind tracker": (
+        part('type = "star-tracker"\ncross = 0\nroll = 0\nboresight = [0, 0, 0]\n'),
+        "part star-tracker",
+        "the boresight needs a direction",
+    ),
+    "too fast a lag": (part('type = "lag"\nlag = 0.001\n'), "simulation.substeps", "at least 200 substeps"),
+    "file and type": (part(MINE + 'type = "gyro"\n'), "part[1].file", "either a type or a file, not both"),
+    "a file's name that is a number": (part("file = 3\n"), "part[1].file: found 3", "the name of a Python file"),
+    "rows of other lengths": (
+        part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n'),
+        "allowed: rows of time, x, y, z, or the name of a CSV file",
+    ),
+    "no such file": (part('file = "nope.py"\n'), '"nope.py": No such file', "a Python file that holds a part"),
+}
+"""Tables beside those of a body and a law."""
+WHOLE = {
     "a law for another body": (POINT + '[[law]]\ntype = "pd"\nk_rate = 0.1\nk_attitude = 0.1\n', "law[1].type", '"pd"'),
     "a law for this body is not there": (BODY + CIRCLE, "law[1].type", '"l2-circle"'),
-    "an estimator without its sensors": (BODY + FILTER + PD, "no attitude", "a sensor that measures attitude"),
-    "an estimator without one of its sensors": (BODY + TRACKER + FILTER + PD, "no rate", "a sensor that measures rate"),
-    "two estimators": (BODY + GYRO + TRACKER + FILTER * 2 + PD, "a second estimator", "one estimator"),
-    "two sensors of the rate": (BODY + GYRO * 2 + PD, "a second sensor of rate, beside gyro", "one of each"),
-    "a sensor beside [sensor]": (BODY + "[sensor]\nrate_noise = 1e-4\n" + GYRO + PD, "a second sensor of rate"),
     "a part of another body": (
         POINT + part('type = "constant-torque"\ntorque = [0, 0, 1e-5]\n') + CIRCLE,
         "part[1]: found constant-torque, for the body rigid-body",
         "a part for libration-point",
     ),
-    "a part that is about the Earth elsewhere": (
-        BODY + MARS + part('type = "residual-dipole"\ndipole = [0, 0, 0.01]\n') + PD,
-        "part residual-dipole: found an orbit about Mars",
-        "one about Earth",
-    ),
-    "a target about the Earth elsewhere": (BODY + MARS + part('type = "sun"\n') + PD, "part sun: found an orbit about Mars"),
     "a mode's target about the Earth elsewhere": (BODY + MARS + MODES, "found an orbit about Mars"),
-    "an unknown type": (BODY + part('type = "gyroo"\n') + PD, 'part[1].type: found "gyroo"', "did you mean gyro?"),
-    "no type": (BODY + part("noise = 1\n") + PD, "part[1].type: found nothing", "or a file"),
-    "what another table gives": (BODY + part('type = "wheels"\n') + PD, '"wheels"', "the [wheels] table, which gives it"),
-    "single brackets": (BODY + '[part]\ntype = "gyro"\n' + PD, "part: found", "[[part]] tables, with double brackets"),
     "no table": ("part = [3]\n" + BODY + PD, "part[1]: found 3", "a [[part]] table"),
-    "an unknown key": (BODY + part('type = "gyro"\nnoice = 1\n') + PD, "part[1].noice: found an unknown key", "noise"),
-    "a missing key": (BODY + part('type = "lag"\n') + PD, "part[1].lag: found nothing", "this key is required"),
-    "another unit": (BODY + part('type = "gyro"\nnoise = "1 N m"\n') + PD, 'part[1].noise: found "1 N m"', "rad"),
-    "below the bound": (BODY + part('type = "gyro"\nnoise = -1\n') + PD, "part[1].noise: found -1", "at least 0"),
-    "two numbers of three": (BODY + part('type = "gyro"\nbias = [0, 1]\n') + PD, "part[1].bias", "3 numbers"),
-    "a name twice": (BODY + GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n') + PD, "part[2].name", "a name that"),
-    "too late a tracker": (
-        BODY + part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 100\n') + PD,
-        "part star-tracker",
-        "the delay must be at most 64 control periods",
-    ),
-    "a blind tracker": (
-        BODY + part('type = "star-tracker"\ncross = 0\nroll = 0\nboresight = [0, 0, 0]\n') + PD,
-        "part star-tracker",
-        "the boresight needs a direction",
-    ),
-    "too fast a lag": (BODY + part('type = "lag"\nlag = 0.001\n') + PD, "simulation.substeps", "at least 200 substeps"),
-    "file and type": (BODY + part(MINE + 'type = "gyro"\n') + PD, "part[1].file", "either a type or a file, not both"),
-    "a file's name that is a number": (BODY + part("file = 3\n") + PD, "part[1].file: found 3", "the name of a Python file"),
-    "rows of other lengths": (
-        BODY + part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n') + PD,
-        "allowed: rows of time, x, y, z, or the name of a CSV file",
-    ),
-    "no such file": (BODY + part('file = "nope.py"\n') + PD, '"nope.py": No such file', "a Python file that holds a part"),
 }
 
 
-@pytest.mark.parametrize("kind", COMPOSED)
+WHOLE |= {kind: (BODY + tables + PD, *said) for kind, (tables, *said) in COMPOSED.items()}
+
+
+@pytest.mark.parametrize("kind", WHOLE)
 def test_parts_that_do_not_go_together(kind, tmp_path):
-    text, *said = COMPOSED[kind]
+    text, *said = WHOLE[kind]
     line = told(tmp_path, text)
     assert all(words in line for words in said), line
 
