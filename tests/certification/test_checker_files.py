@@ -58,7 +58,14 @@ def test_a_readable_file_with_a_fault_fails(tmp_path, made):
     period = f'"control_period": {content["certificates"][0]["subject"]["control_period"]}'
     assert period in plain
     texts = [twice, plain.replace(period, '"control_period": NaN'), plain.replace(period, '"control_period": 1e999')]
-    for text in [*texts, plain.replace("certificate 2", "certificate 3"), "[]", "null", '"x"']:
+    for text in [
+        *texts,
+        plain.replace("certificate 2", "certificate 3"),
+        plain.replace("certificate 2", "certificate 9"),
+        "[]",
+        "null",
+        '"x"',
+    ]:
         path.write_text(text, encoding="utf-8")
         assert not passed(check_file(path)), text[:60]
 

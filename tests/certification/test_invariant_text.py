@@ -1,23 +1,22 @@
 """Expressions and files of invariant sets: what is read means what Python means, and all else is refused in one line."""
 
-import math
 import re
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
 import pytest
 from flint import fmpq
 from hypothesis import given
 from hypothesis import strategies as st
 
-from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, exact, pieces
-from starhold.certification.invariant import System, load, parse
-from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial
-from starhold.certification.invariant.system import split
+from starhold.certification.invariant import load, parse
+from starhold.certification.invariant.recording import program
 from starhold.certification.invariant.text import ExpressionError, as_written, read
 from starhold.errors import InputError
+from starhold.kernel.numbers import Account
+from starhold.kernel.polynomials import Poly, var
+from starhold.kernel.programs import Exactly, Program, known
 from tests.certification.invariants import file
 from tests.refusals import refused
 
@@ -78,24 +77,23 @@ def test_expressions_mean_what_python_means(text, x, y):
     assert found[0] == exact(exactly(text, x, y))
 
 
-@given(expressions, numbers, numbers, st.integers(0, 40))
-def test_enclosures_hold_floats_and_exact_values(text, x, y, width):
+@given(expressions, numbers, numbers)
+def test_programs_are_what_expressions_are(text, x, y):
+    """The kernel's reading of a recorded expression is its value, in one case at least, and no case says another."""
     try:
-        cells = split(System(("x", "y"), (Polynomial({}), Polynomial({}))), read(text, NAMES)).cells
+        value = read(text, NAMES)
     except ExpressionError:
         return
-    size = width / 40
-    sides = tuple(Intervals(np.array([float(c) - size]), np.array([float(c) + size])) for c in (x, y))
-    for cell in cells:
-        form = EnclosedPolynomial(cell.V)
-        for sharp in (False, True):
-            box = form.on(Boxes(sides, sharp))
-            for dx in (-size, 0.0, size):
-                point = (float(x) + dx, float(y) - dx)
-                value = cell.V(*(fmpq(*p.as_integer_ratio()) for p in point))
-                assert exact(float(box.low[0])) <= value <= exact(float(box.high[0]))
-                near = float(form.at(np.array([[point[0]], [point[1]]]))[0])
-                assert math.isclose(near, int(value.p) / int(value.q), rel_tol=1e-9, abs_tol=1e-6)
+    recorded = Program.read(program([value], ["x", "y"]))
+    Account.open()
+    (cases,) = recorded.run({name: known(var(name)) for name in "xy"}, Exactly(), 1)
+    at = {"x": x, "y": y}
+    found = {
+        case.value.at(at).number
+        for case in cases
+        if all((Poly(dict(p)).at(at).number > 0) == truth for p, truth in case.guards)
+    }
+    assert found == {Fraction(exactly(text, x, y))}
 
 
 def test_conditions_may_be_joined():

@@ -14,10 +14,8 @@ from starhold.analysis.departure import HAS, LOST, Departure
 from starhold.analysis.metrics import on_limit
 from starhold.analysis.trial import FLIGHTS, LEGS, BrokenClaimError, Trial
 from starhold.analysis.trial import SLACK as RISE
-from starhold.certification.circle import IN_PLANE
-from starhold.certification.equilibrium import CLEAR, HELD
 from starhold.certification.openness import WITHOUT
-from starhold.certification.station_terms import COMMON, FULL, LINEAR, UNLIMITED
+from starhold.kernel.sentences import ASSUMPTIONS
 from starhold.laws import l2_circle
 from starhold.laws.point import PointMeasurement
 from starhold.parts.bodies.libration_point import ROWS
@@ -32,7 +30,17 @@ SLACK = 1e-6
 """The integration moves V, scaled distances and velocities by so much in a motion along a border."""
 PERIOD = 1e-4
 """Control that is renewed so often counts as continuous (scaled)."""
-MET = (LINEAR, FULL, *COMMON, CLEAR, IN_PLANE)
+UNLIMITED, HELD = ASSUMPTIONS["unlimited-control"], ASSUMPTIONS["held-aside"]
+_NAMES = (
+    "linear-field",
+    "whole-field",
+    "circling-bodies",
+    "exact-place",
+    "continuous-control",
+    "off-the-bodies",
+    "in-the-plane",
+)
+MET = tuple(ASSUMPTIONS[name] for name in _NAMES)
 """Assumptions that a flight meets, but for where `outside` or the simulation ends it."""
 FLOOR = 1e-6
 """Share of V at the centre of the circle: what the held control makes of zero."""

@@ -71,11 +71,13 @@ BESIDE = ("sampling", "control-limit", "saturated-axis")
 
 @dataclass(frozen=True, repr=False)
 class Certificate:
-    """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names."""
+    """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names. `proof`: what
+    the kernel is given, of claims that it decides."""
 
     name: str
     subject: dict[str, Any]
     claims: tuple[Claim, ...]
+    proof: dict[str, Any] | None = None
 
     def __repr__(self) -> str:
         claims = ", ".join(f"{claim.kind} {claim.outcome}" for claim in self.claims)
@@ -114,4 +116,5 @@ def _plain(certificate: Certificate) -> dict[str, Any]:
         claims.append({"kind": claim.kind, "outcome": claim.outcome, **asdict(claim)})
     kinds = [claim["kind"] for claim in claims]
     about = {"outcome": certificate.outcome, "subject": certificate.subject, "kinds": kinds}
-    return {"name": certificate.name, **about, "claims": claims}
+    proof = {} if certificate.proof is None else {"proof": certificate.proof}
+    return {"name": certificate.name, **about, "claims": claims, **proof}

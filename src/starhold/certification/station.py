@@ -1,60 +1,122 @@
-"""Certificates of station-keeping loops: what they speak of, and which claims are made."""
+"""Certificates of station-keeping loops: what they speak of, and which claims are made. What a law declares to make
+attractive decides that: errors that vanish there, with their V, or a place of rest."""
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
-from starhold.certification.circle import attracts, control_limit
-from starhold.certification.equilibrium import returns, saturated_axis
+from starhold.certification.certificate import BALLS, EXACT, Certificate, Claim, Obligation
+from starhold.certification.evidence.finding import certificate
+from starhold.certification.evidence.station import UNSHOWN, Station, full_problem
 from starhold.certification.openness import assumed_away, named
-from starhold.certification.station_terms import UNLIMITED, assumed, lag_of, model_of
 from starhold.certification.subject import described_gains
+from starhold.kernel.check import check
+from starhold.kernel.sentences import ASSUMPTIONS
+from starhold.laws.point_programs import claim_of
 from starhold.loop.closed_loop import ClosedLoop
+
+SURE = ("circling-bodies", "exact-place", "continuous-control")
+"""What is assumed of every loop."""
+WEAK, ASIDE = "the feedback is too weak", "the other axes cannot be held with so little control"
 
 
 def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
-    """The certificate of a station-keeping loop; without claims, which is undecided, for a law that none are made about."""
+    """Return the certificate of a station-keeping loop; without claims, which is undecided, for a law that declares nothing
+    that it makes attractive, or keeps a memory."""
+    station, claims, law = Station(loop), list[Claim | None](), loop.law
+    circle = law.hook("errors") is not None and law.lyapunov is not None
     # What overflows in a guess is caught where the guess is verified.
     with np.errstate(all="ignore"):
-        try:
-            claims = _claims(loop)
-        except (OverflowError, ZeroDivisionError) as reason:
-            refused = Obligation(
-                "form", EXACT, "undecided", {"reason": f"gains and plant are too far apart in size: {reason}"}
-            )
-            kind = "circle" if loop.law.name == "l2-circle" else "equilibrium"
-            claims = [Claim(kind, {}, {}, assumed(loop, UNLIMITED), (refused,))]
-    return Certificate(name or loop.law.name, described_station(loop), named(claims, loop))
+        if circle and not loop.remembers:
+            claims = _circle(station)
+        elif law.hook("rest") is not None and not loop.remembers:
+            claims = _rest(station)
+    proof = certificate(list(station.programs.values()), station.claims) if station.claims else None
+    shown = iter(check(json.dumps(proof)) if proof else ())
+    found = [_as_told(claim_of(next(shown), circle)) if claim is None else claim for claim in claims]
+    return Certificate(name or law.name, described_station(loop), named(found, loop), proof)
 
 
-def _claims(loop: ClosedLoop) -> list[Claim]:
-    claims: list[Claim] = []
-    limited = loop.limit != "none" and math.isfinite(loop.saturation_limit())
-    if loop.law.name == "l2-circle":
-        claims.append(attracts(loop))
-        if limited and claims[0].outcome == "proved":
-            claims.append(control_limit(loop))
-    elif loop.law.name == "l2-equilibrium":
-        claims.append(returns(loop))
-        if limited and loop.limit == "axis" and model_of(loop) == "linear" and claims[0].outcome == "proved":
-            claims.append(saturated_axis(loop))
-    return claims
+def _circle(station: Station) -> list[Claim | None]:
+    """Return claims that are undecided, and None for each that the station has evidence of."""
+    loop, limit = station.loop, station.loop.saturation_limit()
+    if found := _tried(station.show_circle):
+        other = _tried(station.show_astray) and _tried(station.show_held)
+        return [_undecided(loop, "circle", "form", found) if other else None]
+    if loop.limit == "none" or not math.isfinite(limit):
+        return [None]
+    why = "only for a law that undoes the linear model alone"
+    if not full_problem(loop):
+        why = _tried(lambda: station.show_limit(loop.limit, limit))
+    told = {"limit": limit, "kind": loop.limit}
+    return [None, _undecided(loop, "control-limit", "control", why, told) if why else None]
+
+
+def _rest(station: Station) -> list[Claim | None]:
+    loop, limit = station.loop, station.loop.saturation_limit()
+    if found := _tried(station.show_rest):
+        return [_undecided(loop, "equilibrium", "form", found) if _tried(station.show_astray) else None]
+    if loop.limit != "axis" or not math.isfinite(limit) or full_problem(loop):
+        return [None]
+    why = _tried(lambda: station.show_limited_axis(limit))
+    told = {"limit": limit}
+    return [None, _undecided(loop, "saturated-axis", "stays", ASIDE if "held" in why else WEAK, told) if why else None]
+
+
+def _tried(show: Callable[[], None]) -> str:
+    """Return why nothing was found; empty where it was."""
+    try:
+        show()
+    except UNSHOWN as reason:
+        return str(reason)
+    except (OverflowError, ZeroDivisionError, ValueError) as reason:
+        return f"gains and plant are too far apart in size: {reason}"
+    return ""
+
+
+def _undecided(loop: ClosedLoop, kind: str, obligation: str, why: str, told: Any = None) -> Claim:
+    beside = {"control-limit": "in-the-plane", "saturated-axis": "held-aside"}.get(kind, "unlimited-control")
+    names = ["whole-field" if full_problem(loop) else "linear-field", *SURE, beside]
+    names += ["off-the-bodies"] if kind == "equilibrium" and full_problem(loop) else []
+    how = EXACT if obligation == "form" else BALLS
+    reason = {"reason": _mismatch(loop) or why}
+    return Claim(
+        kind, told or {}, {}, tuple(ASSUMPTIONS[n] for n in names), (Obligation(obligation, how, "undecided", reason),)
+    )
+
+
+def _mismatch(loop: ClosedLoop) -> str:
+    """Return the fault of a law that undoes another model than the one that is flown; empty where it undoes that."""
+    undoes = bool(getattr(loop.gains, "model", full_problem(loop)))
+    if undoes == full_problem(loop):
+        return ""
+    if undoes:
+        return "the law undoes what the linear model does not have"
+    return "the law undoes the linear model, and the full problem is flown"
+
+
+def _as_told(told: Any) -> Claim:
+    obligations = tuple(Obligation(**one) for one in told["obligations"])
+    return Claim(told["kind"], told["numbers"], {}, tuple(told["assumptions"]), obligations)
 
 
 def described_station(loop: ClosedLoop) -> dict[str, Any]:
-    """The loop as plain numbers and names, all that a checker needs to build it again."""
+    """Return the loop as plain numbers and names, all that a checker needs to record its programs again."""
+    lag = loop.find("lag")
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
         "plant": loop.craft._asdict(),
-        "model": model_of(loop),
+        "nominal": loop.known._asdict(),
+        "model": "nonlinear" if full_problem(loop) else "linear",
         "limit": loop.limit,
         "control_limit": loop.saturation_limit() if math.isfinite(loop.saturation_limit()) else None,
-        "lag": lag_of(loop),
+        "lag": 0.0 if lag is None else lag.params.lag,
         "control_period": loop.period,
         "assumed_away": assumed_away(loop),
     }

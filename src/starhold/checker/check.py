@@ -15,8 +15,6 @@ from flint import ctx
 
 from starhold.checker.claims import CLAIMS, UNLIMITED
 from starhold.checker.exact import CheckError, Obligation, Verdict, demand, limited
-from starhold.checker.invariant import FORMAT as INVARIANT
-from starhold.checker.invariant import invariant_findings
 from starhold.checker.reading import read_file, shallow
 from starhold.checker.refutation import refutation
 from starhold.checker.shapes import (
@@ -33,12 +31,15 @@ from starhold.checker.shapes import (
     outcome_of,
     shaped,
 )
-from starhold.checker.station import STATION_CLAIMS, StationSubject, read_station, station_refutation
+from starhold.checker.station import StationSubject, read_station, station_findings
 from starhold.checker.subject import LoopSubject, read_subject
 from starhold.checker.torque import never_beyond
+from starhold.kernel.check import check as kernel_check
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.reading import FORMAT as KERNEL
 
 FORMAT = "starhold certificate 2"
-FORMER = ("starhold certificate 1", "starhold invariant certificate 1")
+FORMER = ("starhold certificate 1", "starhold invariant certificate 1", "starhold invariant certificate 2")
 """Formats of earlier versions, whose keys had other names."""
 ENDS = (
     "convergence",
@@ -78,6 +79,12 @@ def passed(findings: Sequence[Finding]) -> bool:
 def check_file(path: Path | str) -> list[Finding]:
     """The findings about a certificate file; InputError where there is none that can be read."""
     content, faults = read_file(path)
+    if isinstance(content, Mapping) and content.get("format") == KERNEL:  # pyright: ignore[reportUnknownMemberType]
+        try:
+            proved = kernel_check(Path(path).read_text(encoding="utf-8"))
+        except RefusedError as reason:
+            return [Finding("", "", "", "fails", str(reason))]
+        return [Finding("", one.claim.theorem, one.statement.written(), "holds", "") for one in proved]
     return [*(Finding("", "", "", "fails", fault) for fault in faults), *check(content)]
 
 
@@ -90,16 +97,10 @@ def check(content: Any) -> list[Finding]:
             shaped(content, FILE, "the file")
             former = content["format"] in FORMER
             demand(not former, f"the format is {content['format']!r}, of an earlier version: certify again")
-            demand(content["format"] in (FORMAT, INVARIANT), f"the format is not {FORMAT!r} or {INVARIANT!r}")
+            demand(content["format"] == FORMAT, f"the format is not {FORMAT!r}, nor the kernel's")
             demand(len(content["certificates"]) > 0, "there are no certificates")
         except CheckError as fault:
             return [Finding("", "", "", "fails", str(fault))]
-        if content["format"] == INVARIANT:
-            return [
-                Finding(str(given.get("name", "")), *found)
-                for given in content["certificates"]
-                for found in invariant_findings(given)
-            ]
         return [finding for given in content["certificates"] for finding in _certificate(given)]
 
 
@@ -113,6 +114,14 @@ def _certificate(given: Mapping[str, Any]) -> Iterator[Finding]:
     subject, fault = _guarded(partial(_subject, given))
     if subject is None:
         yield Finding(name, "", "", "fails", fault)
+        return
+    if isinstance(subject, StationSubject):
+        found, fault = _guarded(partial(_of_station, name, subject, given))
+        yield from found or []
+        if fault:
+            yield Finding(name, "", "", "fails", fault)
+        elif not found:
+            yield Finding(name, "", "", "not claimed", "there are no claims")
         return
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
@@ -143,6 +152,15 @@ def _of_unknown_body(given: Any) -> None:
     demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
 
 
+def _of_station(name: str, subject: StationSubject, given: Any) -> list[Finding]:
+    for claim in given["claims"]:
+        shaped(claim, CLAIM, "the claim")
+        for obligation in claim["obligations"]:
+            shaped(obligation, OBLIGATION, "an obligation")
+    absent = [f"without the {name}" for name in given["subject"]["assumed_away"]]
+    return [Finding(name, *one) for one in station_findings(subject, given, absent)]
+
+
 def _subject(given: Any) -> LoopSubject | StationSubject:
     certificate_shaped(given)
     station = "plant" in given["subject"]
@@ -168,11 +186,10 @@ def _absent(subject: Mapping[str, Any], claim: Any) -> list[str]:
     return [*subject["assumed_away"], *bounded]
 
 
-def _claim(subject: LoopSubject | StationSubject, absent: Sequence[str], claim: Any) -> list[tuple[str, Verdict, str]]:
+def _claim(subject: LoopSubject, absent: Sequence[str], claim: Any) -> list[tuple[str, Verdict, str]]:
     """Verdict and reason for each obligation of a claim."""
     shaped(claim, CLAIM, "the claim")
-    kinds = STATION_CLAIMS if isinstance(subject, StationSubject) else CLAIMS
-    demand(claim["kind"] in kinds, f"there is no kind of claim {claim['kind']} about such a loop")
+    demand(claim["kind"] in CLAIMS, f"there is no kind of claim {claim['kind']} about such a loop")
     for obligation in claim["obligations"]:
         shaped(obligation, OBLIGATION, "an obligation")
     outcomes = [obligation["outcome"] for obligation in claim["obligations"]]
@@ -193,11 +210,8 @@ def _claim(subject: LoopSubject | StationSubject, absent: Sequence[str], claim: 
     return [_verdict(proof) for proof in shown]
 
 
-def _obliges(subject: LoopSubject | StationSubject, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
+def _obliges(subject: LoopSubject, claim: Any) -> tuple[list[str], Callable[[], list[Obligation]]]:
     """The assumptions of a claim, and what makes the list of what has to be shown."""
-    if isinstance(subject, StationSubject):
-        about = STATION_CLAIMS[claim["kind"]]
-        return about.assumptions(subject), partial(about.proofs, subject, claim)
     kind, wheels = CLAIMS[claim["kind"]], subject.wheels is not None
     demand(kind.wheels is None or kind.wheels == wheels, f"such a claim is {'not ' if wheels else ''}for loops with wheels")
     assumed = kind.assumptions(claim["numbers"], wheels)
@@ -213,7 +227,7 @@ def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
     return (name if how else "", "fails", fault) if reason is None else (name if how else "", "holds", reason)
 
 
-def _unproved(subject: LoopSubject | StationSubject, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
+def _unproved(subject: LoopSubject, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
     """Nothing of such a claim counts as proved; a refutation must be one."""
     for part, shapes in (("numbers", NUMBERS), ("witness", WITNESS)):
         shape, given = shapes[claim["kind"]], claim[part]
@@ -229,13 +243,7 @@ def _unproved(subject: LoopSubject | StationSubject, claim: Mapping[str, Any]) -
     for obligation in claim["obligations"]:
         name, verdict, reason = obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"
         if obligation["outcome"] == "refuted":
-            shown, fault = _guarded(partial(_refutes, subject, claim, obligation))
+            shown, fault = _guarded(partial(refutation, subject, claim, obligation))
             verdict, reason = ("fails", f"not refuted: {fault}") if shown is None else ("not claimed", f"refuted: {shown}")
         found.append((name, verdict, reason))
     return found
-
-
-def _refutes(subject: LoopSubject | StationSubject, claim: Mapping[str, Any], obligation: Mapping[str, Any]) -> str:
-    if isinstance(subject, StationSubject):
-        return station_refutation(subject, claim, obligation)
-    return refutation(subject, claim, obligation)

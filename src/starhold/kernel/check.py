@@ -13,32 +13,34 @@ from .theorems import THEOREMS
 
 @dataclass(frozen=True)
 class Proved:
-    """A claim that is proved, and what it says."""
+    """A claim that is proved, what it says, and what was shown for it, each with the name of its rule."""
 
     claim: Claim
     statement: Statement
+    shown: tuple[tuple[str, str], ...]
 
 
 def check(text: str) -> list[Proved]:
     """Return what a certificate proves; RefusedError where any of its claims is not proved."""
     Account.open()
-    return [Proved(claim, prove(claim)) for claim in read_certificate(text)]
+    return [prove(claim) for claim in read_certificate(text)]
 
 
-def prove(claim: Claim) -> Statement:
+def prove(claim: Claim) -> Proved:
     """Check each obligation of a claim's theorem, and return what the theorem then says."""
     demand(claim.theorem in THEOREMS, "there is no such theorem")
-    shown = THEOREMS[claim.theorem](claim)
+    wanted, shown = THEOREMS[claim.theorem](claim), list[tuple[str, str]]()
     while True:
         try:
-            name, obligation = next(shown)
+            name, obligation = next(wanted)
         except StopIteration as end:
             claim.close()
-            return end.value
+            return Proved(claim, end.value, tuple(shown))
         try:
             obligation.check(claim.evidence.get(name))
         except RefusedError as fault:
             raise RefusedError(f"{claim.theorem}, {name}: {fault}") from None
+        shown.append((name, type(obligation).__name__))
 
 
 def main(arguments: list[str]) -> int:

@@ -43,6 +43,22 @@ def wired_matrix(name: str, value: Matrix) -> dict[str, Poly]:
     return found | ({f"{name}.{i}": poly(value[i][i]) for i in AXES} if plain else {})
 
 
+def read(claim: Claim, role: str, count: int, ring: Exactly, *tables: Wired) -> list[Piecewise]:
+    """Return the outputs of a program over a ring, its inputs wired as the tables say; beside these only gains, numbers of
+    the craft as the law knows it and as it is, and the period are numbers, those of the subject."""
+    program, given, inputs = claim.programs[role], dict[str, Piecewise](), dict[str, Poly]()
+    for table in tables:
+        inputs |= table
+    for name in program.inputs:
+        if name in inputs:
+            given[name] = known(inputs[name])
+        elif name.startswith(("gains.", "craft.", "plant.")) or name == "measurement.period":
+            given[name] = known(claim.subject[name])
+        else:
+            raise RefusedError(f"the {role} asks for {name}, which nothing gives")
+    return program.run(given, ring, count)
+
+
 class AttitudeLoop:
     """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are."""
 
@@ -82,19 +98,8 @@ class AttitudeLoop:
         return J, inverse(J)
 
     def read(self, role: str, count: int, *tables: Wired) -> list[Piecewise]:
-        """Return the outputs of a program, its inputs wired as the tables say; only gains, numbers of the craft as the law
-        knows it, and the period are numbers of the subject."""
-        program, given, inputs = self.claim.programs[role], dict[str, Piecewise](), dict[str, Poly]()
-        for table in tables:
-            inputs |= table
-        for name in program.inputs:
-            if name in inputs:
-                given[name] = known(inputs[name])
-            elif name.startswith(("gains.", "craft.")) or name == "measurement.period":
-                given[name] = known(self.claim.subject[name])
-            else:
-                raise RefusedError(f"the {role} asks for {name}, which nothing gives")
-        return program.run(given, Exactly(), count)
+        """Return the outputs of a program, its inputs wired as the tables say."""
+        return read(self.claim, role, count, Exactly(), *tables)
 
     @cached_property
     def law(self) -> list[Piecewise]:

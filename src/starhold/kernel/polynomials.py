@@ -130,6 +130,14 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
     return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]
 
 
+def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:
+    """Return f and c with p = f s + c; f is 0 where there are none."""
+    first = max(s.terms, key=len)
+    factor = p.terms.get(first, Fraction(0)) / s.terms[first]
+    rest = p - factor * s
+    return (factor, rest.number) if not rest.names else (Fraction(0), Fraction(0))
+
+
 def read_poly(given: Any) -> Poly:
     """Read a polynomial of the evidence: {"q0 w1 w1": "3/4"}."""
     found: dict[Monomial, Fraction] = {}

@@ -22,7 +22,7 @@ OPERATIONS = {
 }  # fmt: skip
 """The operations, each with the kinds that it takes and gives: numbers and truths."""
 STEPS, CASES = 20_000, 2_000
-_NAME = re.compile(r"[a-z_]+(\.[a-z_]+|\.[0-9]+)*", re.ASCII)
+_NAME = re.compile(r"[A-Za-z_]\w*(\.\w+)*", re.ASCII)
 
 
 @dataclass(frozen=True)

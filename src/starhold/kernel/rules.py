@@ -63,6 +63,38 @@ class Squares:
 
 
 @dataclass(frozen=True)
+class Sum:
+    """p >= the sum of the `strict`, each times a positive number, wherever the known are not negative and the relations are
+    zero (the easy half of Schmuedgen's Positivstellensatz).
+
+    Evidence: those numbers; the relations' cofactors; parts, each the places of known polynomials, whose product it has
+    for a factor, and a sum of squares z'Gz: p = numbers.strict + cofactors.relations + the sum of parts."""
+
+    p: Poly
+    known: Sequence[Poly] = ()
+    modulo: Sequence[Poly] = ()
+    strict: Sequence[Poly] = ()
+
+    def check(self, evidence: Any) -> None:
+        """Refuse evidence that does not show it."""
+        numbers, cofactors, parts = read_table(evidence, "numbers", "cofactors", "parts")
+        weights = [rational(x) for x in read_list(numbers, len(self.strict))]
+        demand(all(x > 0 for x in weights), "a multiplier is not positive")
+        rest = self.p - dot(weights, self.strict) - combination(cofactors, self.modulo)
+        for part in read_list(parts):
+            places, names, rows = read_table(part, "of", "z", "gram")
+            z = [read_poly({name: "1"} if isinstance(name, str) else name) for name in read_list(names)]
+            gram = matrix(rows, len(z), len(z))
+            demand(definite(gram, False), "a matrix is somewhere negative")
+            form = dot(z, apply(gram, z))
+            for k in read_list(places):
+                demand(type(k) is int and 0 <= k < len(self.known), "a part has a factor that is not known")
+                form = form * self.known[k]
+            rest = rest - form
+        demand(not rest.terms, "a sum of squares is another one")
+
+
+@dataclass(frozen=True)
 class Solves:
     """Where the given vanish, and the relations, so do the wanted. Evidence: a matrix that takes the given to the wanted,
     and for each the cofactors of the relations."""
@@ -177,6 +209,6 @@ class Local:
         return OnCells(self.box, {"o": self.outside, "p": lambda cell: whole.on(cell).low > 0, "g": form})
 
 
-Obligation: TypeAlias = Vanishes | Squares | Solves | Contracts | Definite | Exceeds | OnCells | Local
+Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Definite | Exceeds | OnCells | Local
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
 """Obligations, each with the name under which its evidence stands."""

@@ -27,7 +27,18 @@ ASSUMPTIONS = {
     "bounded-momentum": "body and wheels have no more momentum together than told",
     "linear-motion": "the motion is linear, as it is near rest",
     "quaternion-as-fed": "the quaternion that is fed back never jumps",
+    "equations-as-given": "the equations are exactly as given",
+    "filippov": "motions are those in the sense of Filippov where the right-hand side jumps",
     "sign-at-once": "the sign of the quaternion is chosen at once",
+    "linear-field": "linear motion near the point",
+    "whole-field": "motion exactly as modelled",
+    "circling-bodies": "circular motion of the two bodies",
+    "exact-place": "position and velocity exactly known",
+    "continuous-control": "control applied continuously, without lag",
+    "unlimited-control": "control not limited",
+    "in-the-plane": "starts in the plane x = 0 without a rate along X",
+    "held-aside": "held at rest along Y and Z, where no Coriolis acceleration acts along X",
+    "off-the-bodies": "never at the centre of one of the two bodies",
 }
 """The assumption in words, by its identifier."""
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import Vector, scale, subtract
 from starhold.laws.interface import Card, Gain, NoMemory
-from starhold.laws.point import MODELS, PointMeasurement, along, check_x, hold_x, least_rate, nonlinear_remainder
+from starhold.laws.point import MODELS, PointMeasurement, along, check_x, hold_x, least_rate, undo_remainder
 from starhold.parts.bodies.libration_point import Libration
 from starhold.synthesis.circle import demand
 
@@ -113,7 +113,7 @@ def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> V
 
 def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Return the control acceleration (scaled)."""
-    return subtract(feedback(measurement, gains, plant), nonlinear_remainder(measurement, plant, gains.model)), memory
+    return undo_remainder(feedback(measurement, gains, plant), measurement, plant, gains.model), memory
 
 
 def lyapunov(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Scalar:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, NamedTuple
 
-from starhold.algebra.vector import Vector, subtract
+from starhold.algebra.vector import Vector
 from starhold.laws.interface import Card, Gain, NoMemory
-from starhold.laws.point import MODELS, PointMeasurement, check_x, hold_x, nonlinear_remainder
+from starhold.laws.point import MODELS, PointMeasurement, check_x, hold_x, undo_remainder
 from starhold.parts.bodies.libration_point import Libration
 
 CARD = Card(
@@ -69,7 +69,12 @@ def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> V
 
 def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Return the control acceleration (scaled)."""
-    return subtract(feedback(measurement, gains, plant), nonlinear_remainder(measurement, plant, gains.model)), memory
+    return undo_remainder(feedback(measurement, gains, plant), measurement, plant, gains.model), memory
+
+
+def rest(gains: Gains) -> Vector:
+    """Return where the craft comes to rest."""
+    return (0.0, gains.y, gains.z)
 
 
 def examples() -> list[Gains]:

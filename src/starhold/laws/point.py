@@ -22,13 +22,12 @@ def least_rate(plant: Libration) -> float:
     return plant.rate * best_rate(plant)
 
 
-def nonlinear_remainder(measurement: PointMeasurement, plant: Libration, model: Scalar) -> Vector:
-    """Return the full problem's acceleration less the linear one where `model` is nonlinear, else zero."""
-    more = subtract(
-        nonlinear(measurement.position, measurement.velocity, plant),
-        linear(measurement.position, measurement.velocity, plant),
-    )
-    return (model * more[0], model * more[1], model * more[2])
+def undo_remainder(control: Vector, measurement: PointMeasurement, plant: Libration, model: int) -> Vector:
+    """Return the control without what the full problem adds to the linear acceleration here, where `model` asks for that."""
+    if MODELS[model] == "linear":
+        return control
+    position, velocity = measurement.position, measurement.velocity
+    return subtract(control, subtract(nonlinear(position, velocity, plant), linear(position, velocity, plant)))
 
 
 def check_x(k_position: float, k_velocity: float, plant: Libration) -> None:

@@ -101,7 +101,7 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> st
 
 
 def _obligation(obligation: Obligation) -> str:
-    text = OBLIGATIONS[obligation.name]
+    text = OBLIGATIONS.get(obligation.name, obligation.name)
     reason = f"<br><b>{escape(evidence(obligation))}</b>" if obligation.evidence else ""
     return (
         f"<tr><td>{_outcome(obligation.outcome)}</td><td>{escape(_sentence_case(text))}{reason}</td>"

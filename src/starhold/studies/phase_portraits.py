@@ -11,8 +11,7 @@ import numpy as np
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.invariant import InvariantProblem, System, WantedSet
-from starhold.certification.invariant.descent import Candidate
-from starhold.certification.invariant.enclosure import EnclosedPolynomial
+from starhold.certification.invariant.candidate import Candidate, Floats
 from starhold.certification.invariant.search import Values
 from starhold.certification.invariant.theorems import indicator
 
@@ -95,13 +94,7 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
     # Of what is left, all of which some motions start from.
     sign = -1.0 if wanted.theorem == "unstable" else 1.0
     V = (values.V if flat else sign * _least(what, points, len(problem.system.variables), sign)).reshape(shape)
-    marks = [
-        o.evidence[key]
-        for o in claim.obligations
-        if o.outcome == "refuted"
-        for key in ("state", "outside")
-        if key in o.evidence
-    ]
+    marks = [o.evidence["state"] for o in claim.obligations if o.outcome == "refuted"]
     orbit = None if start is None or len(problem.system.variables) != 2 else _orbit(what, np.array(start))
     marked = tuple((mark[names[0]], mark[names[1]]) for mark in marks)
     equilibrium = None if wanted.equilibrium is None else (float(wanted.equilibrium[0]), float(wanted.equilibrium[1]))
@@ -132,8 +125,8 @@ class _Rates:
     def __init__(self, what: Candidate, moving: int) -> None:
         pieces = what.pieces
         self._moving = moving
-        self._surfaces = [EnclosedPolynomial(surface) for surface in pieces.surfaces]
-        self._cells = [(cell.signs, [EnclosedPolynomial(rate) for rate in cell.rates[:moving]]) for cell in pieces.cells]
+        self._surfaces = [Floats(surface) for surface in pieces.surfaces]
+        self._cells = [(cell.signs, [Floats(rate) for rate in cell.rates[:moving]]) for cell in pieces.cells]
 
     def __call__(self, points: Any) -> Any:
         speeds = np.full((self._moving, points.shape[1]), np.nan)

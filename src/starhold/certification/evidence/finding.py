@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from starhold.certification.evidence.squares import rounded, squares, text
+from starhold.certification.evidence.squares import plainly, rounded, squares, text
 from starhold.kernel import rules
 from starhold.kernel.numbers import Account, RefusedError, inverse, rational
-from starhold.kernel.polynomials import Poly
+from starhold.kernel.polynomials import Poly, multiple
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.reading import Claim, Told
 from starhold.kernel.theorems import THEOREMS
@@ -61,11 +61,11 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
     found: Any = None
     o = wanted[name]
     if isinstance(o, rules.Squares):
-        found = squares(o, scales)
+        found = plainly(o) or squares(o, scales)
         if found is None:
             raise NotFoundError(f"{name}: no sum of squares was found")
     elif isinstance(o, rules.Solves):
-        found = solves(o)
+        found = in_proportion(o) or solves(o)
     elif isinstance(o, rules.Vanishes) and o.modulo:
         found = [text(c) for c in euler(name, wanted)]
     elif isinstance(o, rules.Contracts):
@@ -75,6 +75,17 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
     except RefusedError as reason:
         raise NotFoundError(f"{name}: {reason}") from None
     return found
+
+
+def in_proportion(o: rules.Solves) -> dict[str, Any] | None:
+    """Return the matrix that takes each of what is given to what is wanted in its place; None for no multiples."""
+    if o.modulo or len(o.given) != len(o.wanted) or not all(p.terms for p in o.given):
+        return None
+    shares = [multiple(wanted, given) for given, wanted in zip(o.given, o.wanted, strict=True)]
+    if any(factor == 0 or offset != 0 for factor, offset in shares):
+        return None
+    rows = [[str(share[0]) if i == k else "0" for k in range(len(shares))] for i, share in enumerate(shares)]
+    return {"matrix": rows, "cofactors": [[] for _ in o.wanted]}
 
 
 def solves(o: rules.Solves) -> dict[str, Any]:

@@ -22,6 +22,9 @@ from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
 sparse: Any = import_module("scipy.sparse")
+TOLERANCE = 1e-11
+LIMIT = 30.0
+"""Seconds that the interior point may take."""
 DIGITS = (12, 14, 9, 16)
 DEFINITE = -1e-8
 """The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
@@ -42,8 +45,7 @@ class Problem:
 def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts; None where none was found. scales: about how large variables become."""
     p, known, fixed = settled(o)
-    for count in counts(o):
-        ansatz = cofactors(o, p, count)
+    for count, ansatz in [(k, each) for k in counts(o) for each in ansatzes(o, p, known, k)]:
         problem = posed(
             p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count]
         )
@@ -59,6 +61,21 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
                 continue
             return evidence
     return None
+
+
+def plainly(o: Squares) -> dict[str, Any] | None:
+    """Return evidence in which the matrix is what is left of p without relations; None where that is refused."""
+    p, known, fixed = settled(o)
+    problem = posed(p, known, [], o.z)
+    if o.modulo or not p.terms.keys() <= {m for q in problem.columns for m in q.terms}:
+        return None
+    found = exactly(problem, [0.0] * len(problem.columns), 1)
+    evidence = None if found is None else written(o, problem, found, fixed, [])
+    try:
+        o.check(evidence)
+    except RefusedError:
+        return None
+    return evidence
 
 
 def counts(o: Squares) -> list[int]:
@@ -79,6 +96,18 @@ def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
             fixed[place] = max(p.terms.get(strange, Fraction(0)) / g.terms[strange], Fraction(0))
             p = p - g * fixed[place]
     return p, [g for place, g in enumerate(known) if place not in fixed], fixed
+
+
+def ansatzes(o: Squares, p: Poly, known: list[Poly], count: int) -> list[list[list[Poly]]]:
+    """Return what is tried for cofactors: first only what makes no monomial that nothing else has, so that all that rounding
+    leaves can be put on the matrix."""
+    whole = cofactors(o, p, count)
+    grams = [a * b for k, a in enumerate(o.z[:count]) for b in o.z[: k + 1]]
+    held = {m for q in (p, *known, *grams) for m in q.terms}
+    fitting = [
+        [c for c in parts if (c * relation).terms.keys() <= held] for relation, parts in zip(o.modulo, whole, strict=True)
+    ]
+    return [fitting, whole] if fitting != whole and any(fitting) else [whole]
 
 
 def cofactors(o: Squares, p: Poly, count: int) -> list[list[Poly]]:
@@ -139,8 +168,8 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
         raise InputError("certify", "", "no clarabel", "pip install clarabel, which guesses matrices") from None
     cones = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(signed), *map(clarabel.PSDTriangleConeT, sides)]
     settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    settings.verbose, settings.time_limit = False, LIMIT
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     solver = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, sparse.csc_matrix(A), b, cones, settings)
     found = solver.solve()
     return np.array(found.x) if "Solved" in str(found.status) or "Insufficient" in str(found.status) else None

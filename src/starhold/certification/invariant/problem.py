@@ -15,14 +15,13 @@ from typing import Any, cast
 
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.certificate import Certificate
-from starhold.certification.certificate import write as write_certificates
+from starhold.certification.evidence.finding import certificate as kernel_certificate
 from starhold.certification.invariant.system import System, split
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
-from starhold.certification.invariant.theorems import THEOREMS, WantedSet, indicator, prove
+from starhold.certification.invariant.theorems import THEOREMS, Shown, WantedSet, indicator, show
 from starhold.errors import InputError
 from starhold.files import read_text
 
-FORMAT = "starhold invariant certificate 2"
 MOST, LARGEST, LONGEST = 6, 1e100, 100
 """Variables and parameters together, beyond which branch and bound would not end; numbers of a box, of which floats hold
 the powers; characters of a name."""
@@ -47,21 +46,29 @@ class InvariantProblem:
         return self.orbits[place] if place < len(self.orbits) else None
 
 
-def certify(problem: InvariantProblem) -> Certificate:
+@dataclass(frozen=True, repr=False)
+class SetCertificate(Certificate):
+    """Claims about invariant sets; `shown` has those that are proved or refuted as the kernel reads them."""
+
+    shown: tuple[Shown, ...] = ()
+
+
+def certify(problem: InvariantProblem) -> SetCertificate:
     """Prove each claim of a problem as far as possible."""
     system = problem.system
     rates = zip(system.variables, system.rates, strict=True)
     written = problem.written or {"rates": {name: [str(piece.value) for piece in pieces(rate)] for name, rate in rates}}
     subject = {"variables": list(system.variables), "parameters": list(system.parameters), **written}
-    return Certificate(problem.name, subject, tuple(prove(system, wanted) for wanted in problem.claims))
+    shown = tuple(show(system, wanted) for wanted in problem.claims)
+    return SetCertificate(problem.name, subject, tuple(one.claim for one in shown), shown=shown)
 
 
-def write(certificate: Certificate, path: Path) -> None:
-    """The certificate as a JSON file, in the form that all certificates have."""
-    write_certificates([certificate], certificate.name, path)
-    content = json.loads(path.read_text(encoding="utf-8"))
-    content["format"] = FORMAT
-    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+def write(certificate: SetCertificate, path: Path) -> None:
+    """Write what is proved or refuted as the kernel reads it."""
+    told = [one for one in certificate.shown if one.kernel is not None]
+    programs = [program for one in told for program in one.programs]
+    content = kernel_certificate(programs, [one.kernel for one in told if one.kernel is not None])
+    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 def builtin_names() -> list[str]:

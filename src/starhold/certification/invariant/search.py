@@ -12,10 +12,8 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.invariant.descent import Candidate, Guarded
-from starhold.certification.invariant.enclosure import Boxes, EnclosedPolynomial
-from starhold.certification.invariant.signs import from_equilibrium, lowest
-from starhold.certification.invariant.system import Cell, Poly, along
+from starhold.certification.invariant.candidate import Candidate, Floats
+from starhold.certification.invariant.system import Cell, Poly, solve
 from starhold.certification.matrices import number
 
 Array = NDArray[np.float64]
@@ -33,14 +31,14 @@ class Values:
         self.points = points
         self.V, self.slope = np.full(count, np.nan), np.full(count, np.nan)
         self.cell = np.full(count, -1)
-        surfaces = [EnclosedPolynomial(s).at(points) for s in what.pieces.surfaces]
+        surfaces = [Floats(s).at(points) for s in what.pieces.surfaces]
         for place, cell in enumerate(what.pieces.cells):
             here = self.cell < 0
             for side, values in zip(cell.signs, surfaces, strict=True):
                 here &= side * values >= 0.0
             self.cell[here] = place
-            self.V[here] = EnclosedPolynomial(cell.V).at(points[:, here])
-            self.slope[here] = EnclosedPolynomial(cell.slope).at(points[:, here])
+            self.V[here] = Floats(cell.V).at(points[:, here])
+            self.slope[here] = Floats(cell.slope).at(points[:, here])
 
 
 def grid(box: Sequence[tuple[float, float]], count: int | None = None) -> Array:
@@ -87,8 +85,8 @@ def stuck(what: Candidate) -> list[Array]:
     found: list[Array] = []
     moving = what.pieces.moving
     for place, cell in enumerate(what.pieces.cells):
-        rates = [EnclosedPolynomial(rate) for rate in cell.rates[:moving]]
-        slopes = [[EnclosedPolynomial(rate.derivative(k)) for k in range(moving)] for rate in cell.rates[:moving]]
+        rates = [Floats(rate) for rate in cell.rates[:moving]]
+        slopes = [[Floats(rate.derivative(k)) for k in range(moving)] for rate in cell.rates[:moving]]
         points = grid(what.box, 7)
         for _ in range(12):
             f = np.array([rate.at(points) for rate in rates])
@@ -226,57 +224,37 @@ def member(what: Candidate, level: float) -> tuple[Any, ...] | None:
     return None
 
 
-def leaving(what: Candidate) -> dict[str, Any] | None:
-    """Two states of a small box in which V' > 0, the first in M, the second with V > 0: on the way between them M ends, and
-    motions leave it. Verified; None if none is found."""
-    values = Values(what, grid(what.box))
-    near = np.flatnonzero((values.V > 0.0) & (values.slope > 1e-9 * np.nanmax(np.abs(values.slope), initial=1e-300)))
-    for place in near[np.argsort(values.V[near], kind="stable")][:TRIES]:
-        cell = what.guarded[int(values.cell[place])]
-        found = _border(what, cell, values.points[:, place])
-        if found is not None:
-            return found
+def jump(what: Candidate) -> dict[str, Any] | None:
+    """A state of two closed cells at which their V differ, verified, on a linear surface; None if none is found."""
+    every = (*what.pieces.cells, *what.pieces.thin)
+    for place, one in enumerate(every):
+        for other in every[place + 1 :]:
+            linear = ((m, solve(m)) for m in (what.pieces.surfaces[k] for k in one.apart(other)))
+            surface, solved = next((found for found in linear if found[1] is not None), (None, None))
+            if solved is None or what.pieces.agree(one, other, [(one.V, other.V)]):
+                continue
+            free, instead = solved
+            points = grid([(0.0, 0.0) if k == free else side for k, side in enumerate(what.box)], 41)
+            gaps = np.abs(Floats(what.pieces.reduced(one.V - other.V, [surface])).at(points))
+            for k in np.argsort(-gaps, kind="stable"):
+                state = list(next(rounded(points[:, k])))
+                state[free] = instead(*state)
+                cells = closed_cells(what, state)
+                if in_box(what, state) and one in cells and other in cells and one.V(*state) != other.V(*state):
+                    sides = [number(one.V(*state)), number(other.V(*state))]
+                    return {"state": named(what, state), "V from both sides": sides}
     return None
 
 
-def _border(what: Candidate, cell: Guarded, point: Array) -> dict[str, Any] | None:
-    gradient = [EnclosedPolynomial(cell.cell.V.derivative(k)) for k in range(len(point))]
-    g = np.zeros(len(point))
-    for _ in range(8):
-        g = np.array([float(slope.at(point[:, None])[0]) for slope in gradient])
-        g[what.pieces.moving :] = 0.0
-        if not g.any():
-            return None
-        point = point - float(cell.V.at(point[:, None])[0]) * g / float(g @ g)
-    size = float(np.max([high - low for low, high in what.box]))
-    for share in (1e-2, 1e-3, 1e-4, 1e-6):
-        step = share * size * g / float(np.linalg.norm(g))
-        ends = [tuple(exact(float(f"{x:.9g}")) for x in point + way * step) for way in (-1.0, 1.0)]
-        inside, outside = (value(what, end) for end in ends)
-        if inside is None or outside is None or not (inside <= 0 < outside):
-            continue
-        sides = [(min(number(a), number(b)), max(number(a), number(b))) for a, b in zip(*ends, strict=True)]
-        boxes = Boxes(tuple(_interval(low, high) for low, high in sides))
-        here = [other for other in what.guarded if other.inside(boxes)[0]]
-        if any(other.cell.rates != cell.cell.rates for other in here):
-            continue
-        least = float(EnclosedPolynomial(along(cell.cell.V, cell.cell.rates)).on(boxes).low[0])
-        if least > 0.0 and all(_same_or_less(what, other.cell, cell.cell.V) for other in here):
-            return {"state": named(what, ends[0]), "outside": named(what, ends[1]), "V' between": least}
-    return None
+def from_equilibrium(q: Poly, equilibrium: Sequence[Any]) -> Poly:
+    """The polynomial in the distance from an equilibrium."""
+    generators = q.context().gens()
+    return q.compose(*(g if x is None else g + x for g, x in zip(generators, equilibrium, strict=True)))
 
 
-def _same_or_less(what: Candidate, cell: Cell, V: Poly) -> bool:
-    """Whether V of a cell is this one, or zero where this one is not positive."""
-    leading = V.leading_coefficient()
-    sides = zip(what.pieces.surfaces, cell.signs, strict=True)
-    return cell.V == V or (cell.V.is_zero() and any(s * leading == V and side * leading < 0 for s, side in sides))
-
-
-def _interval(low: float, high: float) -> Any:
-    from starhold.algebra.intervals import Intervals
-
-    return Intervals(np.array([low]), np.array([high]))
+def lowest(q: Poly, moving: Sequence[int]) -> int:
+    """The lowest degree in the moving variables among a polynomial's terms."""
+    return min((sum(powers[k] for k in moving) for powers in q.to_dict()), default=0)
 
 
 def ray(what: Candidate, wanted: Callable[[Poly, Poly], Poly | None]) -> dict[str, Any] | None:

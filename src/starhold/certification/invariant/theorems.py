@@ -11,35 +11,45 @@ M is a compact set, V its indicator: continuous, zero on M and positive elsewher
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 from starhold.algebra.polynomial import exact
 from starhold.algebra.scalar import maximum
-from starhold.certification.certificate import EXACT, Claim, Obligation, Outcome
-from starhold.certification.invariant import enclosure, search
-from starhold.certification.invariant.continuity import continuous
-from starhold.certification.invariant.descent import Candidate, bounded, falls, jumps, leaves, positive, switches
-from starhold.certification.invariant.measure import volume
-from starhold.certification.invariant.system import Poly, System
-from starhold.certification.matrices import number
+from starhold.certification.certificate import Claim, Obligation
+from starhold.certification.evidence.finding import certificate
+from starhold.certification.invariant import search
+from starhold.certification.invariant.candidate import Candidate
+from starhold.certification.invariant.prover import Attempt, proved, scales
+from starhold.certification.invariant.recording import program
+from starhold.certification.invariant.system import System, plain
+from starhold.kernel.check import prove as kernel_proves
+from starhold.kernel.numbers import Account, RefusedError
+from starhold.kernel.polynomials import Poly as Exact
+from starhold.kernel.reading import Claim as KernelClaim
+from starhold.kernel.reading import read_certificate
 
-INTERVALS = "interval arithmetic"
-VERIFIED = "exact inequality"
+SQUARES, VERIFIED = "sums of squares", "exact inequality"
+KERNEL = {"stable": "is stable", "unstable": "is unstable"}
+"""The kernel's theorems; the others are about what attracts."""
 THEOREMS = ("stable", "attracts", "region", "unstable", "intersection")
-LESS = (1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.2, 0.3, 0.6, 0.9, 0.99)
-"""How far below the level that floats suggest a proof is tried."""
-PATIENCE = 4
-"""Levels at which V falls that are tried for the rest of what has to be shown."""
-SLIDES = "a motion may slide on a surface where the right-hand side jumps, and V is not shown to change there as it must"
-STAYS = "no function is shown to grow where V' = 0: try another `escape`"
+STEPS = {
+    "positive": "positive", "border": "bounded", "changes": "falls", "agree": "switching", "continuous": "continuous",
+    "never": "falls",
+}  # fmt: skip
+"""What the kernel's obligations are about."""
 ASSUMPTIONS = (
     "the equations exactly as given",
     "where the right-hand side jumps, motions in the sense of Filippov: x' is any mean of what it is on the sides and on "
     "the surface",
 )
+NEAR = 1e-6
+"""The share of the largest V below which a V that rises leaves no level."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +57,7 @@ class WantedSet:
     """One claim to be shown. `V`: a polynomial or piecewise one, for `intersection` several; `box`: where, in the order of
     variables and parameters; `equilibrium`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
-    of M; `squares`: functions such that V' is a sum of their squares with negative factors; `known`: the area (or
+    of M; `squares`: functions that vanish on M, of whose multiples squares are made; `known`: the area (or
     volume) of the true region, if somebody knows it."""
 
     theorem: str
@@ -61,42 +71,27 @@ class WantedSet:
     name: str = ""
 
 
-@dataclass
-class _Proof:
-    """Obligations and numbers, gathered on the way to a claim."""
+@dataclass(frozen=True)
+class Shown:
+    """A claim with what was shown of it, and as the kernel reads it with its programs, where that is proved or refuted."""
 
-    wanted: WantedSet
-    what: Candidate
-    found: list[Obligation] = field(default_factory=list[Obligation])
-    numbers: dict[str, Any] = field(default_factory=dict[str, Any])
-    limit: dict[str, float] | None = None
-    """The state that stops the level."""
-
-    def add(self, name: str, how: str, holds: bool | None, evidence: dict[str, Any] | None = None) -> bool:
-        outcome: Outcome = "proved" if holds else "undecided" if holds is None else "refuted"
-        self.found.append(Obligation(name, how, outcome, evidence or {}))
-        return bool(holds)
-
-    def perhaps(self, name: str, holds: bool, reason: str) -> bool:
-        """Add an obligation that is proved or else undecided."""
-        return self.add(name, INTERVALS, True if holds else None, {} if holds else {"reason": reason})
-
-    def claim(self) -> Claim:
-        witness: dict[str, Any] = {"name": self.wanted.name, "box": [list(side) for side in self.wanted.box]}
-        if self.limit is not None:
-            witness["limit"] = self.limit
-        told = {"theorem": self.wanted.theorem} | self.numbers
-        assumptions = ASSUMPTIONS if jumps(self.what.pieces) else ASSUMPTIONS[:1]
-        return Claim(f"invariant-{self.wanted.theorem}", told, witness, assumptions, tuple(self.found))
+    claim: Claim
+    kernel: dict[str, Any] | None
+    programs: tuple[dict[str, Any], ...]
 
 
 def indicator(wanted: WantedSet) -> Any:
-    """The V of a claim; of several functions the largest, or zero."""
+    """Return the V of a claim; of several functions the largest, or zero."""
     return reduce(maximum, (*wanted.V, 0)) if wanted.theorem == "intersection" else wanted.V
 
 
 def prove(system: System, wanted: WantedSet) -> Claim:
-    """The claim with what was shown of it."""
+    """Return the claim with what was shown of it."""
+    return show(system, wanted).claim
+
+
+def show(system: System, wanted: WantedSet) -> Shown:
+    """Prove a claim as far as possible."""
     if wanted.theorem not in THEOREMS:
         raise ValueError(f"no theorem {wanted.theorem}")
     if len(wanted.box) != len(system.names):
@@ -104,215 +99,153 @@ def prove(system: System, wanted: WantedSet) -> Claim:
     if wanted.equilibrium is not None and len(wanted.equilibrium) != len(system.variables):
         raise ValueError(f"an equilibrium of {len(wanted.equilibrium)} numbers for {len(system.variables)} variables")
     point = None if wanted.equilibrium is None else (*map(exact, wanted.equilibrium), *(None for _ in system.parameters))
-    proof = _Proof(wanted, Candidate(system, indicator(wanted), wanted.box, point, wanted.squares))
-    # In this order: what comes later makes no sense without what comes before.
-    steps = [_equilibrium, _continuous, _member]
-    steps += [_unstable] if wanted.theorem == "unstable" else [_positive, _falling]
-    with enclosure.allowed(enclosure.ALL):
-        for step in steps:
-            if not step(proof):
-                break
-        return proof.claim()
+    what = Candidate(system, indicator(wanted), wanted.box, point)
+    return _Proof(wanted, what).shown()
 
 
-def _equilibrium(proof: _Proof) -> bool:
-    """That the point can be stayed at."""
-    equilibrium, what = proof.what.equilibrium, proof.what
-    if equilibrium is None:
-        return True
-    if not all(x is None or low < number(x) < high for x, (low, high) in zip(equilibrium, what.box, strict=True)):
-        return proof.add("equilibrium", EXACT, None, {"reason": "the equilibrium is not inside the box"})
-    cells = search.cells_at(what, equilibrium)
-    rates = [[search.at(rate, equilibrium) for rate in cell.rates] for cell in cells]
-    # A mean of two rates is zero where one is a negative multiple of the other: then a motion can stay by sliding.
-    if any(all(rate.is_zero() for rate in own) for own in rates) or any(
-        _balanced(one, other) for one in rates for other in rates
-    ):
-        return proof.add("equilibrium", EXACT, True)
-    if len(cells) > 1:
-        return proof.add("equilibrium", EXACT, None, {"reason": "no mean of the rates of two sides is zero there"})
-    evidence = {"state": search.named(what, equilibrium), "rates": [str(rate) for rate in rates[0]]}
-    return proof.add("equilibrium", EXACT, False, evidence)
+class _Proof:
+    """One claim on its way to the kernel."""
+
+    def __init__(self, wanted: WantedSet, what: Candidate) -> None:
+        self.wanted, self.what = wanted, what
+        system = what.system
+        self.programs = {"rates": program(system.rates, system.names), "V": program([what.V], system.names)}
+        self.unstable = wanted.theorem == "unstable"
+        self.numbers: dict[str, Any] = {"theorem": wanted.theorem}
+        if wanted.level is not None and not self.unstable:
+            self.numbers["level"] = wanted.level
+        self.witness: dict[str, Any] = {"name": wanted.name, "box": [list(side) for side in wanted.box]}
+        self.witness["equilibrium"] = wanted.equilibrium is not None
+
+    def shown(self) -> Shown:
+        """Return the claim with its outcome."""
+        kernel = self.proof()
+        if not isinstance(kernel, str):
+            statement = kernel_proves(claim_of(kernel, self.programs)).statement
+            if "level" in kernel["numbers"]:
+                self.numbers["level"] = float(Fraction(kernel["numbers"]["level"]))
+            self.tell()
+            return self.made(Obligation("proof", SQUARES, "proved"), kernel, "filippov" in statement.assumptions)
+        for name, word, find in self.refutations():
+            state = find()
+            if state is not None:
+                return self.made(Obligation(name, VERIFIED, "refuted", state), self.against(word, state))
+        step = next((what for word, what in STEPS.items() if f": {word}" in kernel), "falls")
+        name = "grows" if self.unstable and step == "falls" else step
+        return self.made(Obligation(name, SQUARES, "undecided", {"reason": kernel}), None)
+
+    def made(self, obligation: Obligation, kernel: dict[str, Any] | None, jumps: bool = False) -> Shown:
+        """Return the claim."""
+        assumptions = ASSUMPTIONS if jumps else ASSUMPTIONS[:1]
+        claim = Claim(f"invariant-{self.wanted.theorem}", self.numbers, self.witness, assumptions, (obligation,))
+        return Shown(claim, kernel, tuple(self.programs.values()))
+
+    def attempt(self, theorem: str, numbers: dict[str, Fraction], taken: tuple[str, ...] = ()) -> Attempt:
+        """Return a claim for the kernel without evidence."""
+        wanted, system = self.wanted, self.what.system
+        box = dict(zip(system.names, wanted.box, strict=True))
+        subject = {f"box.{x}.{k}": str(Fraction(end)) for x, ends in box.items() for k, end in enumerate(ends)}
+        point: dict[str, Any] = {}
+        if wanted.equilibrium is not None:
+            point = dict(zip(system.variables, (fraction(exact(x)) for x in wanted.equilibrium), strict=True))
+        told = {f"equilibrium.{x}": v for x, v in point.items()} | numbers
+        sizes = scales(box, {x: float(v) for x, v in point.items()})
+        basis = [self.polynomial(h) for h in wanted.squares] or None
+        return Attempt(theorem, self.programs, subject, {x: str(v) for x, v in told.items()}, sizes, basis, taken=taken)
+
+    def polynomial(self, function: Any) -> Exact:
+        """Return a function that is not piecewise as the kernel has it."""
+        found = plain(self.what.system, function).to_dict().items()
+        names = self.what.system.names
+        terms = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in found}
+        return Exact({tuple(sorted(m)): Fraction(int(c.p), int(c.q)) for m, c in terms.items()})
+
+    def proof(self) -> dict[str, Any] | str:
+        """Return the claim with evidence that the kernel accepts, or why there is none."""
+        wanted, what, numbers = self.wanted, self.what, dict[str, Fraction]()
+        levelled = wanted.level is not None and not self.unstable
+        top = math.inf if self.unstable or levelled else search.ceiling(what, wanted.theorem != "stable")
+        if top <= 0.0:
+            return "V is not positive on the border of the box, or V rises however small it is: border"
+        if levelled:
+            numbers["level"] = Fraction(wanted.level or 0.0)
+        if what.equilibrium is None:
+            falls = wanted.theorem not in ("stable", "unstable")
+            member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if falls else 0.0)
+            if member is None:
+                return "no state with V <= 0 was found in the box: member"
+            numbers |= {f"member.{x}": fraction(v) for x, v in zip(what.pieces.names, member, strict=True)}
+        elif self.unstable:
+            way = search.ray(what, lambda V, slope: V)
+            if way is None:
+                return "no direction was found in which V > 0: direction"
+            numbers |= {f"direction.{x}": Fraction(v) for x, v in way["direction"].items()}
+        escape = None if wanted.escape is None else self.polynomial(wanted.escape)
+        return proved(self.attempt(KERNEL.get(wanted.theorem, "attracts"), numbers), top, escape)
+
+    def refutations(self) -> list[tuple[str, str, Callable[[], dict[str, Any] | None]]]:
+        """Return what may refute the claim: the names of what is needed and of how V fails, and a search for a state."""
+        what, level = self.what, self.wanted.level
+        sense, word = (-1, "does not grow") if self.unstable else (1, "does not fall")
+        found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
+        found.append(("continuous", "jumps", lambda: search.jump(what)))
+        if what.equilibrium is not None and not self.unstable:
+            found.append(("positive", "is not positive", lambda: search.not_positive(what)))
+        if not self.unstable or what.equilibrium is None:
+            border = 0.0 if level is None or self.unstable else level
+            found.append(("bounded", "reaches the border", lambda: search.reaching(what, border)))
+        least = math.inf if self.unstable else level if level is not None else self.near()
+        name = "grows" if self.unstable else "falls"
+
+        def changes() -> dict[str, Any] | None:
+            state = search.rising(what, least, sense)
+            weak = self.wanted.theorem == "stable" and state is not None and state["V'"] <= 0.0
+            return None if weak else state
+
+        return [*found, (name, word, changes)]
+
+    def near(self) -> float:
+        """Return a V so small that where it rises no level can be claimed."""
+        values = search.Values(self.what, search.grid(self.what.box)).V
+        return NEAR * float(abs(values[values == values]).max(initial=0.0))
+
+    def against(self, word: str, state: dict[str, Any]) -> dict[str, Any] | None:
+        """Return the claim that V fails at a state, where the kernel accepts it."""
+        numbers = {f"state.{x}": Fraction(v) for x, v in state["state"].items()}
+        found = self.attempt("fails", numbers, (word,)).claim()
+        try:
+            kernel_proves(claim_of(found, self.programs))
+        except RefusedError:
+            return None
+        return found
+
+    def tell(self) -> None:
+        """Say how near the level is to what refutes, and about how large the set."""
+        what, numbers = self.what, self.numbers
+        if self.wanted.theorem in ("region", "intersection") and self.wanted.level is None:
+            rising, border = (find(what, math.inf, digits=search.NEAR) for find in (search.rising, search.reaching))
+            kinds = {"V rises": rising, "border": border}
+            above = {kind: float(found["V"]) for kind, found in kinds.items() if found}
+            if above:
+                numbers["limited_by"] = min(above, key=lambda kind: above[kind])
+                numbers["refuted_level"] = above[numbers["limited_by"]]
+                self.witness["limit"] = (kinds[numbers["limited_by"]] or {})["state"]
+        if len(what.box) <= 3 and not what.system.parameters and "level" in numbers:
+            # In the middles of equal parts of the box.
+            count = search.POINTS[len(what.box)]
+            parts = [(low + (high - low) / count / 2.0, high - (high - low) / count / 2.0) for low, high in what.box]
+            inside = numbers["level"] >= search.Values(what, search.grid(parts)).V
+            numbers["size"] = float(inside.mean() * math.prod(high - low for low, high in what.box))
+            if self.wanted.known is not None:
+                numbers["known"] = self.wanted.known
 
 
-def _balanced(one: list[Poly], other: list[Poly]) -> bool:
-    """Whether the rates of two cells, not zero and without parameters, are opposite."""
-    if not all(rate.is_constant() for rate in one + other):
-        return False
-    a, b = ([0 if rate.is_zero() else rate.leading_coefficient() for rate in own] for own in (one, other))
-    place = next((k for k, x in enumerate(b) if x != 0), None)
-    return (
-        place is not None
-        and a[place] / b[place] < 0
-        and all(x == y * (a[place] / b[place]) for x, y in zip(a, b, strict=True))
-    )
+def claim_of(claim: dict[str, Any], programs: dict[str, dict[str, Any]]) -> KernelClaim:
+    """Return a claim as the kernel reads it in a certificate."""
+    Account.open()
+    return read_certificate(json.dumps(certificate([*programs.values()], [claim])))[0]
 
 
-def _continuous(proof: _Proof) -> bool:
-    how, holds, evidence = continuous(proof.what)
-    return proof.add("continuous", how, holds, evidence)
-
-
-def _member(proof: _Proof) -> bool:
-    what = proof.what
-    if what.equilibrium is not None:
-        found = [search.at(cell.V, what.equilibrium) for cell in search.cells_at(what, what.equilibrium)]
-        holds = all(V.is_zero() for V in found)
-        evidence = {} if holds else {"state": search.named(what, what.equilibrium), "V": [str(V) for V in found]}
-        return proof.add("set", EXACT, holds, evidence)
-    if proof.wanted.theorem not in ("stable", "unstable"):
-        # Shown by any state of {V <= level}, for the least V of that set cannot be positive where V falls.
-        return True
-    return _inhabited(proof, 0.0)
-
-
-def _inhabited(proof: _Proof, level: float) -> bool:
-    state = search.member(proof.what, level)
-    if state is None:
-        return proof.add("set", VERIFIED, None, {"reason": "no state with V <= 0 was found in the box"})
-    return proof.add("set", VERIFIED, True, {"state": search.named(proof.what, state)})
-
-
-def _positive(proof: _Proof) -> bool:
-    """V > 0 outside of M: by definition, unless M is told to be an equilibrium."""
-    what = proof.what
-    if what.equilibrium is not None and not positive(what):
-        refuted = search.not_positive(what)
-        return proof.add("positive", INTERVALS, False if refuted else None, refuted or _exhausted())
-    if what.equilibrium is not None:
-        return proof.add("positive", INTERVALS, True)
-    if bounded(what, 0.0):
-        return True
-    refuted = search.reaching(what, 0.0)
-    return proof.add("bounded", INTERVALS, False if refuted else None, refuted or _exhausted())
-
-
-def _unstable(proof: _Proof) -> bool:
-    what = proof.what
-    if what.equilibrium is None:
-        holds = bounded(what, 0.0)
-        refuted = None if holds else search.reaching(what, 0.0)
-        near = proof.add("bounded", INTERVALS, True if holds else False if refuted else None, refuted or {})
-    else:
-        found = search.ray(what, lambda V, slope: V)
-        reason = {"reason": "no direction was found in which V > 0"}
-        near = proof.add("positive nearby", VERIFIED, True if found else None, found or reason)
-    if not near:
-        return False
-    weak = falls(what, math.inf, -1)
-    if weak is not None and not weak:
-        proof.add("grows", INTERVALS, True)
-        return not jumps(what.pieces) or proof.perhaps("switching", switches(what, math.inf, -1), SLIDES)
-    refuted = search.rising(what, math.inf, -1)
-    return proof.add("grows", INTERVALS, False if refuted else None, refuted or _exhausted())
-
-
-class _Shown(NamedTuple):
-    """A level at which V is shown to fall, and whether the rest is shown there too; `left` is None where nothing need be."""
-
-    level: float
-    crossed: bool
-    left: bool | None
-
-
-def _falling(proof: _Proof) -> bool:
-    """The set {V <= level}: bounded, V falls on it. The largest level at which all is shown, unless one is given."""
-    what, wanted = proof.what, proof.wanted
-    if wanted.level is not None:
-        shown = _at(proof, wanted.level)
-        if shown is None:
-            return _not_at(proof, wanted.level)
-    else:
-        if _refuted_near(proof):
-            return False
-        shown = _largest(proof)
-        if shown is None:
-            hint = "" if what.equilibrium is not None else "; where M is one point, say so by `equilibrium`"
-            return proof.add("falls", INTERVALS, None, {"reason": _exhausted()["reason"] + hint})
-    if what.equilibrium is None and wanted.theorem != "stable":
-        _inhabited(proof, shown.level)
-    proof.add("bounded", INTERVALS, True)
-    proof.add("falls", INTERVALS, True)
-    proof.numbers["level"] = shown.level
-    if jumps(what.pieces):
-        proof.perhaps("switching", shown.crossed, SLIDES)
-    if shown.crossed and shown.left is not None:
-        proof.perhaps("leaves", shown.left, STAYS)
-    if what.equilibrium is None and shown.crossed:
-        # Where V cannot rise it cannot become positive.
-        proof.add("invariant", INTERVALS, True)
-    _tell(proof, shown.level)
-    return True
-
-
-def _at(proof: _Proof, level: float) -> _Shown | None:
-    """Try a level; None where V is not shown to fall."""
-    what = proof.what
-    weak = falls(what, level) if bounded(what, level) else None
-    if weak is None:
-        return None
-    crossed = not jumps(what.pieces) or switches(what, level)
-    if proof.wanted.theorem == "stable" or not crossed or not weak:
-        return _Shown(level, crossed, None)
-    escape = None if proof.wanted.escape is None else what.polynomial(proof.wanted.escape)
-    return _Shown(level, crossed, leaves(what, weak, level, escape))
-
-
-def _largest(proof: _Proof) -> _Shown | None:
-    """At the largest level that is tried and shows all; else at the largest that shows that V falls."""
-    # Where the set has to be stable only, motions may stay in it anywhere.
-    guess, first, others = search.ceiling(proof.what, proof.wanted.theorem != "stable"), None, 0
-    for less in LESS:
-        shown = _at(proof, guess * (1.0 - less)) if guess > 0.0 else None
-        if shown is not None and shown.crossed and shown.left is not False:
-            return shown
-        first = first or shown
-        others += shown is not None
-        if others == PATIENCE:
-            break
-    return first
-
-
-def _not_at(proof: _Proof, level: float) -> bool:
-    """A level that was asked for and is not shown."""
-    proof.numbers["level"] = level
-    reaching = search.reaching(proof.what, level)
-    if reaching is not None:
-        return proof.add("bounded", INTERVALS, False, reaching)
-    rising = search.rising(proof.what, level)
-    if rising is not None and (rising["V'"] > 0.0 or proof.wanted.theorem != "stable"):
-        return proof.add("falls", INTERVALS, False, rising)
-    return proof.add("falls", INTERVALS, None, _exhausted())
-
-
-def _refuted_near(proof: _Proof) -> bool:
-    """Whether motions are found to leave M, or V to rise however near M, so that there is no level."""
-    leaving = search.leaving(proof.what) if proof.what.equilibrium is None else None
-    if leaving is not None:
-        proof.add("invariant", INTERVALS, False, leaving)
-        return True
-    ray = search.ray(proof.what, lambda V, slope: slope)
-    if ray is not None:
-        proof.add("falls", VERIFIED, False, ray)
-    return ray is not None
-
-
-def _tell(proof: _Proof, level: float) -> None:
-    """How near the level is to what refutes, and how large the set."""
-    what, numbers = proof.what, proof.numbers
-    if proof.wanted.theorem in ("region", "intersection") and proof.wanted.level is None:
-        rising, border = (find(what, math.inf, digits=search.NEAR) for find in (search.rising, search.reaching))
-        kinds = {"V rises": rising, "border": border}
-        above = {kind: float(found["V"]) for kind, found in kinds.items() if found}
-        if above:
-            numbers["limited_by"] = min(above, key=lambda kind: above[kind])
-            numbers["refuted_level"] = above[numbers["limited_by"]]
-            proof.limit = (kinds[numbers["limited_by"]] or {})["state"]
-    if len(what.box) <= 3 and not what.system.parameters:
-        numbers["size"] = volume(what, level)
-        if proof.wanted.known is not None:
-            numbers["known"] = proof.wanted.known
-
-
-def _exhausted() -> dict[str, Any]:
-    return {"reason": "neither shown with the boxes that were allowed nor refuted by a state"}
+def fraction(x: Any) -> Fraction:
+    """Return an exact number of flint."""
+    return Fraction(int(x.p), int(x.q))

@@ -16,17 +16,13 @@ HEADINGS = {
 }
 
 OBLIGATIONS = {
-    "equilibrium": "the point is an equilibrium of the system",
+    "proof": "the kernel accepts the evidence",
     "continuous": "V is continuous",
-    "set": "M is not empty, and V is zero on it",
     "positive": "V > 0 everywhere in the box but at the equilibrium",
-    "positive nearby": "V > 0 somewhere in every neighbourhood of the equilibrium",
     "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
-    "falls": "V never rises on the set, and falls but where told",
+    "falls": "V never rises on the set, and falls but where a function is told that grows there",
     "grows": "V grows wherever it is positive in the box",
-    "switching": "where the right-hand side jumps, motions cross, or V changes as it must for every mean there",
-    "leaves": "no motion stays where V does not fall, but in M",
-    "invariant": "no motion leaves M",
+    "switching": "where the right-hand side jumps, V changes as it must for every mean there",
 }
 
 
@@ -34,8 +30,8 @@ def sentence(claim: Claim) -> str:
     """The claim in a sentence, whether or not it is proved."""
     n = claim.numbers
     theorem, level = n["theorem"], n.get("level")
-    where = "a level set of V" if level is None else f"{{V <= {down(level)}}}"
-    M = "the equilibrium" if any(o.name == "equilibrium" for o in claim.obligations) else "M"
+    where = "a level set of V" if level is None else f"{{V < {down(level)}}}"
+    M = "the equilibrium" if claim.witness["equilibrium"] else "M"
     sense = ", in Filippov's sense," if len(claim.assumptions) > 1 else ""
     if theorem == "unstable":
         return f"{M} is unstable: every motion{sense} that starts in the box where V > 0 leaves the box"
@@ -50,12 +46,11 @@ def size(numbers: Mapping[str, Any], orbit: float | None = None) -> str:
     """How large the set is, and its share of what is known of the true region (`orbit`: the area inside of it)."""
     if "size" not in numbers:
         return ""
-    low, high = numbers["size"]
-    text = f"its size is at least {down(low)} and at most {_up(high)}"
-    known = numbers.get("known", orbit)
-    if known is not None:
-        text += f": {100.0 * low / known:.1f} % of the true region's {known:.4g}"
-        text += ", as the file tells" if "known" in numbers else ", integrated in floats"
+    share = numbers.get("known", orbit)
+    text = f"its size is about {numbers['size']:.4g}, counted in floats"
+    if share is not None:
+        text += f": {100.0 * numbers['size'] / share:.1f} % of the true region's {share:.4g}"
+        text += ", as the file tells" if "known" in numbers else ""
     return text
 
 

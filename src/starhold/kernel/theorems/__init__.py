@@ -8,7 +8,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, sampling, sliding
+from . import attitude, invariant, sampling, sliding, station
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -20,4 +20,15 @@ THEOREMS: dict[str, Theorem] = {
     "converges from both quaternions whatever the inertia": attitude.converges_evenly_whatever_the_inertia,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
+    "ends on the circle": station.ends_on_circle,
+    "comes to rest": station.comes_to_rest,
+    "returns with limited control": station.returns_with_limited_control,
+    "needs more control on the circle": station.needs_more_control,
+    "does not return": station.does_not_return,
+    "holds another circle": station.holds_another_circle,
+    "attracts": invariant.attracts,
+    "is stable": invariant.stays,
+    "is unstable": invariant.leaves,
+    "avoids": invariant.avoids,
+    "fails": invariant.fails,
 }

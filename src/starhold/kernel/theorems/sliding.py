@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from ..loops import AXES, HYSTERESIS, SHORTEST, AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times, transpose
-from ..polynomials import Poly, apply, dot, poly
+from ..polynomials import Poly, apply, dot, multiple, poly
 from ..programs import Case
 from ..reading import Claim
 from ..rules import Definite, Exceeds, Obligation, Shown, Squares, Vanishes
@@ -89,14 +89,6 @@ def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
             linear.append(slope)
     demand(bool(reaches), "the law does not switch")
     return Axis(min(reaches), min(linear) if linear else None)
-
-
-def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:
-    """Return f and c with p = f s + c; f is 0 where there are none."""
-    first = next(iter(s.terms))
-    factor = p.terms.get(first, Fraction(0)) / s.terms[first]
-    rest = p - factor * s
-    return (factor, rest.number) if not rest.names else (Fraction(0), Fraction(0))
 
 
 def on_side(case: Case, s: Poly) -> bool:

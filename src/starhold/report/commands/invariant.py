@@ -11,6 +11,7 @@ from starhold.report.commands import Block, Column, Command, Heading, Result, Ta
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
+    from starhold.certification.invariant.problem import SetCertificate
     from starhold.studies.phase_portraits import Portrait
 
 COLOURS = {"proved": "green", "refuted": "red", "undecided": "yellow"}
@@ -30,7 +31,7 @@ def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
     return (problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem),)
 
 
-def present(problem: InvariantProblem, certificate: Certificate) -> Result:
+def present(problem: InvariantProblem, certificate: SetCertificate) -> Result:
     """Each claim with its outcome, how it was shown and what is missing; the phase portrait with the sets."""
     from starhold.certification import invariant as sets
     from starhold.studies.phase_portraits import portraits

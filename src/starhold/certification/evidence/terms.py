@@ -1,0 +1,155 @@
+"""Helpers about polynomials for those who look for sums of squares."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from importlib import import_module
+from itertools import combinations, combinations_with_replacement
+from typing import Any
+
+import numpy as np
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx
+
+from starhold.certification.evidence.squares import degree, text
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.polynomials import Monomial, Poly, dot, poly
+from starhold.kernel.rules import Sum
+
+sparse: Any = import_module("scipy.sparse")
+pivoted: Any = import_module("scipy.linalg").qr
+linprog: Any = import_module("scipy.optimize").linprog
+
+
+PAIRED = 10
+"""Of so many known things products of two are tried."""
+
+
+def times(a: Poly, b: Poly, c: int = 1) -> Poly:
+    """Return c a b, without an account."""
+    found: dict[Monomial, Fraction] = defaultdict(Fraction)
+    for m, x in a.terms.items():
+        for n, y in b.terms.items():
+            found[tuple(sorted(m + n)) if m and n else m or n] += x * y * c
+    return Poly(found)
+
+
+def monomials(names: Sequence[str], most: int, least: int = 0) -> list[Poly]:
+    """Return all monomials of these degrees."""
+    spare = range(least, most + 1)
+    return [Poly({tuple(m): Fraction(1)}) for d in spare for m in combinations_with_replacement(sorted(names), d)]
+
+
+def unit(x: float) -> Fraction:
+    """Return the power of two next to a positive number."""
+    return Fraction(2) ** round(np.log2(x)) if 0.0 < x < np.inf else Fraction(1)
+
+
+def independent(given: list[Poly]) -> list[Poly]:
+    """Return polynomials without those that others before them make."""
+    rows = {m: k for k, m in enumerate({m for q in given for m in q.terms})}
+    A = fmpq_mat(max(len(rows), 1), max(len(given), 1))
+    for k, q in enumerate(given):
+        for m, c in q.terms.items():
+            A[rows[m], k] = fmpq(c.numerator, c.denominator)
+    echelon, rank = A.rref()
+    return [given[next(k for k in range(len(given)) if echelon[r, k] != 0)] for r in range(rank)]
+
+
+def multiples(basis: Sequence[Poly], p: Poly) -> list[Poly]:
+    """Return the multiples of some polynomials that are of no higher degree than another."""
+    names = sorted(p.names)
+    return [times(q, m) for q in basis for m in monomials(names, degree(p) - degree(q))]
+
+
+def largest(q: Poly) -> float:
+    """Return the largest coefficient."""
+    return max((abs(float(c)) for c in q.terms.values()), default=1.0)
+
+
+def identity(o: Sum) -> dict[str, Any] | None:
+    """Return evidence without squares: p as a combination of what is known and of relations."""
+    if o.strict:
+        return None
+    names = sorted({x for q in (o.p, *o.modulo) for x in q.names})
+    top = max(degree(q) for q in (o.p, *o.modulo))
+    loose = [monomials(names, top - degree(q)) for q in o.modulo]
+    few = [k for k, q in enumerate(o.known) if degree(q) <= top]
+    places = [(), *((k,) for k in few), *combinations(few[:PAIRED], 2)]
+    made: dict[tuple[int, ...], Poly] = {own: q for own in places if degree(q := product_of(o.known, own)) <= top}
+    free = [times(q, m) for q, own in zip(o.modulo, loose, strict=True) for m in own]
+    used = needed(o.p, free, made)
+    y = None if used is None else solved(o.p, [*free, *(made[own] for own in used)])
+    if used is None or y is None:
+        return None
+    cofactors, at = list[dict[str, str]](), 0
+    for own in loose:
+        cofactors.append(text(dot(y[at : at + len(own)], own)))
+        at += len(own)
+    parts = [{"of": [*own], "z": [""], "gram": [[str(c)]]} for own, c in zip(used, y[at:], strict=True) if c]
+    evidence = {"numbers": [], "cofactors": cofactors, "parts": parts}
+    try:
+        o.check(evidence)
+    except RefusedError:
+        return None
+    return evidence
+
+
+def product_of(known: Sequence[Poly], places: Iterable[int]) -> Poly:
+    """Return the product of the known polynomials of some places."""
+    found = poly(1)
+    for k in places:
+        found = times(found, known[k])
+    return found
+
+
+def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list[tuple[int, ...]] | None:
+    """Return the places of products that p is made of with positive factors, and of free polynomials, in floats."""
+    every = [*free, *made.values()]
+    rows = {m: k for k, m in enumerate({m for q in (p, *every) for m in q.terms})}
+    A, b = np.zeros((len(rows), len(every))), np.zeros(len(rows))
+    for k, q in enumerate(every):
+        for m, c in q.terms.items():
+            A[rows[m], k] = float(c)
+    for m, c in p.terms.items():
+        b[rows[m]] = float(c)
+    if not p.terms:
+        return []
+    cost = np.r_[np.zeros(len(free)), np.ones(len(made))]
+    found = linprog(cost, A_eq=A, b_eq=b, bounds=[(None, None)] * len(free) + [(0, None)] * len(made))
+    return [own for own, v in zip(made, found.x[len(free) :], strict=True) if v > 1e-9] if found.status == 0 else None
+
+
+def solved(p: Poly, every: list[Poly]) -> list[Fraction] | None:
+    """Return numbers that make p of these polynomials, as few as elimination finds; None where there are none."""
+    rows = {m: k for k, m in enumerate(sorted({m for q in (p, *every) for m in q.terms}))}
+    A = fmpq_mat(max(len(rows), 1), len(every) + 1)
+    for k, q in enumerate([*every, p]):
+        for m, c in q.terms.items():
+            A[rows[m], k] = fmpq(c.numerator, c.denominator)
+    echelon, rank = A.rref()
+    y = [Fraction(0)] * len(every)
+    for r in range(rank):
+        lead = next(k for k in range(len(every) + 1) if echelon[r, k] != 0)
+        if lead == len(every):
+            return None
+        y[lead] = Fraction(int(echelon[r, len(every)].p), int(echelon[r, len(every)].q))
+    return y
+
+
+def quotient(p: Poly, q: Poly) -> Poly | None:
+    """Return p / q, None where that is no polynomial."""
+    names = sorted(p.names | q.names)
+    ring = fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
+
+    def within(a: Poly) -> Any:
+        items = a.terms.items()
+        return ring.from_dict({tuple(m.count(x) for x in names): fmpq(c.numerator, c.denominator) for m, c in items})
+
+    found, rest = divmod(within(p), within(q))
+    if rest != 0:
+        return None
+    items = found.to_dict().items()
+    powers = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in items}
+    return Poly({m: Fraction(int(c.p), int(c.q)) for m, c in powers.items()})

@@ -1,0 +1,202 @@
+"""Systems of few variables, wired from programs as cells on which rates and functions are polynomials."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import combinations
+from math import factorial
+from typing import Any
+
+from .numbers import RefusedError, demand, read_list
+from .polynomials import Poly, dot, poly, var
+from .programs import Condition, Exactly, Guards, known
+from .reading import Claim
+from .rules import Obligation, Shown, Sum
+from .sentences import Statement
+
+CELLS, VARIABLES, POWER, TAYLOR = 64, 9, 6, 8
+Shows = Generator[tuple[str, Obligation], None, Statement]
+State = dict[str, Fraction]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell is where its surfaces times their signs are not negative (0: where a surface vanishes)."""
+
+    signs: dict[Condition, int]
+    rates: list[Poly]
+    V: list[Poly]
+
+    def on(self, surface: Condition, other: Cell) -> bool:
+        """Tell whether both cells meet on a surface only."""
+        ends = [cell.signs.get(surface, 2) for cell in (self, other)]
+        return 0 in ends or ends[0] == -ends[1]
+
+
+class System:
+    """x' = f(x) with functions V, cut into cells. Variables count from the equilibrium, if there is one, which the last
+    function is about."""
+
+    def __init__(self, claim: Claim, *roles: str) -> None:
+        self.claim, rates = claim, claim.programs["rates"]
+        count, self.roles = len(rates.outputs), roles
+        self.names, others = rates.inputs[:count], rates.inputs[count:]
+        demand(1 <= count <= len(rates.inputs), "there is not a variable for each rate")
+        self.angles = [name for name in self.names if f"sin.{name}" in others or f"cos.{name}" in others]
+        turning = {f"{f}.{name}" for name in self.angles for f in ("sin", "cos")}
+        self.parameters = [name for name in others if name not in turning]
+        demand(not any(name.startswith(("sin.", "cos.")) for name in (*self.names, *self.parameters)), "an angle is none")
+        demand(len(self.names) + len(self.parameters) <= VARIABLES, "there are too many variables")
+        point = [claim.numbers.get(f"equilibrium.{name}") for name in self.names]
+        self.at_point = point[0] is not None
+        demand(all((x is not None) == self.at_point for x in point), "an equilibrium lacks variables")
+        self.shift: State = {name: x or Fraction(0) for name, x in zip(self.names, point, strict=True)}
+        demand(not any(self.shift[name] for name in self.angles), "an angle is not zero at the equilibrium")
+        self.box: dict[str, tuple[Fraction, Fraction]] = {}
+        for name in (*self.names, *self.parameters):
+            if f"box.{name}.0" in claim.subject or name in self.parameters:
+                low, high = (claim.subject[f"box.{name}.{k}"] - self.shift.get(name, 0) for k in (0, 1))
+                demand(low < high, "an interval is empty")
+                self.box[name] = low, high
+        given = {name: known(var(name) + self.shift.get(name, 0)) for name in {*rates.inputs, *turning}}
+        # Of a cosine what it lacks to one is the variable, so that all variables vanish at the equilibrium.
+        given |= {f"cos.{x}": known(1 - var(f"cos.{x}")) for x in self.angles}
+        outputs = rates.run(given, Exactly(), count)
+        for role in roles:
+            demand(set(claim.programs[role].inputs) <= set(given), "a function depends on more than the state")
+            outputs += claim.programs[role].run(given, Exactly(), 1)
+        joined: list[tuple[Guards, list[Poly]]] = [(frozenset(), [])]
+        for cases in outputs:
+            pairs = ((a | case.guards, [*before, case.value]) for a, before in joined for case in cases)
+            joined = [(guards, values) for guards, values in pairs if not contradictory(guards)]
+            demand(len(joined) <= CELLS, "there are too many cells")
+        self.all = [Cell(signs(guards), values[:count], values[count:]) for guards, values in joined]
+        self.surfaces = sorted({surface for cell in self.all for surface in cell.signs})
+
+    @cached_property
+    def facts(self) -> list[Poly]:
+        """Return what is negative nowhere: the sides of the box, and of an angle what Taylor's series leave, times
+        x for the sine. (Each is the integral of the one before, and so they alternate for x > 0.)"""
+        found = [side for name, (low, high) in self.box.items() for side in (var(name) - low, high - var(name))]
+        for name in self.angles:
+            series, term = {"cos": poly(0), "sin": poly(0)}, poly(1)
+            for n in range(TAYLOR):
+                f, sign = ("cos", "sin")[n % 2], (1, 1, -1, -1)[n % 4]
+                series[f], term = series[f] + term * Fraction(sign, factorial(n)), term * var(name)
+                turned = 1 - var(f"cos.{name}") if f == "cos" else var(f"sin.{name}")
+                left = (series[f] - turned) * sign
+                found.append(left * var(name) if f == "sin" else left)
+        return found
+
+    def slope(self, V: Poly, rates: Sequence[Poly]) -> Poly:
+        """Return V' for these rates."""
+        found = dot([V.slope(name) for name in self.names], rates)
+        for name, rate in zip(self.names, rates, strict=True):
+            if name in self.angles:
+                s, c = f"sin.{name}", f"cos.{name}"
+                found = found + (V.slope(s) * (1 - var(c)) + V.slope(c) * var(s)) * rate
+        return found
+
+    def sum(
+        self, p: Poly, cells: Sequence[int], more: Sequence[Poly] = (), strict: Sequence[Poly] = (),
+        zero: Sequence[Poly] = (), face: dict[str, Fraction] | None = None,
+    ) -> Sum:  # fmt: skip
+        """Return that p is not negative (strict: positive where they are) where cells meet, with more that is not negative
+        and what is zero, or on a face of the box."""
+        sides = dict[Condition, int]()
+        for k in cells:
+            for surface, sign in self.all[k].signs.items():
+                sides[surface] = sign if sides.get(surface, sign) == sign else 0
+        turned = [(var(f"sin.{x}"), 1 - var(f"cos.{x}")) for x in self.angles]
+        circles = [s * s + c * c - 1 for s, c in turned]
+        parts = (
+            [*more, *(Poly(dict(surface)) * sign for surface, sign in sides.items() if sign), *self.facts],
+            [*zero, *(Poly(dict(surface)) for surface, sign in sides.items() if not sign), *circles],
+            strict,
+        )
+        put = face or {}
+        found = [[q.at(put) for q in part] if put else list(part) for part in parts]
+        return Sum(p.at(put) if put else p, *found)
+
+    @cached_property
+    def apart(self) -> list[tuple[int, ...]]:
+        """Return the cells that are told to be empty, and the pairs that are told not to meet."""
+        told = self.claim.evidence.get("apart")
+        found = [tuple(read_list(own)) for own in read_list(told or [])]
+        demand(all(len(own) in (1, 2) and self.are_cells(own) for own in found), "there are no such cells")
+        return found
+
+    def are_cells(self, places: Sequence[Any]) -> bool:
+        """Tell whether these are places of cells."""
+        return all(type(k) is int and 0 <= k < len(self.all) for k in places)
+
+    @cached_property
+    def cells(self) -> list[int]:
+        """Return the places of the cells that are not empty."""
+        return [k for k in range(len(self.all)) if (k,) not in self.apart]
+
+    def meet(self, i: int, j: int) -> bool:
+        """Tell whether two cells may meet."""
+        return (min(i, j), max(i, j)) not in self.apart
+
+    def sound(self) -> Shown:
+        """Each function is one: it is the same where cells meet."""
+        for own in self.apart:
+            yield f"apart {' '.join(map(str, own))}", self.sum(poly(-1), own)
+        for i, j in combinations(self.cells, 2):
+            for k, (V, W) in enumerate(zip(self.all[i].V, self.all[j].V, strict=True)):
+                for sign in (1, -1) if (V - W).terms and self.meet(i, j) else ():
+                    yield f"continuous {k} {i} {j} {sign:+d}", self.sum((V - W) * sign, (i, j))
+
+    @property
+    def origin(self) -> State:
+        """Return the equilibrium in place of the state."""
+        turned = [f"{f}.{x}" for x in self.angles for f in ("sin", "cos")]
+        return dict.fromkeys((*self.names, *turned), Fraction(0))
+
+    def around_point(self) -> Iterator[tuple[Cell, bool]]:
+        """Yield the cells that may hold the equilibrium, and whether they do for all parameters."""
+        for name in self.names:
+            low, high = self.box.get(name, (Fraction(-1), Fraction(1)))
+            demand(low < 0 < high, "the equilibrium is not inside of the box")
+        for cell in self.all:
+            sides = [(Poly(dict(surface)).at(self.origin), sign) for surface, sign in cell.signs.items()]
+            if all(side.names or (side.number * sign >= 0 if sign else side.number == 0) for side, sign in sides):
+                yield cell, not any(side.names for side, _ in sides)
+
+    def state(self, place: str) -> tuple[Cell, State]:
+        """Return the state of the numbers place.x, and a cell that holds it; refuse one outside of the box."""
+        demand(not self.angles, "a state with an angle has no exact values")
+        state = {x: self.claim.numbers[f"{place}.{x}"] - self.shift.get(x, 0) for x in (*self.names, *self.parameters)}
+        demand(all(low <= state[x] <= high for x, (low, high) in self.box.items()), "a state is outside of the box")
+        for cell in self.all:
+            sides = [(Poly(dict(surface)).at(state).number, sign) for surface, sign in cell.signs.items()]
+            if all(x * sign >= 0 if sign else x == 0 for x, sign in sides):
+                return cell, state
+        raise RefusedError("no cell holds a state")
+
+
+def contradictory(guards: Guards) -> bool:
+    """Tell whether a condition is to hold and not to hold, or two that are opposite are to hold."""
+    against = {(p, False) for p, truth in guards if truth}
+    against |= {(tuple((m, -c) for m, c in p), True) for p, truth in guards if truth}
+    return not against.isdisjoint(guards)
+
+
+def signs(guards: Guards) -> dict[Condition, int]:
+    """Return the side of each surface; p and -p are one surface, on which lies what has neither p > 0 nor -p > 0."""
+    found = dict[Condition, int]()
+    for p, truth in sorted(guards):
+        turn = 1 if p[0][1] > 0 else -1
+        surface, sign = tuple((m, c * turn) for m, c in p), turn if truth else -turn
+        found[surface] = sign if found.get(surface, sign) == sign else 0
+    return found
+
+
+def power(x: Poly, n: Any) -> Poly:
+    """Return x^n."""
+    demand(type(n) is int and 0 <= n <= POWER, "a power is too high, or none")
+    return power(x, n - 1) * x if n else poly(1)

@@ -1,0 +1,98 @@
+"""The kernel is told programs and numbers of a craft near a libration point; certificates tell what it proved of them."""
+
+from __future__ import annotations
+
+import re
+from math import isfinite
+from typing import Any
+
+from starhold.algebra.vector import ZERO
+from starhold.kernel.check import Proved
+from starhold.kernel.sentences import ASSUMPTIONS
+from starhold.laws.catalogue import Law
+from starhold.laws.point import PointMeasurement
+from starhold.parts.actuators.limits import LIMITS
+from starhold.parts.bodies.libration_point import Libration, linear, nonlinear
+from starhold.trace.straight_line import labelled, straight_line
+
+ASKED = PointMeasurement(ZERO, ZERO, 0.0, 0.0)
+"""A measurement of which every number is an input."""
+
+
+def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: str) -> dict[str, dict[str, Any]]:
+    """Return the programs by role: the field, the law, how its control is limited, and what it declares to make attractive:
+    errors that vanish with their V, or a place of rest."""
+    memory = law.remember(gains, craft, 0.0)
+
+    def control(measurement: PointMeasurement, gains: Any, craft: Any) -> Any:
+        return law.command(measurement, gains, craft, memory)[0]
+
+    programs = {
+        "field": straight_line(nonlinear if full else linear, position=ZERO, velocity=ZERO, plant=craft),
+        "law": straight_line(control, measurement=ASKED, gains=gains, craft=craft),
+        "limited": straight_line(LIMITS[limit], command=ZERO, limit=0.0),
+    }
+    if errors := law.hook("errors"):
+        programs["errors"] = straight_line(errors, measurement=ASKED, gains=gains)
+    if law.lyapunov is not None:
+        programs["lyapunov"] = straight_line(law.lyapunov, measurement=ASKED, gains=gains, craft=craft)
+    if rest := law.hook("rest"):
+        programs["rest"] = straight_line(rest, gains=gains)
+    return programs
+
+
+def point_subject(gains: Any, craft: Libration, known: Libration) -> dict[str, str]:
+    """Return the exact numbers that the programs may ask for: gains, the craft's and those that the law takes it to have."""
+    named = [*labelled("gains", gains), *labelled("plant", craft), *labelled("craft", known)]
+    return {name: x.hex() for name, x in named if isfinite(x)}
+
+
+HOWS = {
+    "Vanishes": "exact identity",
+    "Solves": "exact identity",
+    "Exceeds": "exact inequality",
+    "Squares": "sum of squares",
+    "Contracts": "Lyapunov's matrix",
+}
+"""How the kernel's rules show something."""
+TOLD = {
+    "ends on the circle": ("circle", ("level", "inner", "outer", "velocity")),
+    "comes to rest": ("equilibrium", ()),
+    "returns with limited control": ("saturated-axis", ("limit", "width", "reach", "boundary")),
+    "needs more control on the circle": ("control-limit", ()),
+    "holds another circle": ("circle", ()),
+    "does not return": ("equilibrium", ()),
+}
+"""The kind of claim that each theorem shows or refutes, and those of its numbers that the claim tells."""
+REFUTED = {
+    "needs more control on the circle": ("control", ("control", "y", "z")),
+    "holds another circle": ("only the circle", ("radius", "needs", "of")),
+    "does not return": ("each axis returns", ()),
+}
+"""What the theorems that refute a claim say is not so, and by which numbers."""
+_NUMBER = re.compile(r"( [+-]?\d+)+$")
+
+
+def claim_of(proved: Proved, circle: bool) -> dict[str, Any]:
+    """Return what a certificate tells of a proved claim; circle: the law is for one."""
+    numbers = {name: float(x) for name, x in proved.claim.numbers.content.items()}
+    kind, names = TOLD[proved.claim.theorem]
+    limit = next((name for name in ("norm", "axis") if f"limit.{name}" in numbers), None)
+    claimed: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
+    claimed |= {name: numbers[name] for name in names}
+    # Steps of one name are told of once.
+    steps = dict.fromkeys((_NUMBER.sub("", name), HOWS[rule]) for name, rule in proved.shown)
+    outcome, shown = "proved", [(*step, "proved", dict[str, float]()) for step in steps]
+    if proved.claim.theorem in REFUTED:
+        name, evidence = REFUTED[proved.claim.theorem]
+        outcome = "refuted"
+        if kind == "equilibrium" and circle:
+            kind, name = "circle", "x returns"
+        shown = [(name, "exact inequality", "refuted", {key: numbers[key] for key in evidence})]
+    return {
+        "kind": "control-limit" if limit else kind,
+        "outcome": outcome,
+        "numbers": claimed,
+        "assumptions": [ASSUMPTIONS[name] for name in proved.statement.assumptions],
+        "obligations": [dict(zip(("name", "how", "outcome", "evidence"), one, strict=True)) for one in shown],
+    }

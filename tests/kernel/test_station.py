@@ -1,0 +1,162 @@
+"""Claims of station keeping through the kernel: what is proved, by how much, and what is refused."""
+
+import copy
+import json
+import random
+import time
+from collections import Counter
+
+import pytest
+
+from starhold.kernel.check import check
+from starhold.kernel.numbers import RefusedError
+from tests.kernel.certificates import rekeyed, text
+from tests.kernel.mutations import WAYS, says
+from tests.kernel.stations import BEST, PLANT, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
+from tests.tiers import WHOLE
+
+ROUND = {"level": 0.49999952, "outer": 1.4142133, "velocity": 0.9999995}
+WITHIN = {
+    "smooth": {"level": 0.030478, "outer": 1.116644, "velocity": 0.246894},
+    "relay with layer": {"level": 0.026367, "outer": 1.108892, "velocity": 0.229641},
+}
+CIRCLES = [
+    ("l2-circle", "smooth"),
+    ("l2-circle", "relay with layer"),
+    ("l2-deficit", "deficit 5"),
+    ("l2-nonlinear", "full model"),
+]
+PEAK, STEEP = 3.4295901709068626, 1.0 + 2.0 * PLANT.stiffness
+RELAY = SOFT._replace(boundary_layer=0.0)
+MADE = {
+    "circle": lambda: flown("l2-circle", "smooth"),
+    "layer": lambda: certify_station(loop_of(SOFT)),
+    "full": lambda: flown("l2-nonlinear", "full model"),
+    "limit": lambda: certify_station(loop_of(BEST, 1.1 * PEAK)),
+    "limit by axis": lambda: certify_station(loop_of(SOFT, 3.6, "axis")),
+    "deficit": lambda: flown("l2-deficit", "deficit 5"),
+    "relay": lambda: certify_station(loop_of(RELAY)),
+    "rest": lambda: certify_station(loop_of(REST)),
+    "limited axis": lambda: certify_station(loop_of(REST, 4.0, "axis")),
+    "x leaves": lambda: certify_station(loop_of(BEST._replace(k_x=8.0))),
+}
+PLACES = {"limit": 1, "limit by axis": 1, "deficit": 1, "limited axis": 1}
+COUNT = 400 if WHOLE else 60
+
+
+def made(name):
+    return copy.deepcopy(proof(MADE[name](), PLACES.get(name, 0)))
+
+
+@pytest.mark.parametrize(("scenario", "law"), CIRCLES)
+def test_the_circle_attracts_as_far_as_before(scenario, law):
+    numbers = flown(scenario, law).claim("circle").numbers
+    assert all(numbers[name] >= 0.98 * least for name, least in ROUND.items())
+    assert numbers["inner"] < 0.0007
+
+
+@pytest.mark.parametrize("law", WITHIN)
+def test_the_control_stays_within_its_limit_as_far_as_before(law):
+    numbers = flown("l2-circle", law).claim("control-limit").numbers
+    assert all(numbers[name] >= 0.98 * least for name, least in WITHIN[law].items())
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_proofs_hold_and_take_no_time(name):
+    content = made(name)
+    started = time.process_time()
+    (proved,) = check(text(content))
+    assert time.process_time() - started < 0.5
+    assert proved.statement.text
+    assert all(StationOracle(content, content["claims"][0], seed).holds() for seed in range(3))
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_nothing_false_is_accepted(name):
+    original, r, tally = made(name), random.Random(name), Counter()
+    while sum(tally.values()) < COUNT:
+        content = copy.deepcopy(original)
+        r.choice(WAYS)(r, content, content["claims"][0])
+        content = rekeyed(content)
+        if content == original:
+            continue
+        try:
+            check(text(content))
+        except RefusedError:
+            tally["refused"] += 1
+            continue
+        same = says(content) == says(original)
+        tally["same" if same else "other"] += 1
+        assert same or StationOracle(content, content["claims"][0]).holds(), content["claims"][0]
+    assert tally["refused"] > COUNT / 3
+
+
+def refused(name, match, **numbers):
+    content = made(name)
+    content["claims"][0]["numbers"] |= {key.replace("_", "."): str(value) for key, value in numbers.items()}
+    with pytest.raises(RefusedError, match=match):
+        check(json.dumps(content))
+
+
+def test_each_number_is_needed():
+    refused("circle", "centre outside", level="50001/100000")
+    refused("circle", "inner circles", inner="0")
+    refused("circle", "outer circles", outer="3/2")
+    refused("circle", "errors of the velocity", velocity="1")
+    refused("circle", "nothing depends on clear", clear="1/1000")
+    refused("full", "off it on the whole set", clear="1/100")
+    refused("limit", "norm of the control", limit_norm="18/5")
+    refused("limited axis", "the limit turns motions round", width="1/2")
+    refused("limited axis", "the law turns motions round", reach=str(10**16))
+    refused("limited axis", "x follows", reach="1/10")
+    refused("limited axis", "nothing returns", boundary="2/5")
+    refused("limited axis", "its root", root_low="3")
+    refused("limited axis", "its root", root_high="29/10")
+    refused("deficit", "more than the limit", limit_norm="7/2")
+    refused("deficit", "on the circle|circle", y="1/10")
+    refused("relay", "does not hold", radius="11/10")
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "value", "match"),
+    [
+        ("circle", "gains.k", "-1", "V decreases"),
+        ("circle", "gains.alpha", "-1", "V is"),
+        ("circle", "gains.rate", "0", "run through"),
+        ("circle", "gains.k_x", "44/5", "x returns"),
+        ("circle", "gains.k_velocity", "0", "x returns"),
+        ("circle", "plant.stiffness", "4", "V decreases|x is"),
+        ("circle", "craft.rate", "2", "V decreases|x is"),
+        ("layer", "gains.boundary_layer", "0", "V decreases"),
+        ("rest", "gains.k_x", "8", "returns"),
+        ("rest", "gains.k_velocity.1", "0", "returns"),
+        ("limited axis", "gains.k_x", "20", "turns motions round"),
+        ("limited axis", "gains.y", "2", "can be held"),
+        ("relay", "gains.boundary_layer", "1/1000", "has a layer"),
+        ("x leaves", "gains.k_x", "10", "every axis returns|axis"),
+    ],
+)
+def test_each_number_of_the_loop_matters(name, key, value, match):
+    content = made(name)
+    content["claims"][0]["subject"][key] = value
+    with pytest.raises(RefusedError, match=match):
+        check(json.dumps(content))
+
+
+def test_another_model_than_the_one_that_is_flown_is_no_proof():
+    content, linear = made("full"), made("circle")
+    content["programs"] |= linear["programs"]
+    content["claims"][0]["programs"]["law"] = linear["claims"][0]["programs"]["law"]
+    content["programs"] = {n: p for n, p in content["programs"].items() if n in content["claims"][0]["programs"].values()}
+    with pytest.raises(RefusedError):
+        check(json.dumps(content))
+
+
+def test_a_limit_that_cuts_in_another_way_is_no_clip():
+    content = made("limited axis")
+    name = content["claims"][0]["programs"]["limited"]
+    program = content["programs"][name]
+    program["steps"].append(["plus", program["outputs"][0], program["outputs"][0]])
+    program["outputs"][0] = len(program["inputs"]) + len(program["steps"]) - 1
+    with pytest.raises(RefusedError, match="limited"):
+        check(json.dumps(rekeyed(content)))
