@@ -34,7 +34,7 @@ EQUATIONS = SCALARS | {
 
 
 @pytest.mark.parametrize("given_to", EQUATIONS, ids=lambda kinds: ", ".join(one.__name__ for one in EQUATIONS[kinds]))
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(data=st.data())
 def test_every_reader_gives_the_same(given_to, data):
     arguments = [data.draw(kind) for kind in given_to]
