@@ -26,51 +26,9 @@ from starhold.algebra.scalar import (
     sqrt,
     where,
 )
-from tests.algebra.readers import SPECIAL, agree, anything, contains, numbers, positives, same
+from tests.algebra.readers import anything, contains, numbers, same
 
-UNARY = (absolute, sign, side, is_finite)
-BINARY = (less, minimum, maximum, clip)
 TRUTHS = (True, False, None)
-truths = st.sampled_from(TRUTHS)
-
-
-def select(a, b, x, y):
-    return where(less(a, b), x, y)
-
-
-def logic(a, b, c):
-    p, q = less(a, b), less(b, c)
-    return both(p, q), either(p, q), opposite(p), both(p, opposite(q)), either(opposite(p), opposite(q))
-
-
-@given(numbers, numbers, positives)
-def test_every_reader_gives_the_same(x, y, limit):
-    for operation in UNARY:
-        agree(operation, x)
-    for operation in BINARY:
-        agree(operation, x, y)
-    agree(clip, x, limit)
-    agree(sqrt, limit)
-    agree(select, x, y, limit, x)
-    agree(logic, x, y, limit)
-
-
-@given(anything, anything, anything)
-def test_compiled_equals_floats_for_any_float(x, y, z):
-    for operation in (*UNARY, sqrt):
-        same(operation, x)
-    for operation in BINARY:
-        same(operation, x, y)
-    same(select, x, y, z, x)
-    same(logic, x, y, z)
-
-
-def test_compiled_equals_floats_for_special_values():
-    for operation in (*UNARY, sqrt):
-        for x in SPECIAL:
-            same(operation, x)
-    for operation, (x, y) in itertools.product(BINARY, itertools.product(SPECIAL, SPECIAL)):
-        same(operation, x, y)
 
 
 @given(anything, anything)

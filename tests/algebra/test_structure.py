@@ -12,7 +12,7 @@ from starhold.algebra.structure import buffers, flatten, move, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.loop.kernels import numbers_of, state_of
 from starhold.trace.calling import Compiled
-from tests.algebra.readers import agree, bits, leaves, numbers, same
+from tests.algebra.readers import bits, leaves, numbers, same
 
 
 class Empty(NamedTuple):
@@ -81,13 +81,6 @@ def test_move(which):
         assert list(map(bits, flatten(end))) == list(map(bits, moved_by_hand(state, step, without(rate, which))))
 
     check()
-
-
-@settings(max_examples=15)
-@given(states, states, numbers)
-def test_every_reader_moves_alike(state, rate, step):
-    agree(move, state, step, rate)
-    agree(move, state, step, without(rate, 5))
 
 
 def test_move_symbols():

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 
 from starhold.algebra.vector import (
     IDENTITY,
@@ -32,37 +32,12 @@ from starhold.algebra.vector import (
     transpose,
     unit,
 )
-from tests.algebra.readers import agree, close, leaves, matrices, numbers, positives, same, symbols, vectors, zero
+from tests.algebra.readers import agree, close, leaves, matrices, positives, same, symbols, vectors, zero
 
 A, B, C, D = (symbols(f"{name}1:4") for name in "abcd")
 M = (symbols("m1:4"), symbols("m4:7"), symbols("m7:10"))
 N = (symbols("n1:4"), symbols("n4:7"), symbols("n7:10"))
 SYMMETRIC = ((M[0][0], M[0][1], M[0][2]), (M[0][1], M[1][1], M[1][2]), (M[0][2], M[1][2], M[2][2]))
-
-
-@settings(max_examples=40)
-@given(vectors, vectors, numbers, positives)
-def test_every_reader_gives_the_same_for_vectors(a, b, c, limit):
-    for operation in (add, subtract, times, dot, cross, gyroscopic_torque, apply):
-        agree(operation, a, b)
-    for operation in (norm, signs, skew, diagonal):
-        agree(operation, a)
-    agree(scale, c, a)
-    agree(clip_axes, a, limit)
-    agree(clip_norm, a, limit)
-    assume(a != ZERO)
-    agree(unit, a)
-
-
-@settings(max_examples=25)
-@given(matrices, matrices, vectors, numbers, numbers)
-def test_every_reader_gives_the_same_for_matrices(m, n, a, c, d):
-    for operation in (apply, gyroscopic_torque, column):
-        agree(operation, m, a)
-    for operation in (transpose, determinant):
-        agree(operation, m)
-    agree(multiply, m, n)
-    agree(combine, c, m, d, n)
 
 
 def test_products_of_vectors():

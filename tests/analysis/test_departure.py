@@ -23,7 +23,6 @@ from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import Recording, fly, label
-from starhold.studies import compare
 from starhold.studies.certificates import certify_scenario
 from starhold.studies.compare import fly_law, prove
 from tests.making import built
@@ -34,13 +33,18 @@ BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
 
 
+def proved_flight(text, law=None):
+    """The flight of a law of a scenario, the first if none is named, with what it leaves."""
+    scenario = parse(text, "here")
+    entry = scenario.pick(law) if law else scenario.laws[0]
+    loop = build(scenario, entry)
+    return prove(scenario, entry, loop, fly_law(scenario, entry, loop))
+
+
 def flown(text):
     """The loop, its certificate and flight, with what the flight leaves."""
-    scenario = parse(text, "here")
-    entry = scenario.laws[0]
-    loop = build(scenario, entry)
-    flight = prove(scenario, entry, loop, fly_law(scenario, entry, loop))
-    return loop, flight.certificates[0], flight, flight.departures[0]
+    flight = proved_flight(text)
+    return built(parse(text, "here")), flight.certificates[0], flight, flight.departures[0]
 
 
 def test_every_assumption_of_a_claim_about_motions_is_looked_at():
@@ -263,14 +267,6 @@ def test_a_fault_ends_the_claims_of_the_first_certificate():
     assert all(one.time >= 10.0 for one in second)
 
 
-def proved_flight(text):
-    """The flight of the first law of a scenario, with what it leaves."""
-    scenario = parse(text, "here")
-    entry = scenario.laws[0]
-    loop = build(scenario, entry)
-    return prove(scenario, entry, loop, fly_law(scenario, entry, loop))
-
-
 LOST_WHEEL = '\n[[fault]]\ntime = {time}\nwheel = 2\nlost = true\naction = "none"\n'
 
 
@@ -349,15 +345,8 @@ def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
 # --- station keeping --------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def deficit():
-    scenario = load("l2-deficit")
-    entry = scenario.pick("2.786 as printed")
-    loop = compare.build(scenario, entry)
-    return prove(scenario, entry, loop, fly_law(scenario, entry, loop))
-
-
-def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit):
+def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle():
+    deficit = proved_flight(builtin_text("l2-deficit"), "2.786 as printed")
     left = deficit.departures[0]["circle"]
     assert [one.how for one in left] == ["the control reaches its limit", "it leaves the set", LOST]
     assert 0.0 < left[0].time < left[1].time < left[2].time == deficit.lost
@@ -368,27 +357,14 @@ def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle(deficit
 
 
 def test_a_flight_on_its_control_limit_leaves_the_claim_that_it_ends_at_the_equilibrium():
-    text = (
-        load("l2-equilibrium").text.partition("[[law]]")[0] + "[[law]]\n" + load("l2-equilibrium").text.split("[[law]]\n")[3]
-    )
-    flight = proved_flight(text)
+    scenario = load("l2-equilibrium")
+    entry = scenario.laws[2]
+    flight = proved_flight(scenario.text, entry.name)
     run, left = flight.recording, flight.departures[0]["equilibrium"]
     assert flight.certificates[0].claim("equilibrium").outcome == "proved"
-    on = np.abs(run["command"]).max(axis=1) >= build(parse(text, "here"), parse(text, "here").laws[0]).saturation_limit()
+    on = np.abs(run["command"]).max(axis=1) >= build(scenario, entry).saturation_limit()
     assert left[0].how == "the control reaches its limit"
     assert left[0].time == pytest.approx(run["time"][np.argmax(on)] * run.attrs["time_unit_s"])
-
-
-def test_no_limit_no_word_of_it():
-    scenario = load("l2-circle")
-    entry = scenario.pick("smooth")
-    loop = compare.build(scenario, entry)
-    claim = Claim("circle", {}, {}, ("control not limited",), ())
-    assert sentence(claim, {"limit": "none", "control_limit": None}) == "the motion ends on the circle"
-    assert (
-        sentence(claim, {"limit": "norm", "control_limit": loop.limit})
-        == "with unlimited control, the motion ends on the circle"
-    )
 
 
 # --- a certificate as a whole -----------------------------------------------------------------------------------------

@@ -49,18 +49,6 @@ def test_a_lane_and_a_recorded_run_give_the_same_bits(target):
     assert lanes[149].time is None
 
 
-def test_threads_and_company_change_nothing():
-    made = problem()
-    roots = np.linspace(-2.0, -0.3, 300)
-    gains, start = made.gains(roots), np.array([made.start(1.0)]).T
-    watcher = made.watcher()
-    one, other = (watcher.fly(np.repeat(start, 300, axis=1), gains, 1500, threads=count) for count in (1, 3))
-    alone = watcher.fly(start, made.gains(roots[100:101]), 1500)
-    for name in ("time", "peak_rate", "peak_acceleration"):
-        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True)
-        assert getattr(alone, name).tolist() == getattr(one, name)[..., 100:101].tolist()
-
-
 def test_the_inertia_does_not_matter():
     one, other = problem().fly(2.0, [-0.7])[0], problem(inertia=np.diag([30.0, 25.0, 12.0])).fly(2.0, [-0.7])[0]
     assert one.time == pytest.approx(other.time, rel=2e-3)
@@ -115,13 +103,6 @@ def test_acceleration_is_the_mean_from_sample_to_sample():
     run = recorded(np.zeros(4), [0.0, 0.1, 0.4, 0.3], 0.1, 2)
     assert acceleration(run)[:, 1] == pytest.approx([0.5, 1.5, -0.5, -0.5])
     assert of_run(run, 0.01, 0.01).peak_acceleration[1] == pytest.approx(1.5)
-
-
-def test_limits():
-    seen = Transient(3.0, 0.5, (0.1, 0.9, 0.2))
-    assert seen.keeps(Limits(0.5, 0.9))
-    assert not seen.keeps(Limits(0.499, 0.9))
-    assert not seen.keeps(Limits(math.inf, 0.899))
 
 
 ROOTS = np.linspace(-2.6, -0.02, 160)

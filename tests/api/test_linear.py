@@ -38,12 +38,6 @@ def test_closed_is_the_loop_closed():
     assert linear.left_out == ("sensor gaussian",)
 
 
-def test_margins_are_a_table():
-    found = sh.to_pandas(sh.margins("cubesat-slew", "pd"))
-    assert list(found["axis"]) == ["x", "y", "z"]
-    assert (found["gain"] > 10.0).all()
-
-
 def test_a_law_that_leaves_an_axis_alone_has_margins_about_the_others(tmp_path):
     """Gain 0 has no logarithm: neither an error nor a warning comes of it."""
     text = (Path(pd.__file__).read_text()).replace(
@@ -66,16 +60,6 @@ def test_margins_of_an_unstable_loop_are_nan_with_a_reason():
     ):
         found = sh.margins("cubesat-slew", "sliding", 0.25)
     assert all(np.isnan(about.gain) for about in found)
-
-
-def test_a_law_of_modes_with_a_clock_is_refused():
-    modes = [
-        {"name": "one", "type": "pd", "k_rate": 0.02, "k_attitude": 0.004, "until": {"after": "1 min"}},
-        {"name": "two", "type": "pd", "k_rate": 0.03, "k_attitude": 0.004},
-    ]
-    scenario = sh.load("cubesat-slew").with_({"law": [{"name": "both", "type": "modes", "mode": modes}]})
-    with pytest.raises(sh.InputError, match="the law modes goes on changing its memory at rest on target"):
-        sh.margins(scenario)
 
 
 @pytest.mark.parametrize(

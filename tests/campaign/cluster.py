@@ -28,10 +28,10 @@ def cluster(folder, workers=1):
     words = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told))
     try:
         processes.append(start("distributed.cli.dask_scheduler", *words, **quiet))
-        while not told.exists():
+        # The file is there before it is written.
+        while not (address := told.read_text().partition('"address": "')[2].partition('"')[0] if told.exists() else ""):
             assert processes[0].poll() is None
             time.sleep(0.05)
-        address = told.read_text().partition('"address": "')[2].partition('"')[0]
         words = (address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder))
         processes += [start("distributed.cli.dask_worker", *words, **quiet) for _ in range(workers)]
         with Client(address, set_as_default=False) as client:

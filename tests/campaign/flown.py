@@ -50,6 +50,22 @@ def small(**changes):
     return scenario.with_({key.replace("__", "."): value for key, value in changes.items()}) if changes else scenario
 
 
+def short(duration=4.0, laws=SMALL["law"][:1], folder=".", **tables):
+    """Few seconds of one law, or of these."""
+    simulation = SMALL["simulation"] | {"duration": duration}
+    return sh.scenario(SMALL | {"simulation": simulation, "law": [*laws]} | tables, folder=folder)
+
+
+def normal(sigma, **more):
+    """A table of dispersions."""
+    return {"distribution": "normal", "sigma": sigma, **more}
+
+
+def uniform(low, high, **more):
+    """Another one."""
+    return {"distribution": "uniform", "low": low, "high": high, **more}
+
+
 def fly(folder=None, **options):
     """A small campaign, by one thread and without search unless more is said."""
     asked = {"runs": 90, "over": OVER, "requirement": ASKED, "threads": 1, "search": False} | options

@@ -14,7 +14,7 @@ from starhold.campaign.store import Store
 from starhold.errors import InputError
 from starhold.studies.body import study_of
 from starhold.studies.compare import build, record
-from tests.campaign.flown import ASKED, OVER, fly, own_flight, same, small
+from tests.campaign.flown import ASKED, OVER, fly, own_flight, same, small, uniform
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,7 @@ def test_faults_words_and_kernels_of_their_own(tmp_path):
         simulation__duration=12.0,
     )
     over = {
-        "fault[1].time": {"distribution": "uniform", "low": 2, "high": 9},
+        "fault[1].time": uniform(2, 9),
         "spacecraft.limit": {"distribution": "choice", "values": ["axis", "norm"], "weights": [3, 1]},
         "initial.rate": {"distribution": "normal", "sigma": 0.01},
         "law.pd.quaternion_sign": {"distribution": "choice", "values": ["shortest", "as_published"]},
@@ -147,10 +147,10 @@ def test_other_bodies_fly_campaigns_too(tmp_path):
 def test_planted_drivers_are_found(tmp_path):
     # Only heavy craft with weak actuators are late, whatever else differs.
     over = {
-        "spacecraft.torque_limit": {"distribution": "uniform", "low": 0.02, "high": 0.12},
-        "initial.rate[1]": {"distribution": "uniform", "low": 0.0, "high": 0.25},
-        "initial.rate[2]": {"distribution": "uniform", "low": -0.002, "high": 0.002},
-        "sensor.rate_noise": {"distribution": "uniform", "low": 1e-5, "high": 2e-4},
+        "spacecraft.torque_limit": uniform(0.02, 0.12),
+        "initial.rate[1]": uniform(0.0, 0.25),
+        "initial.rate[2]": uniform(-0.002, 0.002),
+        "sensor.rate_noise": uniform(1e-5, 2e-4),
     }
     scenario = small(initial__attitude=[1, 0, 0, 0], simulation__duration=30.0)
     asked = [{"metric": "settling_time", "at_most": "15 s", "share": 0.9}]
@@ -188,7 +188,7 @@ def test_goes_on_after_a_crash_with_more_runs_and_not_after_a_change(result, tmp
         again = fly(folder, metrics=["overshoot", "iterations"], resume=True)
     assert again.digest == result.digest
     assert again.flown == 32 + 20 + 20
-    changed = OVER | {"law.pd.k_rate": {"distribution": "uniform", "low": 1.4, "high": 2.5}}
+    changed = OVER | {"law.pd.k_rate": uniform(1.4, 2.5)}
     with pytest.raises(InputError, match=r'over."law.pd.k_rate".low: 1.4, was 1.5'):
         fly(folder, metrics=["overshoot", "iterations"], over=changed, resume=True)
     assert Store.open(folder).missing("pd") == []
@@ -246,9 +246,9 @@ def test_lost_runs_have_a_time_and_no_metrics(tmp_path):
 @pytest.mark.parametrize(("sampling", "runs"), [("morris", 40), ("saltelli", 64)])
 def test_designs_give_indices_in_place_of_tests(tmp_path, sampling, runs):
     over = {
-        "law.pd.k_rate": {"distribution": "uniform", "low": 1.0, "high": 3.0},
-        "sensor.rate_noise": {"distribution": "uniform", "low": 1e-6, "high": 2e-6},
-        "initial.rate[3]": {"distribution": "uniform", "low": -0.05, "high": 0.05},
+        "law.pd.k_rate": uniform(1.0, 3.0),
+        "sensor.rate_noise": uniform(1e-6, 2e-6),
+        "initial.rate[3]": uniform(-0.05, 0.05),
     }
     asked = [{"metric": "settling_time", "at_most": "30 s", "share": 0.9}]
     law = fly(tmp_path / "c", runs=runs, sampling=sampling, over=over, requirement=asked, law="pd").laws[0]

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import resource
 import signal
 import subprocess
 import time
@@ -178,19 +177,6 @@ def test_a_disk_that_is_full_is_told_and_loses_nothing(store, expected, monkeypa
     assert len(chunks(store.folder)) >= 2
     assert not list(store.folder.rglob(f"{files.UNFINISHED}*"))
     assert resumed(store) == expected
-
-
-def test_a_limit_of_the_system_on_files_is_told_by_the_process(tmp_path, expected):
-    def limited():
-        # Enough for the manifest, not for a chunk.
-        resource.setrlimit(resource.RLIMIT_FSIZE, (2500, 2500))
-
-    words = (str(tmp_path / "campaign"), "threads", "100", "100", "0")
-    driver = start("tests.campaign.toy", *words, stderr=subprocess.PIPE, text=True, preexec_fn=limited)
-    _, said = driver.communicate()
-    assert "InputError" in said.splitlines()[-1]
-    assert "cannot be written: File too large; what was computed is kept" in said.splitlines()[-1]
-    assert resumed(Store.open(tmp_path / "campaign")) == expected
 
 
 def flip(data: bytes, place: float) -> bytes:

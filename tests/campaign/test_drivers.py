@@ -86,69 +86,48 @@ def test_independent_causes_are_fitted_to_the_most_likely(seed):
     assert found - best < 0.02
 
 
-def test_a_single_driver_is_found_and_no_pair(rng):
+PLANTED = {
+    "one end of an input": (lambda x, u: x["x2"] > 0.93, {"x2"}, []),
+    "both ends of an input": (lambda x, u: np.abs(x["x2"] - 0.5) > 0.45, {"x2"}, []),
+    "either of two inputs": (lambda x, u: (x["x1"] > 0.9) | (x["x2"] > 0.9), {"x1", "x2"}, []),
+    "two together": (lambda x, u: (x["x1"] > 2 / 3) & (x["x2"] > 2 / 3), {"x1", "x2"}, [{"x1", "x2"}]),
+    "two together, rarely": (lambda x, u: (x["x1"] > 2 / 3) & (x["x2"] > 2 / 3) & (u < 0.1), {"x1", "x2"}, [{"x1", "x2"}]),
+    "just one of two": (lambda x, u: (x["x1"] > 0.5) ^ (x["x4"] > 0.5), set(), [{"x1", "x4"}]),
+    "just one of two, or chance": (lambda x, u: (x["x1"] > 0.5) ^ (x["x4"] > 0.5) ^ (u < 0.3), set(), [{"x1", "x4"}]),
+    "a word and a number": (lambda x, u: (x["mode"] == "norm") & (x["x0"] < 0.3), {"mode", "x0"}, [{"mode", "x0"}]),
+    "an uneven choice and a flag": (lambda x, u: (x["wheel"] > 1.0) & x["flag"], {"wheel", "flag"}, [{"wheel", "flag"}]),
+}
+"""What makes a run fail, of its inputs and a number between 0 and 1; the inputs and pairs of them that are to be told."""
+
+
+@pytest.mark.parametrize("cause", PLANTED)
+def test_planted_causes_and_no_others_are_found(rng, cause):
+    fails, inputs, pairs = PLANTED[cause]
+    drawn = draws(rng) | {"wheel": rng.choice([1.0, 2.0, 3.0], N, p=[0.9, 0.07, 0.03]), "flag": rng.uniform(size=N) < 0.5}
+    drivers = find_drivers(drawn, fails(drawn, rng.uniform(size=N)), {})
+    assert set(told(drivers)) == inputs
+    assert told_pairs(drivers) == pairs
+
+
+def test_a_driver_is_told_with_where_its_failures_are(rng):
     inputs = draws(rng)
-    drivers = find_drivers(inputs, inputs["x2"] > 0.93, {})
-    assert told(drivers) == ["x2"]
-    assert told_pairs(drivers) == []
-    assert drivers.inputs[0].above == 1.0
-    assert drivers.inputs[0].distance == 1.0
-    assert drivers.inputs[0].range[0] > 0.93
+    driver = find_drivers(inputs, inputs["x2"] > 0.93, {}).inputs[0]
+    assert (driver.above, driver.distance) == (1.0, 1.0)
+    assert driver.range[0] > 0.93
 
 
-def test_a_driver_with_two_bad_ends_is_found_and_no_pair(rng):
+def test_a_pair_is_told_with_where_its_failures_are(rng):
     inputs = draws(rng)
-    drivers = find_drivers(inputs, np.abs(inputs["x2"] - 0.5) > 0.45, {})
-    assert told(drivers) == ["x2"]
-    assert told_pairs(drivers) == []
-
-
-@pytest.mark.parametrize("chance", [1.0, 0.1])
-def test_failure_by_two_inputs_together_is_found(rng, chance):
-    inputs = draws(rng)
-    failed = (inputs["x1"] > 2 / 3) & (inputs["x2"] > 2 / 3) & (rng.uniform(size=N) < chance)
-    drivers = find_drivers(inputs, failed, {})
-    assert set(told(drivers)) == {"x1", "x2"}
-    assert told_pairs(drivers) == [{"x1", "x2"}]
-    pair = drivers.pairs[0]
+    failed = (inputs["x1"] > 2 / 3) & (inputs["x2"] > 2 / 3)
+    pair = find_drivers(inputs, failed, {}).pairs[0]
     assert pair.where.startswith("x1 is at least 0.")
     assert "x2 is at least 0." in pair.where
     assert not pair.drawn_together
     assert pair.failed > 0.5 * failed.mean() / 0.25
-
-
-def test_two_causes_that_do_not_know_of_each_other_are_no_pair(rng):
-    inputs = draws(rng)
-    drivers = find_drivers(inputs, (inputs["x1"] > 0.9) | (inputs["x2"] > 0.9), {})
-    assert set(told(drivers)) == {"x1", "x2"}
-    assert told_pairs(drivers) == []
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.3])
-def test_failure_by_just_one_of_two_is_found_though_neither_shows_alone(rng, noise):
-    inputs = draws(rng)
-    failed = (inputs["x1"] > 0.5) ^ (inputs["x4"] > 0.5) ^ (rng.uniform(size=N) < noise)
-    drivers = find_drivers(inputs, failed, {})
-    assert told(drivers) == []
-    assert told_pairs(drivers) == [{"x1", "x4"}]
-
-
-def test_words_and_numbers_fail_together(rng):
-    inputs = draws(rng)
-    failed = (inputs["mode"] == "norm") & (inputs["x0"] < 0.3)
-    drivers = find_drivers(inputs, failed, {})
-    assert set(told(drivers)) == {"mode", "x0"}
-    assert told_pairs(drivers) == [{"mode", "x0"}]
+    drivers = find_drivers(inputs, (inputs["mode"] == "norm") & (inputs["x0"] < 0.3), {})
     assert "mode is norm" in drivers.pairs[0].where
     assert "x0 is at most 0." in drivers.pairs[0].where
     assert next(driver for driver in drivers.inputs if driver.input == "mode").range == "mode is norm"
-
-
-def test_a_choice_between_numbers_that_is_uneven_is_a_driver_like_others(rng):
-    inputs = draws(rng) | {"wheel": rng.choice([1.0, 2.0, 3.0], N, p=[0.9, 0.07, 0.03]), "flag": rng.uniform(size=N) < 0.5}
-    drivers = find_drivers(inputs, (inputs["wheel"] > 1.0) & inputs["flag"], {})
-    assert set(told(drivers)) == {"wheel", "flag"}
-    assert told_pairs(drivers) == [{"wheel", "flag"}]
 
 
 def test_lost_runs_have_no_say_about_a_metric_they_lack(rng):

@@ -18,7 +18,7 @@ from starhold.campaign.engines import Scheduler, Threads, Workers
 from starhold.campaign.store import Store
 from starhold.errors import InputError
 from tests.campaign.cluster import ENVIRONMENT, cluster
-from tests.campaign.toy import LAWS, Toy, fly, manifest, missing
+from tests.campaign.toy import Toy, fly, manifest, missing
 
 
 @pytest.fixture(scope="module")
@@ -228,9 +228,3 @@ def test_a_worker_of_another_version_or_without_a_module_tells(packed, version, 
     _, refusal = engines._fly(packed, version, "pd", 0, 1)
     with pytest.raises(InputError, match=told):
         raise pickle.loads(pickle.dumps(refusal))
-
-
-def test_all_laws_have_the_same_runs(store):
-    fly(store)
-    for law in LAWS:
-        assert np.array_equal(store.columns(["run"], law)["run"], np.arange(100))

@@ -7,26 +7,14 @@ import warnings
 import numpy as np
 import pytest
 
-import starhold as sh
 from starhold.campaign.campaign import with_campaign
 from starhold.errors import InputError
 from starhold.report.campaign_files import write_campaign
-from tests.campaign.flown import SMALL, fly, small
+from tests.campaign.flown import SMALL, fly, normal, short, small, uniform
 from tests.parts.files import ENVIRONMENT
 from tests.refusals import refused
 
-NORMAL = {"distribution": "normal", "sigma": 0.01}
-SHELL = {"distribution": "shell", "high": "2 deg/s"}
-
-
-def uniform(low, high):
-    return {"distribution": "uniform", "low": low, "high": high}
-
-
-def short(folder=".", **changes):
-    """Four seconds of one law."""
-    simulation = SMALL["simulation"] | {"duration": 4.0}
-    return sh.scenario(SMALL | {"simulation": simulation, "law": SMALL["law"][:1]} | changes, folder=folder)
+NORMAL = normal(0.01)
 
 
 def campaign(folder, scenario=None, **options):
@@ -41,7 +29,7 @@ def laws(*names):
 def test_names_that_differ_in_case_alone_are_refused(tmp_path):
     """They would be one column in SQL, and one folder on some disks."""
     with pytest.raises(InputError, match="names that differ by more than case"):
-        campaign(tmp_path / "c", short(law=laws("A", "a")))
+        campaign(tmp_path / "c", short(laws=laws("A", "a")))
     alike = [{"name": name, "metric": "effort", "at_most": 3} for name in ("Straße", "STRASSE")]
     with pytest.raises(InputError, match=r"campaign.requirement\[2\].name: found \"STRASSE\""):
         campaign(tmp_path / "c", requirement=alike)
@@ -59,7 +47,7 @@ def test_columns_of_metrics_and_of_requirements_stay_apart(tmp_path):
 def test_each_worst_run_has_a_file_of_its_own(tmp_path, brief):
     long = "ü" * 100
     asked = [{"name": name, "metric": "effort", "at_most": bound} for name, bound in (("a b", 3), ("a-b", 2), (long, 1))]
-    found = campaign(tmp_path / "c", short(law=laws(long, "pd")), requirement=asked, search=True, runs=2)
+    found = campaign(tmp_path / "c", short(laws=laws(long, "pd")), requirement=asked, search=True, runs=2)
     files = [bracket.file for law in found.laws for bracket in law.brackets]
     assert len({file.casefold() for file in files}) == 6
     assert {"worst-pd-a-b.toml", "worst-pd-a-b-2.toml"} <= {*files}
@@ -96,7 +84,7 @@ def test_designs_are_flown_to_their_indices(tmp_path, sampling):
 
 def test_a_part_of_ones_own_is_flown_and_its_change_refused(tmp_path):
     (tmp_path / "slow.py").write_text(ENVIRONMENT)
-    scenario = short(tmp_path, part=[{"file": "slow.py", "name": "a.b c", "drag": 0.1}])
+    scenario = short(folder=tmp_path, part=[{"file": "slow.py", "name": "a.b c", "drag": 0.1}])
     over = {"part.a.b c.drag": uniform(0.05, 0.2)}
     found = campaign(tmp_path / "c", scenario, over=over)
     frame = found.frame()
@@ -114,14 +102,14 @@ def test_a_part_of_ones_own_is_flown_and_its_change_refused(tmp_path):
 
 def test_a_table_that_a_scenario_names_is_part_of_it(tmp_path):
     (tmp_path / "att.csv").write_text("time,q0,q1,q2,q3\n0,1,0,0,0\n10,0.8,0.6,0,0\n")
-    scenario = short(tmp_path, target={"mode": "history", "file": "att.csv"})
+    scenario = short(folder=tmp_path, target={"mode": "history", "file": "att.csv"})
     assert campaign(tmp_path / "c", scenario).again(1).differs == ()
     (tmp_path / "att.csv").write_text("time,q0,q1,q2,q3\n0,1,0,0,0\n10,0.6,0.8,0,0\n")
     with pytest.raises(InputError, match=r'campaign.files."att.csv"'):
         campaign(tmp_path / "c", scenario, resume=True)
     # By whatever key.
     (tmp_path / "torque.csv").write_text("0,0,0,0\n9,1e-3,0,0\n")
-    scenario = short(tmp_path, part=[{"type": "torque-table", "table": "torque.csv"}])
+    scenario = short(folder=tmp_path, part=[{"type": "torque-table", "table": "torque.csv"}])
     campaign(tmp_path / "d", scenario)
     (tmp_path / "torque.csv").write_text("0,0,0,0\n9,2e-3,0,0\n")
     with pytest.raises(InputError, match=r'campaign.files."torque.csv"'):
@@ -132,7 +120,7 @@ def test_warnings_of_single_runs_are_not_told(tmp_path):
     """A short flight of a craft some of whose orbits meet the ground later on."""
     orbit = {"position": ["7000 km", 0, 0], "velocity": [0, "7.55 km/s", 0]}
     scenario = short(orbit=orbit, environment={"gravity_gradient": True})
-    over = {"orbit.velocity": {"distribution": "normal", "sigma": "5 km/s"}}
+    over = {"orbit.velocity": normal("5 km/s")}
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         campaign(tmp_path / "c", scenario, over=over, runs=60)

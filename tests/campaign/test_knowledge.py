@@ -12,20 +12,17 @@ from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.studies.body import study_of
 from starhold.studies.compare import compare, record
-from tests.campaign.flown import SMALL, fly
+from tests.campaign.flown import SMALL, fly, normal, short, uniform
 
-INERTIA = {"distribution": "normal", "sigma": "4 %", "relative": True}
-LIMIT = {"distribution": "uniform", "low": 0.05, "high": 0.2}
+INERTIA = normal("4 %", relative=True)
+LIMIT = uniform(0.05, 0.2)
 LYAPUNOV = SMALL["law"][1]
 DESIGNED = {"type": "lqr", "form": "II", "q": 1.0, "r": 0.5}
 
 
-def short(laws=(LYAPUNOV,), **changes):
+def turn(laws=(LYAPUNOV,), **tables):
     """Ten seconds from a turn at rest."""
-    simulation = SMALL["simulation"] | {"duration": 10.0}
-    return sh.scenario(
-        SMALL | {"initial": {"attitude": [0.9, 0.1, -0.3, 0.2]}, "simulation": simulation, "law": [*laws]} | changes
-    )
+    return short(10.0, laws, **{"initial": {"attitude": [0.9, 0.1, -0.3, 0.2]}} | tables)
 
 
 def measured(scenario):
@@ -39,7 +36,7 @@ def drawn(row, key="spacecraft.inertia"):
 
 def test_a_drawn_inertia_is_not_told_to_the_law_unless_it_is_said():
     """Against what needs no campaign: a fault at the start that nobody notices, or another craft."""
-    scenario, flown = short(), []
+    scenario, flown = turn(), []
     for known in ({}, {"known_to_law": True}):
         frame = fly(scenario=scenario, over={"spacecraft.inertia": INERTIA | known}, requirement=[], runs=8).frame()
         assert (frame["flown.craft.inertia[1]"] == frame["spacecraft.inertia[1]"]).all()
@@ -55,11 +52,7 @@ def test_a_drawn_inertia_is_not_told_to_the_law_unless_it_is_said():
 
 
 CASES = {
-    "form": (
-        (DESIGNED, LYAPUNOV),
-        {},
-        {"spacecraft.inertia": INERTIA, "initial.rate": {"distribution": "normal", "sigma": 0.01}},
-    ),
+    "form": ((DESIGNED, LYAPUNOV), {}, {"spacecraft.inertia": INERTIA, "initial.rate": normal(0.01)}),
     "limit": ((LYAPUNOV,), {}, {"spacecraft.torque_limit": LIMIT, "spacecraft.inertia": INERTIA | {"known_to_law": True}}),
     "fault": (
         (LYAPUNOV,),
@@ -72,7 +65,7 @@ CASES = {
             "wheels": {"inertia": 1e-3, "torque_limit": 0.2, "momentum_limit": 4.0},
             "wheel": [{"axis": axis} for axis in ([1, 0, 0], [0, 1, 0], [0, 0, 1])],
         },
-        {"wheel[2].axis[1]": {"distribution": "normal", "sigma": 0.02}, "wheels.inertia": INERTIA},
+        {"wheel[2].axis[1]": normal(0.02), "wheels.inertia": INERTIA},
     ),
 }
 
@@ -80,7 +73,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_runs_are_those_of_their_own_scenarios_however_they_are_made(case, monkeypatch):
     laws, tables, over = CASES[case]
-    scenario = short(laws, **tables)
+    scenario = turn(laws, **tables)
     found = fly(scenario=scenario, over=over, requirement=[], runs=10)
     for law in found.laws:
         assert found.again(7, law.law).differs == ()
@@ -89,7 +82,7 @@ def test_the_runs_are_those_of_their_own_scenarios_however_they_are_made(case, m
 
 
 def test_gains_stay_designed_for_the_nominal_craft():
-    scenario = short((DESIGNED,))
+    scenario = turn((DESIGNED,))
     for told in (False, True):
         over = {"spacecraft.inertia": INERTIA | {"known_to_law": told}}
         found = fly(scenario=scenario, over=over, requirement=[], runs=5)
@@ -103,7 +96,7 @@ def test_gains_stay_designed_for_the_nominal_craft():
 
 def test_a_torque_is_shared_out_among_wheels_as_they_are_supposed_to_be():
     laws, tables, over = CASES["wheels"]
-    scenario = short(laws, **tables)
+    scenario = turn(laws, **tables)
     again = fly(scenario=scenario, over=over, requirement=[], runs=3).again(2).scenario
     own, nominal = (build(one, one.laws[0]).wheels for one in (again, scenario))
     assert own.axes != nominal.axes
@@ -113,13 +106,13 @@ def test_a_torque_is_shared_out_among_wheels_as_they_are_supposed_to_be():
 def test_the_verdict_says_what_the_law_knows():
     asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
     over = {"spacecraft.inertia": INERTIA, "spacecraft.torque_limit": LIMIT | {"known_to_law": True}}
-    (law,) = fly(scenario=short(), over=over, requirement=asked, runs=5).laws
+    (law,) = fly(scenario=turn(), over=over, requirement=asked, runs=5).laws
     told = law.verdicts[0].sentence()
     assert told.endswith(
         "The law supposes the file's own spacecraft.inertia, and is told each drawn spacecraft.torque_limit."
     )
-    rate = {"initial.rate": {"distribution": "normal", "sigma": 0.01}}
-    (law,) = fly(scenario=short(), over=rate, requirement=asked, runs=5).laws
+    rate = {"initial.rate": normal(0.01)}
+    (law,) = fly(scenario=turn(), over=rate, requirement=asked, runs=5).laws
     assert "The law" not in law.verdicts[0].sentence()
 
 
@@ -134,14 +127,14 @@ def test_the_verdict_says_what_the_law_knows():
 )
 def test_what_no_law_can_know_and_the_old_name_are_refused(over, told):
     with pytest.raises(InputError, match=re.escape(told)):
-        begin(with_campaign(short(initial={"rate": [0.01, 0.0, 0.0]}), {"over": over, "runs": 3}), ["lyapunov"])
+        begin(with_campaign(turn(initial={"rate": [0.01, 0.0, 0.0]}), {"over": over, "runs": 3}), ["lyapunov"])
 
 
 def test_a_scenario_may_say_what_its_laws_suppose():
-    supposed = short().with_({"nominal": {"spacecraft": {"inertia": [2.5, 3.0, 4.0], "torque_limit": 0.3}}})
+    supposed = turn().with_({"nominal": {"spacecraft": {"inertia": [2.5, 3.0, 4.0], "torque_limit": 0.3}}})
     own = build(supposed, supposed.laws[0])
     assert (own.craft.inertia, own.known.inertia) == ((2.0, 3.0, 4.0), (2.5, 3.0, 4.0))
-    unnoticed = short().with_(
+    unnoticed = turn().with_(
         {"spacecraft.inertia": [2.5, 3.0, 4.0], "fault": [{"time": 0.0, "inertia": [2.0, 3.0, 4.0], "action": "none"}]}
     )
     assert measured(supposed)["effort"] == measured(unnoticed)["effort"]

@@ -3,7 +3,6 @@ digest. Each is of the command line, in processes of its own."""
 
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -18,7 +17,7 @@ from starhold.campaign.campaign import CHUNK
 from tests.campaign.flown import ASKED, OVER, SMALL
 
 COMMAND = [sys.executable, "-m", "starhold", "campaign", "long.toml", "--law", "pd", "--no-search", "-o"]
-RUNS, BLOCK = 2 * CHUNK + 3000, CHUNK
+RUNS = 2 * CHUNK + 3000
 """Three blocks, half a second each or more."""
 
 
@@ -77,43 +76,6 @@ def resumed(place, name, *words):
 
 
 @pytest.mark.slow
-def test_a_killed_driver_is_resumed_to_the_same_digest(place, expected):
-    child = start(place, "killed", "--threads", "1")
-    wait_for_chunks(child, place / "killed", 1)
-    child.kill()
-    child.communicate()
-    held = chunks(place / "killed")
-    assert 1 <= len(held) < 3
-    assert not (place / "killed" / "campaign.json").exists()
-    # And one of them spoiled, by a bit in its middle.
-    data = bytearray(held[0].read_bytes())
-    data[len(data) // 2] ^= 1
-    held[0].write_bytes(data)
-    found, said = resumed(place, "killed")
-    assert found == expected
-    assert said.count("\n") == 1
-    assert (
-        f"{held[0].relative_to(place)}: its bytes are not those that were written; runs 0 to {BLOCK - 1} are flown again"
-        in said
-    )
-
-
-@pytest.mark.slow
-def test_a_full_disk_is_told_and_resumed_to_the_same_digest(place, expected):
-    """The manifest has room, a block of runs has none."""
-
-    def limited():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
-
-    code, said = done(start(place, "full", "--threads", "1", preexec_fn=limited))
-    assert code == 2
-    assert said.count("\n") == 1
-    assert "cannot be written: File too large; what was computed is kept, --resume goes on from there" in said
-    assert not list((place / "full").rglob(".writing-*"))
-    assert resumed(place, "full") == (expected, "")
-
-
-@pytest.mark.slow
 def test_an_interrupt_is_told_and_resumed_to_the_same_digest(place, expected):
     child = start(place, "asked", "--threads", "2")
     wait_for_chunks(child, place / "asked", 1)
@@ -130,15 +92,6 @@ def workers_of(child):
             if "spawn_main" in " ".join(process.cmdline()):
                 found.append(process)
     return found
-
-
-@pytest.mark.slow
-def test_a_killed_worker_changes_nothing(place, expected):
-    child = start(place, "workers", "--workers", "2")
-    wait_for_chunks(child, place / "workers", 1)
-    workers_of(child)[0].kill()
-    assert done(child)[1] == ""
-    assert digest(place / "workers") == expected
 
 
 @pytest.mark.slow

@@ -123,14 +123,6 @@ def test_uniforms_have_names():
     assert names[6:] == (*(f"spacecraft.inertia[{n}]" for n in (1, 2, 3)), "spacecraft.limit")
 
 
-def test_a_run_is_a_scenario():
-    plan = PLANS["sobol"]
-    columns = plan.columns(0, 20)
-    made = SCENARIO.with_(plan.change({name: column[13] for name, column in columns.items()}))
-    assert made.craft.inertia == tuple(columns[f"spacecraft.inertia[{n}]"][13] for n in (1, 2, 3))
-    assert made.table.spacecraft.limit == columns["spacecraft.limit"][13]
-
-
 def test_a_plan_of_nothing_draws_nothing():
     plan = Plan((), "random", 1, 10)
     assert plan.unit(2, 5).shape == (0, 5)
@@ -152,11 +144,6 @@ def test_a_plan_that_cannot_be_is_told_in_one_line(name):
     sampling, runs, said = BAD[name]
     with refused(said, start="my.toml: campaign."):
         Plan(OVER, sampling, 1, runs, "my.toml")
-
-
-@pytest.mark.parametrize("runs", [99, 110])
-def test_numbers_of_runs_that_are_offered_are_taken(runs):
-    assert Plan(OVER, "morris", 1, runs).unit(0, runs).shape == (DIMS, runs)
 
 
 def test_a_design_of_nothing_is_refused():

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, special, stats
 
-from starhold.campaign import sequence
 from starhold.campaign.sequence import (
     bounds,
     decided,
@@ -125,9 +124,3 @@ def test_bad_input_is_one_line():
     ):
         with refused():
             call()
-
-
-@given(st.integers(0, 200), st.integers(0, 200))
-def test_searches_find_the_edge(start, edge):
-    assert sequence.least(lambda number: number >= edge, start) == max(start, edge)
-    assert sequence.greatest(lambda number: number < edge, start) == (min(start, edge - 1) if edge else None)

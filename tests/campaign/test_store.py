@@ -1,8 +1,6 @@
 """The store returns what was put, in any order and cut; it refuses to mix campaigns, and answers questions in SQL."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pandas as pd
@@ -20,7 +18,6 @@ from starhold.campaign.manifest import Manifest, difference, plain
 from starhold.campaign.query import query
 from starhold.campaign.store import Store
 from starhold.errors import InputError
-from tests.campaign.cluster import ENVIRONMENT, ROOT
 from tests.campaign.toy import LAWS, Toy, fly, manifest, missing
 from tests.refusals import refused
 
@@ -369,40 +366,3 @@ def test_questions_leave_out_what_is_unusable_and_say_so(store):
     told = []
     assert query(store.folder, "select count(*) from runs", told.append).iloc[0, 0] == 184
     assert len(told) == 1
-
-
-MEMORY = """
-import numpy as np, resource, sys
-from pathlib import Path
-from starhold.campaign.chunk import Chunk
-from starhold.campaign.digest import digest
-from starhold.campaign.store import Store
-from tests.campaign.toy import manifest
-
-def peak():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
-
-runs, chunk, width = 400_000, 8192, 40
-store = Store.create(Path(sys.argv[1]), manifest(runs, chunk, laws=("pd",)))
-draws = np.random.default_rng(1).normal(size=(width, chunk))
-def put(first, count):
-    columns = {f"x[{n}]": draws[n, :count] for n in range(width)}
-    store.put(Chunk("pd", first, {"run": np.arange(first, first + count)} | columns))
-blocks = store.missing("pd")
-put(*blocks[0])
-store.columns(["x[0]"], "pd")
-before = peak()
-for block in blocks[1:]:
-    put(*block)
-total = sum(store.columns([name], "pd")[name].sum() for name in store.manifest.columns["pd"])
-digest(store)
-print(peak() - before, runs * width * 8 / 2**20, np.isfinite(total))
-"""
-
-
-def test_columns_and_digest_take_less_memory_than_the_results(tmp_path):
-    words = [sys.executable, "-c", MEMORY, str(tmp_path / "campaign")]
-    done = subprocess.run(words, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, check=True)
-    grown, whole, _ = done.stdout.split()
-    assert float(whole) > 120.0
-    assert float(grown) < 90.0

@@ -9,14 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from starhold.campaign import sequence
-from starhold.campaign.verdicts import (
-    acceptance,
-    allowed_failures,
-    failure_bounds,
-    judge,
-    quantile_bound,
-    runs_needed,
-)
+from starhold.campaign.verdicts import acceptance, allowed_failures, failure_bounds, judge, quantile_bound, runs_needed
 from tests.refusals import refused
 
 counts = st.integers(1, 2000).flatmap(lambda runs: st.tuples(st.integers(0, runs), st.just(runs)))

@@ -19,20 +19,14 @@ from starhold.scenario.building import build
 from starhold.scenario.writing import part_table
 from starhold.simulation.lanes import ThreadPool
 from starhold.studies.compare import record
-from tests.campaign.flown import SMALL, fly
+from tests.campaign.flown import fly, normal, short, uniform
 from tests.certification.hunt import random_inertia
 from tests.missions import BASE, DETUMBLE, POINT
 from tests.running import starhold
 
 RATE = {"initial.rate": {"distribution": "shell", "high": "2 deg/s"}}
-LIMITED = {"distribution": "uniform", "low": 0.1, "high": 0.2}
+LIMITED = uniform(0.1, 0.2)
 PEAK = {"metric": "peak_torque", "at_most": 1, "share": 0.5}
-
-
-def short(**changes):
-    """Four seconds of one law."""
-    simulation = SMALL["simulation"] | {"duration": 4.0}
-    return sh.scenario(SMALL | {"simulation": simulation, "law": SMALL["law"][:1]} | changes)
 
 
 def job_of(scenario, over, metric="effort", **changes):
@@ -75,9 +69,7 @@ def test_nothing_is_proved_of_what_effectors_make_of_a_command():
 def test_claims_about_motions_in_the_end_bound_no_flight():
     """Such a claim is proved of this loop, and some of its flights are far from their end."""
     tables = tomllib.loads(BASE + DETUMBLE + POINT)
-    slow = short(
-        simulation=SMALL["simulation"] | {"duration": 4.0}, certify={"disturbance": 1e-4}, sensor={}, environment={}
-    )
+    slow = short(certify={"disturbance": 1e-4}, sensor={}, environment={})
     claims = sh.certify(slow)[0].claims
     assert any(claim.kind == "disturbance" and claim.outcome == "proved" for claim in claims)
     for metric in ("final_attitude_error", "final_rate_error"):
@@ -107,10 +99,7 @@ def test_rounding_contradicts_nothing():
 
 def test_what_cannot_be_is_worst_in_no_sense(tmp_path, brief):
     """Within three sigma lie inertias that no body has, and noises below nothing; the few runs draw none of them."""
-    over = {
-        "spacecraft.inertia": {"distribution": "normal", "sigma": "9 %", "relative": True},
-        "sensor.rate_noise": {"distribution": "normal", "sigma": 4e-5},
-    }
+    over = {"spacecraft.inertia": normal("9 %", relative=True), "sensor.rate_noise": normal(4e-5)}
     for _ in range(2):
         asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
         found = fly(tmp_path / "c", scenario=short(), over=over, requirement=asked, runs=6, search=True, resume=True)
@@ -124,7 +113,7 @@ def test_what_cannot_be_is_worst_in_no_sense(tmp_path, brief):
 def test_what_only_reading_refuses_is_left_out_too(brief):
     """Each lane is made by itself, and one starts in the ground."""
     orbit = {"position": ["6600 km", 0, 0], "velocity": [0, "7.8 km/s", 0], "radius": "6378 km"}
-    over = {"orbit.position[1]": {"distribution": "uniform", "low": "6500 km", "high": "6700 km"}}
+    over = {"orbit.position[1]": uniform("6500 km", "6700 km")}
     job, name, _ = job_of(short(orbit=orbit, environment={"gravity_gradient": True}), over)
     columns = {"orbit.position[1]": np.array([6.6e6, 6.3e6, 6.65e6])}
     refused = np.zeros(3, dtype=bool)
@@ -209,16 +198,16 @@ def random_mission(random):
             modes[0]["effectors"], modes[1]["effectors"] = ["magnetorquers"], ["wheels"]
         law = {"type": "modes", "mode": [{k: v for k, v in mode.items() if k != "quaternion_sign"} for mode in modes]}
     tables["law"] = [law | {"name": "flown"}]
-    small = {"distribution": "uniform", "low": 0.97, "high": 1.03, "relative": True}
+    small = uniform(0.97, 1.03, relative=True)
     drawn = {
         "initial.attitude": {"distribution": "rotations"},
         "initial.rate": {"distribution": "shell", "high": 0.1},
         "spacecraft.inertia": small | {"known_to_law": some(True, False), "together": True},
         "spacecraft.torque_limit": small,
         "spacecraft.limit": {"distribution": "choice", "values": ["axis", "norm", "none"]},
-        "fault[1].time": {"distribution": "uniform", "low": 5 * period, "high": 40 * period},
+        "fault[1].time": uniform(5 * period, 40 * period),
         "law.flown.k_rate": small,
-        "wheels.viscous": {"distribution": "uniform", "low": 0.0, "high": 1e-4 * scale},
+        "wheels.viscous": uniform(0.0, 1e-4 * scale),
     }
     absent = {"fault[1].time": "fault" not in tables, "wheels.viscous": "wheels" not in tables}
     absent |= {"law.flown.k_rate": "mode" in law, "spacecraft.torque_limit": "torque_limit" not in craft}

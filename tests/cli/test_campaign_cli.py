@@ -62,13 +62,6 @@ k_attitude = 0.7
 LAWS = ("pd", "lyapunov")
 
 
-def one_line(done, *told):
-    """A refusal: one line, and nothing else."""
-    complains(done)
-    for text in told:
-        assert text in done.stderr
-
-
 def listed(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
@@ -126,7 +119,7 @@ def test_what_is_missed_and_what_is_not_decided_have_codes_of_their_own(tmp_path
 
 def test_a_folder_that_holds_a_campaign_is_refused_and_force_clears_it(place):
     before = listed(place / "out")
-    one_line(flies(place, "-o", "out"), "a campaign already there (manifest.json)", "--resume")
+    complains(flies(place, "-o", "out"), "a campaign already there (manifest.json)", "--resume")
     assert listed(place / "out") == before
     (place / "out" / "notes.txt").write_text("mine")
     done = flies(place, "--runs", "9", "--force", "-o", "out")
@@ -143,7 +136,7 @@ def test_results_of_other_commands_are_not_removed_unasked(tmp_path):
         folder = tmp_path / name[:5]
         folder.mkdir()
         (folder / name).write_text("mine")
-        one_line(flies(tmp_path, "-o", folder.name), f"results already there ({name})", "--force")
+        complains(flies(tmp_path, "-o", folder.name), f"results already there ({name})", "--force")
         assert listed(folder) == [name]
     assert flies(tmp_path, "--runs", "2", "--force", "-o", "worst").returncode in (0, 4)
     assert "worst-of-mine.toml" not in listed(tmp_path / "worst")
@@ -176,10 +169,10 @@ def test_resume_flies_what_is_missing_and_no_more(place):
     assert "12 runs flown in" in more.stdout
     assert json.loads((out / "campaign.json").read_text())["runs"] == dict.fromkeys(LAWS, 30)
     assert f"digest {digest}" not in more.stdout
-    one_line(resume("--runs", "29"), "campaign.runs: 29, was 30")
-    one_line(resume(text=SMALL.replace("high = 2.5", "high = 2.6")), 'over."law.pd.k_rate".high: 2.6, was 2.5')
-    one_line(resume("--seed", "5"), "seed: 5, was 1")
-    one_line(resume("--law", "pd"), "laws")
+    complains(resume("--runs", "29"), "campaign.runs: 29, was 30")
+    complains(resume(text=SMALL.replace("high = 2.5", "high = 2.6")), 'over."law.pd.k_rate".high: 2.6, was 2.5')
+    complains(resume("--seed", "5"), "seed: 5, was 1")
+    complains(resume("--law", "pd"), "laws")
     # What is the same is no change, whether or not the file says it.
     assert resume("--runs", "30", "--seed", "1").returncode == 0
 
@@ -210,7 +203,7 @@ def test_a_question_that_reaches_further_is_refused(flown):
     place, _ = flown
     before = listed(place)
     done = starhold("query", "out", "select * from read_csv('small.toml')", cwd=place)
-    one_line(done, "Permission Error")
+    complains(done, "Permission Error")
     assert "name = " not in done.stderr
     assert listed(place) == before
 
@@ -223,7 +216,7 @@ def test_a_folder_without_a_campaign_is_refused(flown):
         ("rerun", ".", "0"),
         ("rerun", "absent", "0"),
     ):
-        one_line(starhold(*words, cwd=place), "no manifest.json", "a folder that a campaign was flown into")
+        complains(starhold(*words, cwd=place), "no manifest.json", "a folder that a campaign was flown into")
 
 
 def test_a_run_is_flown_again_and_its_file_flies_the_same(flown, tmp_path):
@@ -243,7 +236,7 @@ def test_a_run_is_flown_again_and_its_file_flies_the_same(flown, tmp_path):
     stored = pd.read_csv(io.StringIO(starhold("query", "out", sql, "--csv", cwd=place).stdout)).iloc[0]
     for name in ("final_rate_error", "effort", "peak_torque"):
         assert math.isclose(metrics[name], stored[name], rel_tol=1e-12), name
-    one_line(starhold("rerun", str(place / "out"), "7", "--law", "lyapunov", "-o", "seven", cwd=tmp_path), "--force")
+    complains(starhold("rerun", str(place / "out"), "7", "--law", "lyapunov", "-o", "seven", cwd=tmp_path), "--force")
 
 
 @pytest.mark.parametrize(
@@ -257,62 +250,47 @@ def test_a_run_is_flown_again_and_its_file_flies_the_same(flown, tmp_path):
     ],
 )
 def test_runs_that_are_none_are_refused(flown, words, told):
-    one_line(starhold("rerun", "out", *words, cwd=flown[0]), told)
-
-
-def other(old, new):
-    assert old in SMALL
-    return SMALL.replace(old, new)
+    complains(starhold("rerun", "out", *words, cwd=flown[0]), told)
 
 
 WITHOUT = SMALL[: SMALL.index("[[campaign")] + SMALL[SMALL.index("[[law") :]
 BAD = {
-    "unknown key of the table": (other("runs = 24", "rnus = 24"), [], ["campaign.rnus", "did you mean runs?"]),
-    "negative sigma": (
-        other('"uniform", low = 1.5, high = 2.5', '"normal", sigma = -0.1'),
-        [],
-        ['over."law.pd.k_rate".sigma', "-0.1", "above 0"],
-    ),
     "zero runs by option": (SMALL, ["--runs", "0"], ["campaign.runs", "at least 1"]),
     "two engines": (SMALL, ["--threads", "2", "--workers", "2"], ["workers", "beside threads"]),
-    "unknown sampling": (SMALL, ["--sampling", "halton"], ["campaign.sampling", "halton"]),
     "runs that no design has": (SMALL, ["--sampling", "morris", "--runs", "23"], ["campaign.runs", "20 or 25"]),
-    "unknown law": (SMALL, ["--law", "lqr"], ["law", "lyapunov, pd"]),
     "no TOML": ("campaign = [", [], ["not TOML"]),
-    "campaign that is no table": (other("[campaign]\nruns = 24", "campaign = 3"), [], ["campaign"]),
     "nothing to draw": (
         WITHOUT.partition("[campaign")[0] + "[[law]]\n" + WITHOUT.partition("[[law]]\n")[2],
         [],
         ["no [campaign]"],
     ),
-    "decided by no requirement": (WITHOUT, ["--until-decided"], ["campaign.requirement"]),
 }
 
 
 @pytest.mark.parametrize("case", list(BAD))
-def test_bad_input_is_one_line(tmp_path, case):
+def test_bad_input_is_complains(tmp_path, case):
     text, words, told = BAD[case]
     (tmp_path / "small.toml").write_text(text)
     done = starhold("campaign", "small.toml", *words, "-o", "out", cwd=tmp_path)
-    one_line(done, *told)
+    complains(done, *told)
     assert done.stdout == ""
     assert not (tmp_path / "out").exists()
 
 
-def test_a_scheduler_that_does_not_answer_is_one_line(tmp_path, monkeypatch):
+def test_a_scheduler_that_does_not_answer_is_complains(tmp_path, monkeypatch):
     monkeypatch.setattr(engines, "Scheduler", partial(engines.Scheduler, patience=1.0))
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{nobody.getsockname()[1]}"
         (tmp_path / "small.toml").write_text(SMALL)
         done = starhold("campaign", "small.toml", "--scheduler", address, "-o", "out", cwd=tmp_path)
-    one_line(done, address, "no Dask scheduler answers")
+    complains(done, address, "no Dask scheduler answers")
     # Nothing is left that stands in the way of the next attempt, and nothing is lost that --force would write over.
     assert not (tmp_path / "out").exists()
-    one_line(starhold("campaign", "small.toml", "--scheduler", "nonsense", "-o", "new", cwd=tmp_path), "nonsense")
+    complains(starhold("campaign", "small.toml", "--scheduler", "nonsense", "-o", "new", cwd=tmp_path), "nonsense")
 
 
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path):
+def test_a_folder_that_cannot_be_written_is_complains(tmp_path):
     (tmp_path / "file").touch()  # a folder below a file cannot be made, even by root
-    one_line(flies(tmp_path, "-o", "file/out"), "cannot write there")
-    one_line(flies(tmp_path, "-o", "file"), "cannot write there")
+    complains(flies(tmp_path, "-o", "file/out"), "cannot write there")
+    complains(flies(tmp_path, "-o", "file"), "cannot write there")

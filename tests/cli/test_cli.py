@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -164,14 +163,6 @@ def test_new_writes_a_file_that_runs(tmp_path):
     starhold("run", "my.toml", "-o", "out", cwd=tmp_path, code=0)
 
 
-def test_design_prints_gains_and_what_they_are_judged_by(short):
-    text = SHORT.split("[[law]]")[0] + '[[law]]\ntype = "lqr"\nform = "II"\nq = [1, 1, 1, 0.2, 0.2, 0.2]\nr = 50\n'
-    (short / "lqr.toml").write_text(text)
-    done = starhold("design", "lqr.toml", cwd=short, code=0)
-    for word in ("k_rate", "k_attitude", "Riccati residual", "P against SciPy", "degree of stability"):
-        assert word in done.stdout
-
-
 def test_lists(tmp_path):
     listed = starhold("laws", cwd=tmp_path).stdout
     for name in catalogue():
@@ -182,18 +173,6 @@ def test_lists(tmp_path):
     assert starhold("scenarios", "three-laws", cwd=tmp_path).stdout == builtin_text("three-laws")
     assert starhold("--version", cwd=tmp_path).stdout.startswith("starhold ")
     assert json.loads(starhold("schema", cwd=tmp_path).stdout)["type"] == "object"
-
-
-def test_check_law_passes_a_good_law_and_fails_a_bad_one(tmp_path):
-    text = Path(catalogue()["pd"].module.__file__).read_text()
-    (tmp_path / "my_pd.py").write_text(text)
-    good = starhold("check-law", "my_pd.py", cwd=tmp_path, code=0)
-    assert "failed" not in good.stdout
-    (tmp_path / "bad_pd.py").write_text(
-        text.replace("scale(gains.k_rate, measurement.rate)", "scale(-gains.k_rate, measurement.rate)")
-    )
-    bad = starhold("check-law", "bad_pd.py", cwd=tmp_path, code=1)
-    assert "failed" in bad.stdout
 
 
 HOLDER = """
@@ -270,23 +249,6 @@ def test_what_ends_a_command_leaves_nothing_half_written(number, short):
     assert said.endswith("starhold: interrupted; files already written are whole\n")
     assert "Traceback" not in said
     assert os.listdir(short / "out") == []
-
-
-def test_python_interface_mirrors_the_commands(short):
-    import starhold as sh
-
-    scenario = sh.load(short / "short.toml")
-    run = sh.simulate(scenario, law="sliding")
-    assert run.attrs["law"] == "sliding"
-    assert (run.attrs["scenario"], run.attrs["seed"]) == (SHORT, 1)
-    assert run.attrs["starhold_version"] == sh.__version__
-    flights = sh.compare(scenario)
-    assert [flight.name for flight in flights] == ["lyapunov", "sliding", "mpc"]
-    assert flights[1].run.equals(run)
-    with pytest.raises(sh.InputError):
-        sh.simulate(scenario, law="nobody")
-    with pytest.raises(AttributeError):
-        _ = sh.no_such_thing
 
 
 def test_meanings_keep_what_stands_in_brackets(tmp_path):

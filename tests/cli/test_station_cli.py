@@ -71,21 +71,3 @@ def test_lists_design_and_new(short):
     assert "peak demand (scaled): 3.43" in designed.stdout
     starhold("new", "my.toml", "--libration", cwd=short, code=0)
     assert "[libration]" in (short / "my.toml").read_text()
-
-
-def test_python_interface_takes_both_kinds(short):
-    import starhold as sh
-    from starhold.scenario.template import template_text
-
-    (short / "new.toml").write_text(template_text("libration-point"))
-    assert [flight.lost for flight in sh.compare(short / "new.toml")] == [None, None]
-
-    scenario = sh.load(short / "short.toml")
-    run = sh.simulate(scenario, law="deficit 5")
-    assert run.attrs["law"] == "l2-circle"
-    flights = sh.compare(scenario)
-    assert flights[1].run.equals(run)
-    assert sh.design(scenario)[0].gains["rate"] == pytest.approx(1.393, abs=1e-3)
-    assert [c.outcome for c in sh.certify(scenario, law="deficit 10")] == ["refuted"]
-    with pytest.raises(sh.InputError, match="a libration-point; allowed: here one of a rigid-body"):
-        sh.failures(scenario)

@@ -193,20 +193,6 @@ def test_what_is_wrong_with_a_message_is_told(told, tmp_path):
         sh.read_aem(tmp_path / "none.aem")
 
 
-def test_a_run_leaves_as_a_message_and_comes_back_as_a_target(tmp_path):
-    scenario = sh.load("three-laws").with_({"simulation.duration": 20.0})
-    run = sh.simulate(scenario, "lyapunov")
-    sh.export_aem(run, tmp_path / "run.aem")
-    changed = {"target": {"mode": "history", "file": str(tmp_path / "run.aem")}}
-    changed |= {"initial.attitude": run["attitude"].to_numpy()[0].tolist(), "simulation.duration": 10.0}
-    again = sh.simulate(scenario.with_(changed), "lyapunov")
-    goal = Rotation.from_quat(again["attitude"].to_numpy(), scalar_first=True)
-    error = Rotation.from_quat(again["attitude_error"].to_numpy(), scalar_first=True)
-    followed = (goal * error.inv()).as_matrix()
-    wanted = Rotation.from_quat(run["attitude"].to_numpy()[: len(followed)], scalar_first=True).as_matrix()
-    np.testing.assert_allclose(followed, wanted, atol=1e-12)
-
-
 def test_the_command_writes_a_message(tmp_path):
     sh.simulate(sh.load("three-laws").with_({"simulation.duration": 2.0})).to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
     starhold("export", "aem", ".", "-o", "run.aem", "--object", "CUBE", cwd=tmp_path, code=0)
@@ -238,12 +224,3 @@ def test_a_message_begins_at_the_epoch_of_the_orbit(tmp_path):
     ):
         sh.export_aem(run, tmp_path / "run.aem", **words)
         assert sh.read_aem(tmp_path / "run.aem").epoch == epoch
-
-
-def test_a_run_is_written_as_parquet(tmp_path):
-    pd = pytest.importorskip("pandas")
-    pytest.importorskip("pyarrow", reason="pyarrow comes with the campaign extra")
-    run = sh.simulate(sh.load("three-laws").with_({"simulation.duration": 2.0}), "lyapunov")
-    sh.to_pandas(run).to_parquet(tmp_path / "run.parquet")
-    back = pd.read_parquet(tmp_path / "run.parquet")
-    np.testing.assert_array_equal(back["rate_x"], run["rate"].to_numpy()[:, 0])

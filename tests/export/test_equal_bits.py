@@ -106,17 +106,6 @@ def test_predictive_law(count, build):
         same(held[0], numbers(state))
 
 
-@pytest.mark.parametrize("name", ["lyapunov", "sliding", "wheel", "modal", "l2", "pid, example 0, noise"])
-def test_plain_python_gives_them_too(name):
-    code = code_of(name)
-    equation, step = code.flight.equation(), Stepper(code)
-    rng = np.random.default_rng(5)
-    for _ in range(20):
-        state = with_numbers(code.flight.start, random_columns(rng, code.flight.start, 1)[:, 0])
-        inputs = with_numbers(code.flight.inputs, random_columns(rng, code.flight.inputs, 1)[:, 0])
-        assert equation(code.flight.parameters, state, inputs) == step(state, inputs)
-
-
 _FUZZ = """
 #include "NAME.h"
 #include <stdint.h>

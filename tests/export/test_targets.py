@@ -82,18 +82,8 @@ def test_leon3(name, tmp_path):
         (tmp_path / "include" / file).write_text(text)
     sources = put(name, tmp_path)
     (tmp_path / "bare.c").write_text(_BARE)
-    flags = [
-        "-m32",
-        "-mcpu=leon3",
-        "-O2",
-        "-std=c99",
-        "-ffp-contract=off",
-        "-fno-math-errno",
-        "-nostdlib",
-        "-nostdinc",
-        "-static",
-    ]
-    flags += ["-isystem", "include", "-isystem", own]
+    flags = "-m32 -mcpu=leon3 -O2 -std=c99 -ffp-contract=off -fno-math-errno -nostdlib -nostdinc -static -isystem include"
+    flags = [*flags.split(), "-isystem", own]
     build_in(tmp_path, compiler, *flags, *sources, "bare.c", "-o", "test")
     assert subprocess.run(["qemu-sparc", str(tmp_path / "test")]).returncode == 0
     selftest = next(tmp_path / source for source in sources if "selftest" in source)

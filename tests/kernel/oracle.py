@@ -178,9 +178,12 @@ class Oracle:
     def state(self, q, w, V0, level):
         if self.lyapunov(q, w) <= V0:
             return False
-        before = None
+        before, kept = None, not {"outside torque", "moving target"} & set(self.words)
         for _ in range(3):
-            u, T, h = self.law(q, w, *self.environment())
+            *others, H = self.environment()
+            u, T, h = self.law(q, w, *others, H)
+            # With nothing from outside a momentum that does not work is constant in the target's axes.
+            T = T + kept * np.cross(w, H)
             if before is not None and not np.allclose(T, before, rtol=1e-6, atol=1e-9 * (np.abs(u).max() + np.abs(T).max())):
                 return False
             before = T

@@ -121,7 +121,6 @@ CASES = {
     "V is least on target": case(feedback(-C, -K), energy(-1.0)),
     "V is non-increasing": case(feedback(-C)),
     "only equilibrium": case(hilly, hills, taken=["hysteresis"], hysteresis=0.75),
-    "the other equilibrium is outside": case(level=0.5),
     "rates": case(level=0.1, fastest=0.4),
     "width": case(taken=["hysteresis"], hysteresis=1.5),
     "the sign never changes": case(taken=["shortest sign"], level=0.3),
@@ -143,7 +142,7 @@ CASES = {
         sliding(0.1), theorem=REACHES, s=surface(0.1), taken=["outside torque"], outside_0=0.2, outside_1=0.0, outside_2=0.0
     ),
 }  # fmt: skip
-"""No false claim is known for the others: that V is level at the other equilibrium, which repels; that a jump lowers V; that
+"""No false claim is known for the others: that the other equilibrium is outside, or inside (one of the two always holds); that V is level at the other equilibrium, which repels; that a jump lowers V; that
 V has the kinetic energy; rests at half turns only; the stiffness; the form of the surface; what a layer adds."""
 
 

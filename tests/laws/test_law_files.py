@@ -1,17 +1,15 @@
 """Laws from files and from other packages: scenarios fly them, proofs read them, and what is wrong with one is one line."""
 
 import json
-import tomllib
 
 import numpy as np
 import pytest
-from jsonschema import Draft202012Validator
 
 import starhold as sh
 from starhold.checker import check_file, passed
-from starhold.conformance.suite import examine, find_law
-from starhold.laws.catalogue import Law, adopted, catalogue, from_file
-from starhold.scenario.json_schema import json_schema
+from starhold.conformance.suite import find_law
+from starhold.laws.catalogue import adopted, catalogue, from_file
+from tests.parts.files import BODY, POINT
 from tests.refusals import complains, refused, replaced, rows
 from tests.running import starhold
 
@@ -68,18 +66,6 @@ def control(measurement, gains, plant, memory):
 def examples():
     return [Gains(30.0, 9.0)]
 """
-BODY = """
-name = "own"
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-torque_limit = 0.05
-[initial]
-angles = ["40 deg", 0, 0]
-[simulation]
-duration = 60.0
-control_period = 0.1
-"""
-POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simulation]\nduration = 1.0\n'
 OWN = '[[law]]\nfile = "laws/my_law.py"\nk = 0.09\n'
 
 
@@ -146,26 +132,6 @@ def test_its_proofs_are_not_about_another_text_of_the_law(folder, tmp_path):
     assert "my-law" not in catalogue()
 
 
-def test_a_station_law_from_a_file_with_a_memory(folder):
-    (folder / "own.toml").write_text(POINT + '[[law]]\nfile = "laws/point.py"\nk = 30.0\nd = 9.0\n')
-    (flight,) = sh.compare(folder / "own.toml")
-    assert flight.law == "point"
-    assert float(np.abs(flight.run.position[-1]).max()) < 0.1
-    law = find_law(str(folder / "laws" / "point.py"))
-    assert isinstance(law, Law)
-    verdicts = list(examine(law))
-    assert [v for v in verdicts if v.outcome == "failed"] == []
-    assert len(verdicts) == 6
-
-
-def test_the_schema_of_scenario_files_takes_it(folder):
-    schema = Draft202012Validator(json_schema())
-    read = tomllib.loads((folder / "own.toml").read_text())
-    assert schema.is_valid(read)
-    assert not schema.is_valid(read | {"law": [{"file": "my_law.py", "type": "pd"}]})
-    assert not schema.is_valid(read | {"law": [{"k": 0.1}]})
-
-
 WRONG = rows("""
 file = "nope.py" | law[1].file: found "nope.py": No such file or directory; allowed: a Python file
 file = "my_law.py"↵type = "pd" | either a type or a file, not both
@@ -221,13 +187,6 @@ def test_links_in_a_circle_are_told_in_one_line(folder):
     (folder / "other.py").symlink_to(folder / "laws" / "my_law.py")
     for words in (("run", "own.toml"), ("check-part", "other.py"), ("laws", "other.py"), ("parts", "other.py")):
         complains(starhold(*words, cwd=folder), "Too many levels of symbolic links")
-
-
-def test_check_part_tells_the_line_that_fails(folder):
-    text = LAW.replace("gains.p, vector_part", "gains.p / (1.0 + measurement.attitude[0]), vector_part")
-    (folder / "half.py").write_text(text)
-    reasons = [verdict.reason for verdict in examine(find_law(str(folder / "half.py"))) if verdict.outcome == "failed"]
-    assert "half.py, line 19: ZeroDivisionError: float division by zero" in reasons
 
 
 def test_a_file_with_the_name_of_another_law_is_refused_and_the_law_s_own_is_it(folder):

@@ -174,17 +174,6 @@ def test_numeric_form_is_optimal_for_any_weights():
         assert linear_modes(tensor(craft.inertia), feedback).real.max() < 0.0
 
 
-def test_numeric_form_of_diagonal_weights_is_form_ii():
-    random = np.random.default_rng(5)
-    for _ in range(fewer(100)):
-        craft, r = make_craft(moments_of(random)), weights_of(random, 3)
-        q = np.r_[weights_of(random, 3), weights_of(random, 3)]
-        closed = lqr.design(craft, lqr.FormII(tuple(q), tuple(r)))
-        other = lqr.design(craft, lqr.Numeric(np.diag(q), np.diag(r)))
-        assert np.array(other.k_rate) == pytest.approx(np.array(closed.k_rate), rel=1e-14)
-        assert np.array(other.k_attitude) == pytest.approx(np.array(closed.k_attitude), rel=1e-14)
-
-
 def test_numeric_gains_keep_symmetry_and_zeros_to_the_last_bit():
     """With Q that commutes with the inertia, as in form I, for which these weights are exact numbers."""
     body = np.array([[5.0, 1.0, -1.0], [1.0, 6.0, 2.0], [-1.0, 2.0, 7.0]])

@@ -14,6 +14,7 @@ from starhold.parts.craft import make_craft
 from starhold.parts.magnetic_field import field, prepared
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
+from tests.missions import cubesat
 from tests.refusals import refused, replaced
 
 INERTIA = np.array([0.05, 0.065, 0.025])
@@ -24,26 +25,10 @@ ORBIT = 5677.0
 """s, of the scenario."""
 
 
-def text(law, rate, angles='["20 deg", "-10 deg", "30 deg"]', duration=ORBIT, parts=PARTS):
-    """A 6U CubeSat on a polar orbit."""
-    return f"""
-name = "own"
-[spacecraft]
-inertia = [0.05, 0.065, 0.025]
-[orbit]
-position = ["6878 km", 0, 0]
-velocity = [0, "-1.017 km/s", "7.544 km/s"]
-epoch = {list(EPOCH)}
-[initial]
-angles = {angles}
-rate = {rate}
-[simulation]
-duration = {duration}
-control_period = 0.5
-record_every = 20
-{parts}
-[[law]]
-{law}"""
+def text(law, rate, duration=ORBIT, parts=PARTS):
+    """The CubeSat with a law."""
+    angles = '["20 deg", "-10 deg", "30 deg"]'
+    return cubesat("record_every = 20\n", parts, f"[[law]]\n{law}", angles=angles, duration=duration, rate=rate)
 
 
 def told(rate, magnetic_field, attitude=(1.0, 0.0, 0.0, 0.0)):
@@ -81,7 +66,7 @@ def test_the_cross_product_law_is_feedback_across_the_field():
 
 def test_b_dot_slows_tumbling_as_the_damping_does_that_it_stands_for():
     k = 2e-4
-    run = sh.simulate(parse(text(f'type = "b-dot"\nk = {k}\n', '["8 deg/s", "-6 deg/s", "5 deg/s"]'), "own"))
+    run = sh.simulate(parse(text(f'type = "b-dot"\nk = {k}\n', ["8 deg/s", "-6 deg/s", "5 deg/s"]), "own"))
     numbers = prepared(EPOCH)
     places = run.position.values
 
@@ -109,18 +94,18 @@ def test_the_design_of_b_dot_is_the_published_one():
     gains = b_dot.design(CRAFT, b_dot.Orbit(ORBIT, math.radians(80.0)))
     assert gains.k == pytest.approx(2.0 * (math.tau / ORBIT) * (1.0 + math.sin(math.radians(80.0))) * 0.025)
     law = 'type = "b-dot"\nform = "orbit"\norbit_period = 5677\ninclination = "80 deg"\n'
-    run = sh.simulate(parse(text(law, "[0.1, -0.1, 0.1]"), "own"))
+    run = sh.simulate(parse(text(law, [0.1, -0.1, 0.1]), "own"))
     assert np.linalg.norm(run.rate.values[-1]) < 0.1 * np.linalg.norm(run.rate.values[0])
 
 
 def test_the_cross_product_law_brings_the_craft_to_rest_on_target_within_orbits():
     law = "k_rate = 1e-4\nk_attitude = 2e-7\n"
-    run = sh.simulate(parse(text(f'type = "cross-product"\n{law}', "[1e-3, -1e-3, 1e-3]", duration=8 * ORBIT), "own"))
+    run = sh.simulate(parse(text(f'type = "cross-product"\n{law}', [1e-3, -1e-3, 1e-3], duration=8 * ORBIT), "own"))
     angle = 2.0 * np.linalg.norm(run.attitude_error.values[:, 1:], axis=1)
     assert angle[0] > 0.5
     assert angle[-500:].max() < 0.01
     # The magnetorquers leave out the same of any law.
-    other = sh.simulate(parse(text(f'type = "pd"\n{law}', "[1e-3, -1e-3, 1e-3]"), "own"))
+    other = sh.simulate(parse(text(f'type = "pd"\n{law}', [1e-3, -1e-3, 1e-3]), "own"))
     shared = len(other.time)
     assert np.abs(other.attitude.values - run.attitude.values[:shared]).max() < 1e-9
     assert np.abs(other.command.values - run.command.values[:shared]).max() > 1e-9
@@ -130,8 +115,8 @@ def test_the_cross_product_law_brings_the_craft_to_rest_on_target_within_orbits(
 def test_a_law_that_the_field_steers_needs_its_reading_and_has_no_claim(law):
     name = law.split('"')[1]
     with refused(f"law {name}: found no magnetic_field, which {name} needs; allowed: a sensor that measures magnetic_field"):
-        sh.simulate(parse(text(law, "[0.1, 0, 0]", parts=""), "own"))
-    (certificate,) = sh.certify(parse(text(law, "[0.1, 0, 0]"), "own"))
+        sh.simulate(parse(text(law, [0.1, 0, 0], parts=""), "own"))
+    (certificate,) = sh.certify(parse(text(law, [0.1, 0, 0]), "own"))
     assert not any(claim.outcome == "proved" for claim in certificate.claims)
 
 

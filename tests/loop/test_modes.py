@@ -88,7 +88,7 @@ ORBIT = BASE.replace("[initial]", '[orbit]\naltitude = "500 km"\ninclination = "
 
 def test_modes_with_targets_of_their_own_fly_as_their_laws_towards_them():
     loop = loop_of(SUN, ORBIT)
-    both, carry = flown(loop, 300)
+    both, _ = flown(loop, 300)
     assert both["mode"][0].tolist() == [1.0] * 200 + [2.0] * 101
     first, ended = flown(loop_of_mode(loop, 0), 200)
     second = replace(loop_of_mode(loop, 1), start=ended.state)
@@ -98,8 +98,6 @@ def test_modes_with_targets_of_their_own_fly_as_their_laws_towards_them():
     for name in ("attitude", "rate", "command", "rate_error"):
         joined = np.concatenate([first[name][:, :200], then[name]], axis=1)
         assert joined.tobytes() == both[name].tobytes(), name
-    assert np.array(flatten(fly_plainly(loop, 300))).tobytes() == np.array(flatten(carry)).tobytes()
-    same_in_every_lane(loop, 300)
 
 
 DELAYED = """
@@ -203,7 +201,7 @@ dipole_limit = "0.2 A m^2"
 
 def test_effectors_that_a_mode_does_without_rest_in_it():
     loop = loop_of(RODS_THEN_WHEELS, CUBESAT)
-    both, carry = flown(loop, 230)
+    both, _ = flown(loop, 230)
     first = flown(loop_of_mode(loop, 0), 200)[0]
     for name in ("attitude", "rate", "command", "magnetic_dipole", "wheel_momentum"):
         assert both[name][:, :200].tobytes() == first[name][:, :200].tobytes(), name
@@ -219,5 +217,3 @@ def test_effectors_that_a_mode_does_without_rest_in_it():
     assert (asked[201:] > 0.0).all()
     # Rotors that are asked for nothing coast down by their friction.
     assert (np.abs(np.diff(both["wheel_momentum"][:, :200], axis=1)) > 0.0).all()
-    assert np.array(flatten(fly_plainly(loop, 230))).tobytes() == np.array(flatten(carry)).tobytes()
-    same_in_every_lane(loop, 230)

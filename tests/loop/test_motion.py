@@ -90,16 +90,6 @@ def test_free_motion_conserves_momentum_and_energy():
     assert abs(np.linalg.norm(last.attitude) - 1.0) < 1e-14
 
 
-def test_orbit_conserves_energy_and_momentum():
-    samples, carry = fly(loop(period=1.0), 6000)
-    r, v = samples[7:10], samples[10:13]
-    energy = 0.5 * (v**2).sum(0) - MU / np.linalg.norm(r, axis=0)
-    momentum = np.cross(r.T, v.T)
-    assert np.abs(energy / energy[0] - 1).max() < 1e-10
-    assert np.abs(momentum - momentum[0]).max() < 1e-10 * np.linalg.norm(momentum[0])
-    assert carry.lost_at == -1.0
-
-
 def test_lyapunov_function_falls_along_the_flight():
     flown = loop("pd", parts=(), period=0.02, limit="none")
     samples, _ = fly(flown, 20_000)
@@ -108,14 +98,6 @@ def test_lyapunov_function_falls_along_the_flight():
     # The held torque lags by half a period, which may feed in a little; nothing else may.
     assert np.diff(energy).max() < 1e-7
     assert energy[-1] < 1e-3 * energy[0]
-
-
-@pytest.mark.parametrize("kind", ["axis", "norm"])
-def test_limits_hold(kind):
-    samples, _ = fly(loop("sliding", period=0.1, limit=kind), 500)
-    size = np.abs(samples[13:16]).max() if kind == "axis" else np.linalg.norm(samples[13:16], axis=0).max()
-    assert size <= 0.01 * (1 + 1e-15)
-    assert size > 0.0099
 
 
 def test_motion_too_fast_to_follow_is_reported_and_ends_the_samples():

@@ -1,21 +1,16 @@
-"""The predictive law and its solver give the same bits in plain Python, on one lane, on eight lanes, in C and JavaScript."""
+"""The solver of the predictive law gives the same bits in plain Python, on one lane and on eight; the law itself flies in
+C and JavaScript in `simulation/test_every_machine.py`."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 
-from starhold.algebra.structured import Buffer, repeat
-from starhold.algebra.vector import ZERO
-from starhold.laws import mpc
-from starhold.laws.interface import Measurement
 from starhold.laws.predictive.problem import Problem
 from starhold.laws.predictive.single import record_solver, work_out
 from starhold.laws.predictive.solver import PATIENCE
-from starhold.trace.program import Memory
 from tests.mpc.programs import Program
-from tests.mpc.setting import CRAFTS, WEIGHTS, fresh
-from tests.trace.machines import Job, Subject, column, on_c, on_lanes, on_node, same
+from tests.trace.machines import Job, column, on_lanes, same
 
 LANES, BUDGET = 8, 100
 SMALL, LARGE, STUBBORN = 0, 3, 13
@@ -45,60 +40,3 @@ def plainly_solved(problem: Problem) -> Any:
     """What plain Python leaves in the memories of the solver."""
     cost, sweeps, solved = work_out(problem, BUDGET)
     return {"numbers": np.array(problem.numbers.cells), "report": np.array([cost, sweeps, float(solved)])}
-
-
-# --- The law ----------------------------------------------------------------------------------------------------------
-
-STEPS, PERIOD = 5, 2.0
-LIKE = 23
-"""Numbers of what the law sees, but for the wheels' momentum."""
-
-
-def seen_in(numbers: Any) -> Measurement:
-    """What the law sees, from its numbers in order."""
-    n = tuple(numbers)
-    return Measurement(n[0:4], n[4:7], n[7:10], n[10:13], n[13:16], n[16:19], n[19:22], n[22])
-
-
-def law_over_rows(gains: mpc.Gains, craft: Any) -> Subject:
-    """The law, called with one row after the other: commands and all that it remembers."""
-
-    def run(rows: Buffer, numbers: Buffer, commands: Buffer, _lane: Any) -> None:
-        def step(k: int) -> None:
-            command, _ = mpc.torque(seen_in(rows.row(k, LIKE)), gains, craft, mpc.Memory(numbers))
-            commands.put(k, command)
-
-        repeat(STEPS, step)
-
-    count = len(fresh(gains, craft).numbers.cells)
-    sizes = (("rows", False, LIKE * STEPS), ("numbers", True, count), ("commands", True, 3 * STEPS))
-    return Subject(run, tuple(Memory(name, True, writable, size) for name, writable, size in sizes), {})
-
-
-def jumping_rows(seed: int) -> Any:
-    """Rows in which the craft tumbles round a moving target, so far off that limits shape most plans."""
-    random = np.random.default_rng(seed)
-    rows = np.zeros((STEPS, LIKE))
-    attitude, rate = random.normal(size=4), random.normal(size=3) * 0.06
-    for row in rows:
-        attitude, rate = attitude + 0.05 * random.normal(size=4), rate + 0.006 * random.normal(size=3)
-        target, acceleration = random.normal(size=(2, 3)) * ((0.01,), (0.001,))
-        turn = attitude / np.linalg.norm(attitude)
-        position = random.normal(size=3) * 5e6
-        row[:] = (*turn, *rate, *(rate + target), *target, *acceleration, *ZERO, *position, PERIOD)
-    return rows
-
-
-@pytest.mark.parametrize("language", ["gcc", "node"])
-def test_law_in_other_languages(language: str):
-    craft = CRAFTS["principal"]
-    gains = mpc.Gains(*WEIGHTS[:2], (1e-3, 1e-3, 1e-3), horizon=9, limit=mpc.LIMITS.index("norm"))
-    subject = law_over_rows(gains, craft)
-    program = subject.program()
-    start = np.array(fresh(gains, craft, PERIOD).numbers.cells)
-    memories = {"rows": jumping_rows(1).ravel(), "numbers": start, "commands": np.zeros(3 * STEPS)}
-    jobs = [Job(program, memories, {})]
-    (found,) = on_node(jobs) if language == "node" else on_c(jobs, language, "-O1")
-    expected = subject.plain(memories, {})
-    same(expected, found, language)
-    assert expected["numbers"][mpc.WORST] > PATIENCE

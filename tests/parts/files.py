@@ -145,6 +145,7 @@ rate = [0.02, -0.03, 0.01]
 duration = 10.0
 control_period = 0.1
 """
+POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simulation]\nduration = 1.0\n'
 PD = '[[law]]\ntype = "pd"\nk_rate = 0.9\nk_attitude = 0.09\n'
 
 

@@ -9,11 +9,10 @@ from starhold.laws.catalogue import catalogue
 from starhold.parts.catalogue import read_module
 from starhold.parts.contract import Parameter
 from starhold.scenario.writing import law_table
-from tests.parts.files import ACTUATOR, BODY, EFFECTOR, ENVIRONMENT, LAW, PARTS, PD, SENSOR, TARGET, part
+from tests.parts.files import BODY, EFFECTOR, PARTS, PD, POINT, TARGET, part
 from tests.refusals import complains
 from tests.running import starhold
 
-POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simulation]\nduration = 1.0\n'
 CIRCLE = law_table(catalogue("libration-point")["l2-circle"], catalogue("libration-point")["l2-circle"].examples()[0])
 GYRO, FILTER = part('type = "gyro"\n'), part('type = "complementary-filter"\nattitude_gain = 0.1\nbias_gain = 0.01\n')
 TRACKER = part('type = "star-tracker"\ncross = 1e-5\nroll = 1e-4\n')
@@ -47,56 +46,66 @@ def told(folder, text):
 
 
 COMPOSED = {
+    "an estimator without its sensors": (FILTER, "no attitude", "a sensor that measures attitude"),
+    "an estimator without one of its sensors": (TRACKER + FILTER, "no rate", "a sensor that measures rate"),
+    "two estimators": (GYRO + TRACKER + FILTER * 2, "a second estimator", "one estimator"),
+    "two sensors of the rate": (GYRO * 2, "a second sensor of rate, beside gyro", "one of each"),
+    "a sensor beside [sensor]": ("[sensor]\nrate_noise = 1e-4\n" + GYRO, "a second sensor of rate"),
+    "a part that is about the Earth elsewhere": (
+        MARS + part('type = "residual-dipole"\ndipole = [0, 0, 0.01]\n'),
+        "part residual-dipole: found an orbit about Mars",
+        "one about Earth",
+    ),
+    "a target about the Earth elsewhere": (MARS + part('type = "sun"\n'), "part sun: found an orbit about Mars"),
+    "an unknown type": (part('type = "gyroo"\n'), 'part[1].type: found "gyroo"', "did you mean gyro?"),
+    "no type": (part("noise = 1\n"), "part[1].type: found nothing", "or a file"),
+    "what another table gives": (part('type = "wheels"\n'), '"wheels"', "the [wheels] table, which gives it"),
+    "single brackets": ('[part]\ntype = "gyro"\n', "part: found", "[[part]] tables, with double brackets"),
+    "an unknown key": (part('type = "gyro"\nnoice = 1\n'), "part[1].noice: found an unknown key", "noise"),
+    "a missing key": (part('type = "lag"\n'), "part[1].lag: found nothing", "this key is required"),
+    "another unit": (part('type = "gyro"\nnoise = "1 N m"\n'), 'part[1].noise: found "1 N m"', "rad"),
+    "below the bound": (part('type = "gyro"\nnoise = -1\n'), "part[1].noise: found -1", "at least 0"),
+    "two numbers of three": (part('type = "gyro"\nbias = [0, 1]\n'), "part[1].bias", "3 numbers"),
+    "a name twice": (GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n'), "part[2].name", "a name that"),
+    "too late a tracker": (
+        part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 100\n'),
+        "part star-tracker",
+        "the delay must be at most 64 control periods",
+    ),
+    "a blind tracker": (
+        part('type = "star-tracker"\ncross = 0\nroll = 0\nboresight = [0, 0, 0]\n'),
+        "part star-tracker",
+        "the boresight needs a direction",
+    ),
+    "too fast a lag": (part('type = "lag"\nlag = 0.001\n'), "simulation.substeps", "at least 200 substeps"),
+    "file and type": (part(MINE + 'type = "gyro"\n'), "part[1].file", "either a type or a file, not both"),
+    "a file's name that is a number": (part("file = 3\n"), "part[1].file: found 3", "the name of a Python file"),
+    "rows of other lengths": (
+        part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n'),
+        "allowed: rows of time, x, y, z, or the name of a CSV file",
+    ),
+    "no such file": (part('file = "nope.py"\n'), '"nope.py": No such file', "a Python file that holds a part"),
+}
+"""Tables beside those of a body and a law."""
+WHOLE = {
     "a law for another body": (POINT + '[[law]]\ntype = "pd"\nk_rate = 0.1\nk_attitude = 0.1\n', "law[1].type", '"pd"'),
     "a law for this body is not there": (BODY + CIRCLE, "law[1].type", '"l2-circle"'),
-    "an estimator without its sensors": (BODY + FILTER + PD, "no attitude", "a sensor that measures attitude"),
-    "an estimator without one of its sensors": (BODY + TRACKER + FILTER + PD, "no rate", "a sensor that measures rate"),
-    "two estimators": (BODY + GYRO + TRACKER + FILTER * 2 + PD, "a second estimator", "one estimator"),
-    "two sensors of the rate": (BODY + GYRO * 2 + PD, "a second sensor of rate, beside gyro", "one of each"),
-    "a sensor beside [sensor]": (BODY + "[sensor]\nrate_noise = 1e-4\n" + GYRO + PD, "a second sensor of rate"),
     "a part of another body": (
         POINT + part('type = "constant-torque"\ntorque = [0, 0, 1e-5]\n') + CIRCLE,
         "part[1]: found constant-torque, for the body rigid-body",
         "a part for libration-point",
     ),
-    "a part that is about the Earth elsewhere": (
-        BODY + MARS + part('type = "residual-dipole"\ndipole = [0, 0, 0.01]\n') + PD,
-        "part residual-dipole: found an orbit about Mars",
-        "one about Earth",
-    ),
-    "a target about the Earth elsewhere": (BODY + MARS + part('type = "sun"\n') + PD, "part sun: found an orbit about Mars"),
     "a mode's target about the Earth elsewhere": (BODY + MARS + MODES, "found an orbit about Mars"),
-    "an unknown type": (BODY + part('type = "gyroo"\n') + PD, 'part[1].type: found "gyroo"', "did you mean gyro?"),
-    "no type": (BODY + part("noise = 1\n") + PD, "part[1].type: found nothing", "or a file"),
-    "what another table gives": (BODY + part('type = "wheels"\n') + PD, '"wheels"', "the [wheels] table, which gives it"),
-    "single brackets": (BODY + '[part]\ntype = "gyro"\n' + PD, "part: found", "[[part]] tables, with double brackets"),
     "no table": ("part = [3]\n" + BODY + PD, "part[1]: found 3", "a [[part]] table"),
-    "an unknown key": (BODY + part('type = "gyro"\nnoice = 1\n') + PD, "part[1].noice: found an unknown key", "noise"),
-    "a missing key": (BODY + part('type = "lag"\n') + PD, "part[1].lag: found nothing", "this key is required"),
-    "another unit": (BODY + part('type = "gyro"\nnoise = "1 N m"\n') + PD, 'part[1].noise: found "1 N m"', "rad"),
-    "below the bound": (BODY + part('type = "gyro"\nnoise = -1\n') + PD, "part[1].noise: found -1", "at least 0"),
-    "two numbers of three": (BODY + part('type = "gyro"\nbias = [0, 1]\n') + PD, "part[1].bias", "3 numbers"),
-    "a name twice": (BODY + GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n') + PD, "part[2].name", "a name that"),
-    "too late a tracker": (
-        BODY + part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 100\n') + PD,
-        "part star-tracker",
-        "the delay must be at most 64 control periods",
-    ),
-    "a blind tracker": (
-        BODY + part('type = "star-tracker"\ncross = 0\nroll = 0\nboresight = [0, 0, 0]\n') + PD,
-        "part star-tracker",
-        "the boresight needs a direction",
-    ),
-    "too fast a lag": (BODY + part('type = "lag"\nlag = 0.001\n') + PD, "simulation.substeps", "at least 200 substeps"),
-    "file and type": (BODY + part(MINE + 'type = "gyro"\n') + PD, "part[1].file", "either a type or a file, not both"),
-    "a file's name that is a number": (BODY + part("file = 3\n") + PD, "part[1].file: found 3", "the name of a Python file"),
-    "no such file": (BODY + part('file = "nope.py"\n') + PD, '"nope.py": No such file', "a Python file that holds a part"),
 }
 
 
-@pytest.mark.parametrize("kind", COMPOSED)
+WHOLE |= {kind: (BODY + tables + PD, *said) for kind, (tables, *said) in COMPOSED.items()}
+
+
+@pytest.mark.parametrize("kind", WHOLE)
 def test_parts_that_do_not_go_together(kind, tmp_path):
-    text, *said = COMPOSED[kind]
+    text, *said = WHOLE[kind]
     line = told(tmp_path, text)
     assert all(words in line for words in said), line
 
@@ -218,24 +227,6 @@ def test_a_file_that_is_no_part_or_fails(kind, tmp_path):
     assert said in told(tmp_path, BODY + before + part(MINE + keys) + PD)
 
 
-def test_a_branch_that_kernels_cannot_take(tmp_path):
-    line = "return tuple(where(less(absolute(u), params.width), 0.0, u) for u in command)"
-    assert line in ACTUATOR
-    (tmp_path / "mine.py").write_text(ACTUATOR.replace(line, "return command if command[0] > 0.1 else (0.0, 0.0, 0.0)"))
-    (tmp_path / "own.toml").write_text(BODY + part(MINE + "width = 1e-3\n") + PD)
-    complains(starhold("run", "own.toml", cwd=tmp_path), "mine.py")
-
-
-def test_a_part_and_a_law_from_files_are_told_apart(tmp_path):
-    (tmp_path / "mine.py").write_text(ENVIRONMENT)
-    (tmp_path / "own_law.py").write_text(LAW.replace("measurement.rate)", "measurement.rates)"))
-    law = '[[law]]\nfile = "own_law.py"\nk = 0.1\n'
-    assert "own_law.py, line 17: AttributeError" in told(tmp_path, BODY + part(MINE + "drag = 0.1\n") + law)
-    (tmp_path / "own_law.py").write_text(LAW)
-    (tmp_path / "mine.py").write_text(SENSOR.replace("state.rate,", "state.rates,"))
-    assert "part mine: mine.py, line 27: AttributeError" in told(tmp_path, BODY + part(MINE + "noise = 0.1\n") + law)
-
-
 ENDLESS = {
     "a part": part('file = "/dev/zero"\n') + PD,
     "rows": TABLE.replace("rows.csv", "/dev/zero") + PD,
@@ -260,12 +251,6 @@ def test_a_long_list_in_place_of_a_matrix_costs_no_memory():
     assert most < 2**22
 
 
-def test_a_file_named_as_an_installed_part(tmp_path):
-    (tmp_path / "gyro.py").write_text(SENSOR)
-    line = told(tmp_path, BODY + part('file = "gyro.py"\nnoise = 1e-4\n') + PD)
-    assert "a part named gyro is installed already; rename the file" in line
-
-
 ROWS = {
     "missing": (None, "rows.csv: No such file"),
     "words": ("time,x,y,z\n0,0,0,much\n1,0,0,0\n", "rows.csv: could not convert string to float"),
@@ -285,11 +270,6 @@ def test_a_table_that_is_none(kind, tmp_path):
     if text is not None:
         (tmp_path / "rows.csv").write_bytes(text if isinstance(text, bytes) else text.encode())
     assert said in told(tmp_path, BODY + TABLE + PD)
-
-
-def test_rows_of_other_lengths_in_the_scenario_itself(tmp_path):
-    rows = part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n')
-    assert "allowed: rows of time, x, y, z, or the name of a CSV file" in told(tmp_path, BODY + rows + PD)
 
 
 def test_a_link_that_hides_a_file_of_python_is_not_run(tmp_path):

@@ -204,11 +204,3 @@ def test_two_random_torques_draw_different_numbers():
     # The first draws what it draws alone.
     alone = fly(replace(loop, parts=loop.parts[:1]), 119)[1].memories.environments
     assert alone[0] == memories[-1][0]
-
-
-def test_two_sensors_draw_different_numbers():
-    parts = fit("sensor", "gyro", 1e-3), fit("sensor", "star-tracker", 1e-3, 1e-3), fit("environment", "random-torque", 1e-3)
-    run = flown(free(*parts), 2000)
-    gyro = (run["gyro_rate"] - run["rate"])[:2000] / 1e-3 * math.sqrt(0.1)
-    tracker = angles(run["attitude"], run["star_tracker_attitude"])[:2000] / 1e-3
-    assert np.abs(np.corrcoef(np.column_stack([gyro, tracker]).T) - np.eye(6)).max() < 4.5 / math.sqrt(2000)

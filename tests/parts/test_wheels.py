@@ -5,12 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from flint import fmpq
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from starhold.algebra.polynomial import Polynomial, constants, pieces
 from starhold.parts.craft import bare_inertia
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
@@ -23,7 +21,6 @@ from starhold.parts.effectors.wheels import (
     lose,
     make_wheels,
     motor,
-    wheel_momentum,
     with_facets,
 )
 from tests.making import HUB, flown, hub, rotors
@@ -146,19 +143,6 @@ def test_layouts():
             pyramid(elevation)
 
 
-def test_polynomials_read_motor_and_allocation():
-    wheels = constants(simple(three_orthogonal(), viscous=1e-4, coulomb=2e-3)._replace(facets=()))
-    names = ("u", "h", "w")
-    values = {"u": fmpq(1, 20), "h": fmpq(2), "w": fmpq(1, 3)}
-    u, h, w = (Polynomial.variable(name) for name in names)
-    zero = constants(0.0)
-    found = motor((u, zero, zero), (h, zero, zero), (w, zero, zero), wheels)[0]
-    holding = [p for p in pieces(found) if all((c.positive.at(values) > 0) == truth for c, truth in p.truths)]
-    assert len(holding) == 1
-    assert float(holding[0].value.at(values)) == pytest.approx(0.05 - 1e-4 * (200.0 - 1.0 / 3.0) - 2e-3)
-    assert float(allocate((u, zero, zero), wheels)[0].at(values)) == pytest.approx(-0.05)
-
-
 # Motors and friction.
 
 
@@ -211,21 +195,6 @@ def test_friction_alone_takes_energy():
     assert energy[-1] < 0.2 * energy[0]
     relative = run["wheel_momentum"][-1] / 0.002 - np.array(wheels.axes) @ run["rate"][-1]
     assert np.abs(relative).max() < 0.01 * CREEP
-
-
-@pytest.mark.parametrize("coulomb", [0.0, 1e-3])
-def test_a_wheel_saturates_at_its_momentum_limit(coulomb):
-    momenta = np.abs(flight(3000, limit=1.0, coulomb=coulomb)[1]["wheel_momentum"])
-    assert 0.4 * (1.0 - BAND) < momenta.max() <= 0.4 * (1.0 + 1e-12)
-
-
-def test_rotors_at_rest_in_the_body_are_part_of_it():
-    """J' w + sum a_i h_i of rotors at rest in the body is J w."""
-    wheels = simple(pyramid(), inertia=0.2, viscous=1e3)
-    rate = (0.3, -0.2, 0.5)
-    momentum = tuple(0.2 * float(np.dot(a, rate)) for a in wheels.axes)
-    whole = bare_inertia(HUB, axial_inertia(wheels)) @ rate + np.array(wheel_momentum(momentum, wheels))
-    np.testing.assert_allclose(whole, HUB @ rate, rtol=1e-14)
 
 
 # Loss of a wheel.

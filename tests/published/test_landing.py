@@ -6,14 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from starhold.analysis.transient import Limits
 from starhold.report.commands.modal_roots import present
 from starhold.report.figures import save
 from starhold.report.tables import write_table
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.studies.modal_roots import law_lines, pick_modal, study
 
-LIMITS = Limits(math.radians(30.0), math.radians(50.0))
 CHECKED = {10: -1.564, 45: -1.054, 85: -0.896, 90: -0.858, 135: -0.548, 180: -0.376}
 """Best roots at some angles (deg), of another program in continuous time."""
 

@@ -3,17 +3,14 @@
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-import starhold as sh
 from starhold.report.body import report_of
 from starhold.report.page import render
 from starhold.report.results import write_results
 from starhold.scenario.reading import Scenario
 from starhold.studies import compare
 from starhold.studies.body import study_of
-from starhold.studies.certificates import certify_scenario
 from tests.report import flown
 from tests.report.reader import Reader
 
@@ -41,24 +38,6 @@ def test_each_body_is_found_by_its_name() -> None:
     for found in (studies, reports):
         assert found["hot-air-balloon"] is found["my.balloon"] is found["any-body"]
         assert len(set(map(id, found.values()))) == 3
-
-
-def test_it_is_measured_by_what_it_records(balloon: Balloon) -> None:
-    flights = compare.compare(balloon)
-    for flight in flights:
-        run = flight.recording
-        assert run.attrs["body"] == "hot-air-balloon"
-        size = np.linalg.norm(run["command"], axis=1)
-        assert flight.metrics["effort"] == pytest.approx(size[:-1].sum() * 0.1, rel=1e-12)
-        assert flight.metrics["peak_command"] == np.abs(run["command"]).max()
-        assert flight.metrics["final_rate"] == pytest.approx(np.linalg.norm(run["rate"][150:], axis=1).max(), rel=1e-12)
-        assert [certificate.outcome for certificate in flight.certificates] == ["undecided"]
-        # The same metrics as of the Dataset, which holds names, units and meanings.
-        assert sh.metrics(flight.run) == flight.metrics
-    results = {flight.name: flight.metrics for flight in flights}
-    assert flights[0].metric_set.ranked(results) == sorted(results, key=lambda name: results[name]["effort"])
-    for tried in certify_scenario(balloon):
-        assert (tried.certificate.outcome, tried.certificate.claims, tried.trial) == ("undecided", (), None)
 
 
 def test_every_recorded_quantity_is_drawn_and_told(balloon: Balloon, tmp_path: Path) -> None:

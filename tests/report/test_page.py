@@ -217,11 +217,6 @@ def test_the_outline_has_the_inertia_of_a_uniform_box(inertia: Any) -> None:
     assert size.max() == pytest.approx(0.95)
 
 
-def test_a_flat_body_has_an_outline() -> None:
-    size, _ = _box((1.0, 1.0, 2.0))
-    assert size.min() == pytest.approx(0.095)
-
-
 def test_settings_tell_what_flies() -> None:
     plain = settings(load("cubesat-slew"), "Settings")
     # In the units in which the file has them.

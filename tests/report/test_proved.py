@@ -10,12 +10,10 @@ from starhold.certification.certificate import Certificate, Claim, Obligation
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, methods, sentence
-from starhold.laws.catalogue import catalogue
 from starhold.report.page import render
 from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from tests.making import built
 from tests.report import flown
 from tests.report.reader import Reader
 from tests.small import CRAFT, MPC, PD, WEAK
@@ -118,16 +116,6 @@ def test_what_certificates_hold_is_no_markup() -> None:
     assert outcomes(found) == ["undecided", "undecided"]
 
 
-def test_the_whole_page_with_certificates_is_deterministic_and_loads_nothing() -> None:
-    flights = [replace(f, certificates=(c,)) for f, c in zip(flown.flights(), certificates()[:2], strict=True)]
-    page = render(flown.scenario(), flights)
-    assert page == render(flown.scenario(), flights)
-    found = Reader(page)
-    assert sum(tag == "script" for tag, _ in found.tags) == 6
-    assert not any({"src", "href"} & set(attrs) for _, attrs in found.tags)
-    assert page.index("<h2>Ranking</h2>") < page.index("<h2>What is proved</h2>") < page.index("<h2>The turning body</h2>")
-
-
 @pytest.mark.parametrize("kind", sorted(HEADINGS))
 def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> None:
     numbers = {
@@ -149,16 +137,3 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
     found = told(Certificate("law", {"quaternion_sign": "shortest"}, (claim,)))
     assert outcomes(found) == ["undecided"] * 2
     assert "why not" in found.text
-
-
-def test_every_law_that_comes_with_starhold_is_told() -> None:
-    """Whatever certificates the examples of all laws give can be shown."""
-    base = built(parse(CRAFT + PD + WEAK + MPC, "test"))
-    made = [
-        certify(replace(base, law=law, gains=gains), law.name)
-        for law in catalogue().values()
-        for gains in law.examples()[:1]
-    ]
-    found = told(*made)
-    assert sum(tag == "section" for tag, _ in found.tags) == len(made)
-    assert set(outcomes(found)) <= {"proved", "refuted", "undecided"}

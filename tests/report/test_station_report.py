@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from starhold.analysis.libration_point import METRICS, CircleGoal, EquilibriumGoal, measure
+from starhold.analysis.libration_point import METRICS
 from starhold.report.colours import colour
 from starhold.report.page import render
 from starhold.report.path_plots import collect
 from starhold.report.phase_portrait import phase_portrait
-from starhold.simulation.lane import Recording
 from tests.report.flown import draw, told
 from tests.report.flown import stations as flights
 from tests.report.reader import Reader
@@ -95,32 +94,3 @@ def test_curves_over_time_are_in_si() -> None:
     assert deviation.clock == "days"
     assert deviation.panels[0].curves[0][0] == pytest.approx(-0.25 * 12742, rel=1e-3)
     assert control.panels[3].levels == pytest.approx([scenario.laws[0].options.limit * 0.505092], rel=1e-4)
-
-
-def recording(position: np.ndarray, control: np.ndarray, **attrs: object) -> Recording:
-    """A run of samples a unit of time apart."""
-    arrays = {"time": np.arange(len(position), dtype=float), "position": position, "control": control, "command": control}
-    return Recording(arrays, {"control_period": 1.0, "record_every": 1, "control_limit": 2.0, "limit": "norm", **attrs})
-
-
-def test_metrics_of_a_run_made_by_hand() -> None:
-    units = told("l2-circle").table.libration.units
-    position = np.array([[0.5, 1.5, 0.0], [0.0, 0.0, 1.1], [0.1, 0.9, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    control = np.array([[0.0, 2.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [0.0, 0.0, 0.0]])
-    found = measure(recording(position, control), units, CircleGoal(1.0, 1.4), 0.15)
-    assert found["settling_time"] == pytest.approx(units.time)
-    assert found["deviation"] == pytest.approx(0.1 * units.length)
-    assert found["deviation_overall"] == pytest.approx(0.5 * units.length)
-    assert found["largest_x"] == pytest.approx(0.1 * units.length)
-    assert found["limit_share"] == pytest.approx(0.4)
-    assert found["peak_ratio"] == pytest.approx(1.0)
-    assert found["effort"] == pytest.approx(6.0 * units.velocity)
-    assert found["effort_per_year"] == pytest.approx(6.0 * units.velocity * 365.25 * 86400 / (4.0 * units.time))
-    rest = measure(recording(position, control), units, EquilibriumGoal((0.0, 0.0, 1.0)), 0.01)
-    assert rest["final_distance"] == pytest.approx(np.sqrt(2.0) * units.length)
-    assert (rest["settling_time"], rest["cut_off"]) == (None, ["settling_time"])
-    assert found["cut_off"] == []
-    lost = measure(recording(position, control, diverged_at=5.0), units, CircleGoal(1.0, 1.4), 0.15)
-    assert lost["diverged_at"] == pytest.approx(5.0 * units.time)
-    assert lost["deviation"] is None
-    assert METRICS.ranked({"a": lost, "b": found}) == ["b", "a"]

@@ -10,7 +10,7 @@ from starhold.scenario.reading import load
 from tests.scenario.mutants import mutant
 from tests.tiers import leading
 
-EACH = 60
+EACH = 120
 
 
 @pytest.mark.parametrize("block", leading(range(5)))

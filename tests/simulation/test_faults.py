@@ -1,22 +1,17 @@
 """A craft whose inertia changes in flight, with wheels and without: what the body does and what the law knows."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from starhold.algebra.quaternion import to_reference
-from starhold.algebra.structure import flatten
 from starhold.algebra.vector import ZERO
 from starhold.laws.interface import Measurement, NoMemory
-from starhold.loop.kernels import make_step
 from starhold.parts.craft import make_craft, tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.scenario.bodies.rigid_body.craft import craft_with, torque_limit, wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse
 from starhold.simulation.lane import fly, label
-from starhold.simulation.lanes import simulate_many
 from starhold.studies.certificates import certify_scenario
 from tests import small
 from tests.making import wheels_after
@@ -85,27 +80,6 @@ def test_a_fault_at_the_start_changes_the_rate_given():
     _, loop = made(PLAIN + LYAPUNOV + fault(MOVED, time=0, action='"none"'))
     run = label(loop, *fly(loop, 1), 1)
     assert run["rate"][0] == pytest.approx(np.array([0.03 * 2.0 / 2.6, -0.02 * 3.0 / 2.9, 0.04 * 4.0 / 3.5]), rel=1e-15)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_lanes_chunks_and_plain_python_agree_bit_for_bit(case):
-    _, loop = made(CASES[case])
-    steps = 160
-    starts = [loop.start._replace(rate=tuple(f * w for w in loop.start.rate)) for f in (1.0, 0.5, -1.0)]
-    batch = simulate_many(loop, starts, steps, threads=2)
-    for lane, start in enumerate(starts):
-        assert batch.state(lane) == fly(replace(loop, start=start), steps)[1].state
-    whole, end = fly(loop, steps)
-    chunked, other = fly(loop, steps, progress=lambda done, total: None)
-    assert np.array_equal(whole, chunked)
-    assert flatten(end) == flatten(other)
-    step, carry = make_step(loop.composition()), loop.carry()
-    for phase in loop.phases(steps):
-        carry = carry._replace(state=carry.state._replace(rate=phase.rate_from(carry.state.rate)))
-        for k in range(phase.first, phase.last):
-            carry = step.update(step.check(carry, k, phase.setup), k, (1, 0), phase.gains, phase.nominal, phase.setup)
-            carry = step.propagate(carry, phase.craft, phase.setup)
-    assert flatten(carry.state) == flatten(end.state)
 
 
 def test_all_phases_are_flown_by_one_kernel():

@@ -23,17 +23,6 @@ def flown(name="sliding", **options):
     return replace(sample_loop(law, law.examples()[0]).with_parts(*noise(1e-4, 1e-4, 1e-4)), **options)
 
 
-def test_every_lane_equals_its_own_single_flight():
-    loop = flown()
-    random = np.random.default_rng(3)
-    starts = [loop.start._replace(rate=tuple(random.normal(scale=0.05, size=3))) for _ in range(LANES)]
-    batch = simulate_many(loop, starts, STEPS, first_run=17)
-    for lane in (0, 1, 127, 128, 255, 256, LANES - 1):
-        alone = fly(replace(loop, start=starts[lane]), STEPS, run=17 + lane)[1].state
-        assert batch.states[:, lane].tolist() == flatten(alone)
-    assert (batch.lost_at == -1).all()
-
-
 @pytest.mark.parametrize("target", [ORBITAL, aimed((0.6, 0.0, 0.8, 0.0))], ids=["orbital", "inertial"])
 def test_lanes_start_like_single_flights(target):
     loop = flown().without("target").with_parts(target)

@@ -17,8 +17,7 @@ batches = settings(
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_every_machine_leaves_the_bits_of_plain_python(machine: str) -> None:
-    if machine not in ("lane", "lanes"):
-        need(machine)
+    need(machine)
 
     @batches
     @given(st.lists(st.tuples(scripts, seeds, st.integers(0, 3)), min_size=8, max_size=8))

@@ -274,10 +274,6 @@ def _writing(cells, x):
     return x
 
 
-class _Field(NamedTuple):
-    x: Any
-
-
 REFUSED: list[tuple[Callable[..., Any], str, str]] = [
     (lambda c, t, n, w: math.sqrt(t[0]), "a function that is none of the scalar operations", "starhold.algebra.scalar"),
     (lambda c, t, n, w: math.sin(t[0]), "a function that is none of the scalar operations", "starhold.algebra.scalar"),

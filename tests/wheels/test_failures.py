@@ -1,7 +1,6 @@
 """What is left after the loss of one or two wheels."""
 
 import csv
-import re
 from dataclasses import replace
 from itertools import combinations
 
@@ -20,7 +19,7 @@ from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
-from starhold.studies.failures import FULL, Failure, _flown, _left, directions_lacking, saturation, study
+from starhold.studies.failures import FULL, Failure, _flown, _left, saturation, study
 from tests.refusals import complains
 from tests.running import starhold
 
@@ -80,16 +79,6 @@ def test_degree_of_stability_and_gains_are_those_of_a_design_for_the_torque_left
     assert found[1].eta == pytest.approx(told["degree of stability (1/s)"], rel=1e-9)
     designed = entry.law.design(scenario.craft, left)
     assert found[1].gains["k_rate"] == pytest.approx(designed.k_rate, rel=1e-12)
-
-
-def test_the_directions_are_those_that_the_wheels_name(found):
-    wheels = make_wheels(pyramid(), 1e-3, 0.02, 0.4)
-    for failure in found[5:]:
-        one, two = (number - 1 for number in failure.lost)
-        with pytest.raises(ValueError, match="no torque about the body direction") as caught:
-            lose(wheels._replace(torque_limit=tuple(0.02 * (k != one) for k in range(4))), two)
-        named = re.search(r"\(([^)]*)\)", str(caught.value))
-        assert [float(x) for x in named[1].split(",")] == pytest.approx(failure.lacking[0], abs=1e-3)
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3, 4])
@@ -180,12 +169,6 @@ def test_the_growth_of_a_made_up_momentum_is_carried_on_to_within_an_orbit():
     assert saturation(times, filled[:, [0, 2]], 500.0).known == "none"
     flown = saturation(times, np.column_stack([swing, 1e-3 * times]), 500.0)
     assert (flown.known, flown.wheel, flown.time) == ("flown", 2, pytest.approx(991.0))
-
-
-def test_directions_lacking():
-    assert directions_lacking(np.empty((0, 3))).tolist() == np.eye(3).tolist()
-    assert directions_lacking(np.array(pyramid())).shape == (0, 3)
-    assert directions_lacking(np.eye(3)[:2]) == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
 
 
 def test_the_table_reads_back(scenario, found, tmp_path):

@@ -1,22 +1,17 @@
 """A spacecraft on reaction wheels, from the scenario file to the flight."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from starhold.parts.craft import make_craft, tensor
-from starhold.parts.effectors.envelope import authority
+from starhold.parts.craft import make_craft
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
-from starhold.simulation.lanes import simulate_many
-from tests.making import built, rotors, wheels_after
+from tests.making import built, rotors
 from tests.refusals import refused
-from tests.tiers import leading
 
 BUILTIN = builtin_text("wheels-orbital")
 LOST = "wheel = 2\nlost = true\ndelay = 5"
@@ -45,26 +40,6 @@ def test_the_builtin_scenario_holds_the_orbital_frame_on_its_first_run():
     assert (np.abs(run["wheel_torque"]) <= limits * (1.0 + 1e-12)).all()
     assert (np.abs(run["wheel_momentum"]) <= np.array(loop.wheels.momentum_limit)).all()
     assert wheels_of(scenario) is not None
-
-
-@pytest.mark.parametrize(
-    ("layout", "allocation"),
-    leading(product(("pyramid", "orthogonal", "nasa-standard"), ("least-peak", "least-squares"))),
-)
-def test_total_angular_momentum_is_kept_without_torque_from_outside(layout, allocation):
-    """Body and wheels together, in inertial axes, over an orbit, in the kernel itself."""
-    text = BUILTIN.replace('"pyramid"', f'"{layout}"').replace('"least-squares"', f'"{allocation}"')
-    text = text.replace("gravity_gradient = true", "gravity_gradient = false").replace('"10 min"', '"94 min"')
-    text = text.replace("inertia = [6.0, 8.0, 5.0]", "inertia = [60.0, 80.0, 50.0]")
-    text = text.replace("# viscous", "viscous").replace("# coulomb", "coulomb")
-    text = text.replace('# momentum = "0.1 N m s"', 'momentum = "0.1 N m s"')
-    _, loop, run = flight(text)
-    body = run["rate"] @ tensor(loop.craft.inertia) + run["wheel_momentum"] @ np.array(loop.wheels.axes)
-    total = Rotation.from_quat(run["attitude"], scalar_first=True).apply(body)
-    size = np.linalg.norm(total[0])
-    assert np.abs(total - total[0]).max() <= 1e-12 * size
-    # The wheels did something meanwhile.
-    assert np.ptp(run["wheel_momentum"], axis=0).max() > 0.01 * size
 
 
 def test_locked_rotors_fall_through_gravity_like_one_body():
@@ -112,29 +87,6 @@ def test_a_pyramid_that_loses_a_wheel_goes_on():
     assert 0.95 * left < settled["both"] < 1.6 * left
     assert 0.95 * left < settled["reallocate"] < settled["none"]
     assert settled["none"] > 2.0 * settled["both"]
-
-
-def test_retuned_gains_are_those_designed_for_the_torque_left():
-    scenario, loop, _ = flight(BUILTIN + STRUCK, steps=1)
-    entry = scenario.laws[0]
-    struck, acted = loop.events
-    assert (struck.step, acted.step) == (200, 250)
-    assert struck.gains == entry.gains
-    share = authority(wheels_after(acted)) / authority(wheels_of(scenario))
-    assert 0.0 < share < 1.0
-    expected = entry.law.design(scenario.craft, entry.spec._replace(torque=entry.spec.torque * share))
-    assert acted.gains == expected
-    assert expected.k_rate < entry.gains.k_rate
-
-
-def test_lanes_agree_with_single_flights_through_a_fault():
-    loop = built(parse(BUILTIN + STRUCK, "here"))
-    start = loop.start
-    starts = [start._replace(rate=tuple(f * w for w in start.rate)) for f in (1.0, 0.5, -1.0)]
-    batch = simulate_many(loop, starts, 400, threads=2)
-    for lane, own in enumerate(starts):
-        end = fly(replace(loop, start=own), 400)[1].state
-        assert batch.state(lane) == end
 
 
 def axes(*rows):
