@@ -221,8 +221,8 @@ class Oracle:
             return all(self.lyapunov(q / np.linalg.norm(q), zero) - V0 > level for q in halves)
         if even:
             return True
-        if level is not None:
-            return self.lyapunov(other, zero) - V0 > level
+        if level is not None and self.lyapunov(other, zero) - V0 > level:
+            return True
         return all(self.lyapunov(other, zero) > self.lyapunov(turned(self.rng), zero) for _ in range(30))
 
     def contents(self, V0, level):

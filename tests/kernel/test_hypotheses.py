@@ -142,8 +142,9 @@ CASES = {
         sliding(0.1), theorem=REACHES, s=surface(0.1), taken=["outside torque"], outside_0=0.2, outside_1=0.0, outside_2=0.0
     ),
 }  # fmt: skip
-"""No false claim is known for the others: that the other equilibrium is outside, or inside (one of the two always holds); that V is level at the other equilibrium, which repels; that a jump lowers V; that
-V has the kinetic energy; rests at half turns only; the stiffness; the form of the surface; what a layer adds."""
+"""No false claim is known for the others: that the other equilibrium is outside, or inside (one of the two always holds);
+that V is level there, which repels; that a jump lowers V; that V has the kinetic energy; rests at half turns only; the
+stiffness; the form of the surface; what a layer adds."""
 
 
 @pytest.mark.parametrize("hypothesis", CASES)
