@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from math import isqrt
 from typing import Any, TypeAlias, cast
 
 Rows: TypeAlias = list[list[Fraction]]
@@ -156,3 +157,23 @@ def cosine_below(angle: Fraction) -> Fraction:
     for k in range(1, 25):
         total, term = total + term, -term * angle * angle / (2 * k * (2 * k - 1))
     return total
+
+
+def root(x: Fraction) -> Fraction:
+    """Return a short number that is not below the square root of a number that is not negative, and hardly above it."""
+    demand(x >= 0, "a root is of a negative number")
+    Account.spend(4, size(x))
+    places = 64 + max(0, x.denominator.bit_length() - x.numerator.bit_length()) // 2
+    return Fraction(isqrt((x.numerator << 2 * places) // x.denominator) + 1, 1 << places) if x else x
+
+
+def up(x: Fraction) -> Fraction:
+    """Return a short number that is not below a number that is not negative, and hardly above it."""
+    demand(x >= 0, "a bound is negative")
+    places = 64 + max(0, x.denominator.bit_length() - x.numerator.bit_length())
+    return Fraction(-((-x.numerator << places) // x.denominator), 1 << places)
+
+
+def norm(v: Iterable[Fraction]) -> Fraction:
+    """Return a number that is not below the Euclidean norm, and hardly above it."""
+    return root(sum((x * x for x in v), Fraction(0)))

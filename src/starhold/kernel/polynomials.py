@@ -7,7 +7,7 @@ from fractions import Fraction
 from itertools import product
 from typing import Any, TypeAlias
 
-from .numbers import Account, demand, longest, rational, read_dict
+from .numbers import Account, demand, longest, rational, read_dict, up
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -128,6 +128,18 @@ def apply(rows: Sequence[Sequence[Poly | Fraction | int]], v: Sequence[Poly]) ->
 def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
     """Return the vector product."""
     return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]
+
+
+def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
+    """Return a number that |p| does not exceed where no variable exceeds its size."""
+    found = Fraction(0)
+    for m, c in p.terms.items():
+        Account.spend(len(m) + 1, longest([c, found]))
+        term = abs(c)
+        for name in m:
+            term *= sizes[name]
+        found += up(term)
+    return up(found)
 
 
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:

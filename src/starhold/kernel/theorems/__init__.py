@@ -8,7 +8,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, invariant, isotropic, sampling, sliding, station
+from . import attitude, invariant, isotropic, pointing, sampling, sliding, station
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -21,6 +21,7 @@ THEOREMS: dict[str, Theorem] = {
     "converges without a preferred axis": isotropic.converges_without_axes,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
+    "points": pointing.points,
     "attracts": invariant.attracts,
     "is stable": invariant.stays,
     "is unstable": invariant.leaves,

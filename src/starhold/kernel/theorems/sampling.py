@@ -26,6 +26,16 @@ def near_rest(cases: Piecewise, rest: dict[str, int]) -> Poly:
     return found[0]
 
 
+def beside(a: Rows, b: Rows) -> Rows:
+    """Return a matrix with the columns of both."""
+    return [[*s, *t] for s, t in zip(a, b, strict=True)]
+
+
+def step(held: Rows, h: Fraction) -> Rows:
+    """Return the linear motion of (w, q) over a period in which the acceleration -held (w, q) does not change."""
+    return plus(beside(scalar(1), scalar(0)), held, -h) + plus(beside(scalar(h / 2), scalar(1)), held, -h * h / 4)
+
+
 def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues no larger than the
     radius, and with `longest` it is for every period up to that.
@@ -46,13 +56,8 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
     push = [[poly(x).number for x in row] for row in loop.J_inverse]
     h, radius = claim.numbers["period"], claim.numbers["radius"]
     longest, other = claim.numbers.get("longest"), claim.numbers.get("other")
-    held = times(push, [[*a, *b] for a, b in zip(C, K, strict=True)])
-
-    def step(h: Fraction) -> Rows:
-        upper = plus([[*a, *b] for a, b in zip(scalar(1), scalar(0), strict=True)], held, -h)
-        return upper + plus([[*a, *b] for a, b in zip(scalar(h / 2), scalar(1), strict=True)], held, -h * h / 4)
-
-    yield "step", Contracts(step(h), radius)
+    held = times(push, beside(C, K))
+    yield "step", Contracts(step(held, h), radius)
     yield "radius", Exceeds(Fraction(1), radius)
     said = (
         f"near rest, with the torque held for {below(h)} s, the loop is stable, with all eigenvalues within {above(radius)}"
@@ -64,7 +69,7 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
         yield "damping outweighs stiffness", Definite(plus(C, K, -longest / 4))
         said += f", and it is stable for every period up to {below(longest)} s"
     if other is not None:
-        yield "another step", Contracts(step(other))
+        yield "another step", Contracts(step(held, other))
         said += f", and it is stable for a period of {below(other)} s"
     demand(not claim.taken.content, "the loop is taken with nothing")
     assumptions = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
