@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
+from math import prod
 from typing import Any, TypeAlias
 
 from .numbers import Account, demand, longest, rational, read_dict, up
@@ -135,10 +136,7 @@ def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     found = Fraction(0)
     for m, c in p.terms.items():
         Account.spend(len(m) + 1, longest([c, found]))
-        term = abs(c)
-        for name in m:
-            term *= sizes[name]
-        found += up(term)
+        found += up(abs(c) * prod(sizes[name] for name in m))
     return up(found)
 
 

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.attitude import Loop, sign_words
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
+from starhold.kernel.held import RATE, TURN, Held, Region
 from starhold.kernel.loops import AttitudeLoop, slopes
 from starhold.kernel.numbers import Account, RefusedError, Rows, norm
-from starhold.kernel.theorems.pointing import RATE, TURN, Held, Region, image, periods
+from starhold.kernel.theorems.pointing import image, periods
 from starhold.parts.craft import tensor
 
 linalg: Any = import_module("scipy.linalg")
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 POINTS = "points"
 LEANS = (0.06, 0.1, 0.15, 0.2, 0.28, 0.35)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
-MORE, FINITE, DEEPEST, ELLIPSOIDS = 1.0 + 1e-9, 5e-3, 8.0, 6
+MORE, FLOOR, LARGER, DEEPEST, ELLIPSOIDS = 1.0 + 1e-9, 1.03, 1.01, 8.0, 6
 """What is given away where numbers are rounded; by how much ellipsoids are larger than the least, for motions come into them
 after a finite time; by how much a level may be below the one before; how many ellipsoids there are at most."""
 
@@ -41,14 +42,22 @@ class Chain:
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     samples: int = 0
+    aimed: float | None = None
+
+    def aim(self) -> float:
+        """Return the level that pushes allow where all motions are nearly linear."""
+        if self.aimed is None:
+            found = self.lower(Fraction(self.level) / 2**20)
+            self.aimed = inf if found is None else float(found[2])
+        return self.aimed
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
         c = Fraction(self.level)
         while (found := self.lower(c)) is not None:
             tau, beta, floor = found
-            end = Fraction(max(float(floor) * 1.001, float(c) / DEEPEST))
-            if end > c * Fraction(99, 100):
+            end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
+            if end > c * Fraction(9, 10):
                 break
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
             self.samples += periods(self.held.h * beta, floor, c, end)
@@ -143,7 +152,12 @@ def find_pointing(
             loop.failed[POINTS] = str(reason)
             return False
         begun.append(Chain(held, V, told["level"]))
-    chain = min(begun, key=Chain.descend)
+    # The best in the small is tried first, and taken if it comes down from the whole set.
+    for chain in sorted(begun, key=Chain.aim):
+        if chain.descend() < 2.0 * chain.aim():
+            break
+    else:
+        chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)
     if not chain.levels:
         loop.failed[POINTS] = "V does not fall on the set from which motions start"
         return False
@@ -178,9 +192,13 @@ def smallest(A: Array, pushes: list[Array]) -> tuple[Array, list[float]] | None:
         return float(np.linalg.eigvalsh(X[TURN, TURN])[-1]), X, shares
 
     weight = np.log([np.linalg.norm(B, 2) / np.linalg.norm(pushes[0], 2) + 1e-12 for B in pushes])
-    found = optimize.minimize(lambda x: np.log(shape(x)[0]), weight, method="Nelder-Mead", options={"maxfev": 400})
+
+    def turn(x: Array) -> float:
+        return float(np.log(shape(x)[0]))
+
+    found = optimize.minimize(turn, weight, method="Nelder-Mead", options={"maxfev": 400})
     _, X, shares = shape(found.x)
-    return (X + X.T) / 2.0 * (1.0 + FINITE), [float(a) for a in shares]
+    return (X + X.T) / 2.0 * LARGER, [float(a) for a in shares]
 
 
 def highest_ratio(a: Rows, b: Rows) -> float:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Generator
 from fractions import Fraction
 
+from ..held import step
 from ..loops import AttitudeLoop
-from ..numbers import Rows, demand, plus, scalar, times
+from ..numbers import Rows, beside, demand, plus, times
 from ..polynomials import Poly, poly
 from ..programs import Guards, Piecewise
 from ..reading import Claim
@@ -24,16 +25,6 @@ def near_rest(cases: Piecewise, rest: dict[str, int]) -> Poly:
     found = [case.value for case in cases if holds(case.guards)]
     demand(len(found) == 1, "the law switches at rest on target")
     return found[0]
-
-
-def beside(a: Rows, b: Rows) -> Rows:
-    """Return a matrix with the columns of both."""
-    return [[*s, *t] for s, t in zip(a, b, strict=True)]
-
-
-def step(held: Rows, h: Fraction) -> Rows:
-    """Return the linear motion of (w, q) over a period in which the acceleration -held (w, q) does not change."""
-    return plus(beside(scalar(1), scalar(0)), held, -h) + plus(beside(scalar(h / 2), scalar(1)), held, -h * h / 4)
 
 
 def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
