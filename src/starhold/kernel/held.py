@@ -126,8 +126,8 @@ class Held:
         return most(self.rates[0], sizes) + self.push * norm(reach(self.felt, [sizes[name] for name in STATE]))
 
     def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
-        """Return A and pairs B, b such that a sample in the region is followed by x+ = Ax + the sum of B v, |v| <= b: what is
-        not linear, and what comes from outside, is such a push."""
+        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, for what
+        is not linear and what comes from outside."""
         h, N, tube, u = self.h, self.N, self.tube(region), self.loop.u
         rest = self.loop.on_target | self.loop.still
         linear = beside(*(slopes(u, letter, rest) for letter in "wq"))

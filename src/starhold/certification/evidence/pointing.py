@@ -154,7 +154,7 @@ def find_pointing(
         begun.append(Chain(held, V, told["level"]))
     # The best in the small is tried first, and taken if it comes down from the whole set.
     for chain in sorted(begun, key=Chain.aim):
-        if chain.descend() < 2.0 * chain.aim():
+        if chain.descend() < 4.0 * chain.aim():
             break
     else:
         chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)
