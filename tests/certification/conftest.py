@@ -23,11 +23,3 @@ def made(tmp_path_factory):
     return lambda name, sign_policy="as_published", disturbance=0.0: json.loads(
         _made(name, sign_policy, disturbance, folder)
     )
-
-
-@pytest.fixture(scope="package", autouse=True)
-def _without_the_kernel():
-    """These tests are about the claims that the checker derives again, and about files as they hold them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("starhold.certification.certify.proved_claims", lambda subject, turn=None: [])
-        yield

@@ -8,7 +8,8 @@ import pytest
 
 from starhold.certification.certificate import Certificate, Claim, Obligation
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.wording import HEADINGS, OBLIGATIONS, methods, sentence
+from starhold.certification.obligations import OBLIGATIONS
+from starhold.certification.wording import HEADINGS, methods, sentence
 from starhold.laws.catalogue import catalogue
 from starhold.report.page import render
 from starhold.report.proved import section

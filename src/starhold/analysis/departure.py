@@ -273,7 +273,7 @@ def value_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
     """Return the claim's V at measurements; None where the law has none. Polynomials take whole columns at once."""
     function, stiffness = loop.law.lyapunov, claim.witness.get("stiffness")
     if claim.kind == "region":
-        return Shape(**claim.witness).value(loop.law.module.single_root(loop.gains)[0], shown.attitude, shown.rate)
+        return Shape(**claim.witness).value(shown.attitude, shown.rate)
     if claim.kind == "sliding":
         return kinetic_energy(loop.law.module.surface(shown, loop.gains), loop.craft)
     if stiffness is not None:

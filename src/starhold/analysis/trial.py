@@ -94,11 +94,10 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
 
 def _fly_region(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
     free, shape, level = _undisturbed(loop, certificate), Shape(**claim.witness), claim.numbers["level"]
-    a = free.law.module.single_root(free.gains)[0]
-    states = shape.draw(a, level, flights, np.random.default_rng(seed))
+    states = shape.draw(level, flights, np.random.default_rng(seed))
     free, states = _paced(free, certificate, states, np.random.default_rng(seed + 1))
     value = _value(free, claim)
-    shares = [share for _, share in _falling(free, certificate, claim, states, value, 1e-15 * a * a)]
+    shares = [share for _, share in _falling(free, certificate, claim, states, value, 1e-15 * shape.p)]
     return Trial(flights, level, max(shares), None)
 
 

@@ -13,12 +13,12 @@ from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
+from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import needed, torque_limit
 from starhold.certification.motion import Motion
 from starhold.certification.openness import bounded_torque, named
 from starhold.certification.proofs import proved_claims
-from starhold.certification.region import region
 from starhold.certification.sampling import APART, sampling
 from starhold.certification.saturation import FREE, saturation
 from starhold.certification.sliding import surface_claim
@@ -75,12 +75,14 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
         everywhere = {"rate_everywhere": None, "everything": True}
         claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
-        proved = {claim.kind: claim for claim in proved_claims(subject, wanted.slew_angle)}
+        proved, failed = proved_claims(subject, wanted.slew_angle)
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted, proved))
         else:
+            if loop.law.hook("single_root") is not None:
+                claims.append(proved.get("region") or _undecided("region", {}, subject, failed[ISOTROPIC]))
             slides = proved.get("sliding") or (surface_claim(subject) if loop.wheels is None else None)
-            claims.extend(claim for claim in (region(subject), slides) if claim is not None)
+            claims.extend([] if slides is None else [slides])
             claims.extend(_unshown(subject, wanted))
         sampled = proved.get("sampling") or sampling(Motion(subject))
         claims.extend([] if sampled is None else [sampled])

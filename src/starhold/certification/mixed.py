@@ -1,5 +1,5 @@
 """The V with a product of rate and attitude, by which a set of attitudes and rates is a region of attraction where the law
-knows no axis: V = |w|^2/2 + a^2 (p u + c2 u^2) - a (g + m u) q.w with u = 1 - q0 and a root a < 0 of the law."""
+knows no axis: V = |w|^2/2 + p u + c2 u^2 + (g + m u) q.w with u = 1 - q0. Shapes are told for a law with the root -1/s."""
 
 from __future__ import annotations
 
@@ -24,36 +24,35 @@ class Shape(NamedTuple):
 
     @property
     def other_equilibrium(self) -> float:
-        """V/alpha^2 at rest on the other quaternion of the target."""
+        """V (1/s2) at rest on the other quaternion of the target."""
         return 2.0 * self.p + 4.0 * self.c2
 
-    def value(self, a: float, attitude: Any, rate: Any) -> Any:
-        """V (1/s2) of attitude and rate (rad/s), numbers or columns, for the root a (1/s)."""
+    def value(self, attitude: Any, rate: Any) -> Any:
+        """V (1/s2) of attitude and rate (rad/s), numbers or columns."""
         q, u = vector_part(attitude), 1.0 - attitude[0]
-        turned = a * a * ((self.p + self.c2 * u) * u)
-        return dot(rate, rate) * 0.5 + turned - a * ((self.g + self.m * u) * dot(q, rate))
+        return dot(rate, rate) * 0.5 + (self.p + self.c2 * u) * u + (self.g + self.m * u) * dot(q, rate)
 
     def room(self, bound: float, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """{V <= bound alpha^2} at u is a ball of rates over alpha: its radius squared, below zero where it is empty."""
+        """{V <= bound} at u is a ball of rates: its radius squared, below zero where it is empty."""
         return 2.0 * (bound - self.p * u - self.c2 * u * u) + (self.g + self.m * u) ** 2 * u * (2.0 - u)
 
-    def draw(self, a: float, level: float, count: int, random: np.random.Generator) -> NDArray[np.float64]:
+    def draw(self, level: float, count: int, random: np.random.Generator) -> NDArray[np.float64]:
         """States (16, count) of {V <= level}, half of them on its surface. Not part of any proof."""
         axes, directions = random.normal(size=(2, 3, count))
         axes /= np.linalg.norm(axes, axis=0)
         directions /= np.linalg.norm(directions, axis=0)
         u = random.uniform(0.0, 2.0, size=count)
         # Where no rate is small enough, less of the turn.
-        while ((room := self.room(level / (a * a), u)) < 0.0).any():
+        while ((room := self.room(level, u)) < 0.0).any():
             u = np.where(room < 0.0, 0.9 * u, u)
         inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count) ** (1.0 / 3.0))
         states = np.zeros((ROWS.torque.stop, count))
         states[0], states[1:4] = 1.0 - u, np.sqrt(u * (2.0 - u)) * axes
-        states[ROWS.rate] = a * ((self.g + self.m * u) * states[1:4] + inside * np.sqrt(room) * directions)
+        states[ROWS.rate] = -((self.g + self.m * u) * states[1:4] + inside * np.sqrt(room) * directions)
         return states
 
     def volume(self, bound: float) -> float:
-        """The volume of {V <= bound a^2} among attitudes and rates, up to a factor."""
+        """The volume of {V <= bound} among attitudes and rates, up to a factor."""
         u = np.linspace(0.0, 2.0, 201)
         return float(np.sum(np.maximum(self.room(bound, u), 0.0) ** 1.5 * np.sqrt(u * (2.0 - u))))
 

@@ -56,15 +56,15 @@ IN_THE_LOOP = {"known-target", "bounded-target", "quaternion-as-fed", "sign-at-o
 """What every loop meets as it is composed: its law is told how the target moves, and how the quaternion's sign is chosen."""
 
 
-def proved_claims(subject: Subject, turn: float | None = None) -> list[Claim]:
-    """Return the claims about a loop for which evidence was found and checked by the kernel, no two of a kind. turn: what
-    the set within the limits is to hold (rad)."""
+def proved_claims(subject: Subject, turn: float | None = None) -> tuple[dict[str, Claim], dict[str, str]]:
+    """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds, and why none was
+    found for other theorems. turn: what the set within the limits is to hold (rad)."""
     found = find_claims(subject, turn)
     if not found.claims:
-        return []
+        return {}, found.failed
     content = certificate(found.programs, found.claims)
     claims = [made(proved, given, found) for proved, given in zip(check(json.dumps(content)), found.claims, strict=True)]
-    return list({claim.kind: claim for claim in reversed(claims)}.values())[::-1]
+    return {claim.kind: claim for claim in reversed(claims)}, found.failed
 
 
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
@@ -157,6 +157,7 @@ def _exact(x: Fraction) -> Any:
 
 _NUMBERS = {
     "convergence": _set,
+    "region": _set,
     "torque-limit": _limit,
     "wheels": _wheels,
     "inertia": _inertia,

@@ -29,83 +29,6 @@ HEADINGS = {
     "saturated-axis": "X with limited control",
 }
 
-OBLIGATIONS = {
-    "inertia": "the inertia is symmetric and positive definite",
-    "Euler's equation": "the program of the body that flies is Euler's equation",
-    "turning": "the program of its turning is that of a unit quaternion",
-    "V is least on target": "V grows at least as the squares of attitude and rate, so that every level set is bounded",
-    "kinetic energy": "V is the kinetic energy of whatever inertia and a function of the attitude",
-    "V falls": "V falls wherever the body turns, on the whole set",
-    "rates": "no motion from the set turns faster than told",
-    "the other equilibrium repels": "V at rest is highest on the other quaternion, where only a set of measure zero ends",
-    "the other equilibrium is outside": "the set does not hold the other quaternion's equilibrium",
-    "V is level at the other equilibrium": "on the other quaternion V does not depend on the rate to first order",
-    "width": "the width of the hysteresis is between 0 and 1",
-    "a jump lowers V": "every switch of the hysteresis lowers V",
-    "the sign never changes": "no motion of the set comes to where the sign of the quaternion changes",
-    "rests at half turns only": "off the target the body can rest at half turns only, which are unstable",
-    "half turns are outside": "the set does not hold a half turn",
-    "turns from rest": "the set holds every rest turned as far as told",
-    "rates on target": "the set holds every rate on target that is told",
-    "states": "the set holds every state that is told",
-    "norm of the torque": "the torque is within the limit on the whole set",
-    "limit of motor": "the motor gives torque",
-    "limit of wheel": "the wheel stores momentum",
-    "motor": "no motor gives more than its limit on the whole set",
-    "wheel": "no wheel stores more than it can on the whole set",
-    "rest on target": "on target at rest the law asks for no torque",
-    "step": "a matrix shrinks over one step of the exactly discretised loop, faster than the radius",
-    "radius": "the radius is below 1",
-    "stiffness": "the stiffness is symmetric and positive definite",
-    "inertia outweighs damping": "at the longest period the inertia outweighs the damping",
-    "damping outweighs stiffness": "and the damping the stiffness, so that every shorter period is stable too",
-    "another step": "a matrix shrinks over a step of the longest period",
-    "surface": "the surface is the rate and a matrix times the attitude, and what is left of it in the end is as told",
-    "q0 grows on the surface": "on the surface the angle to the target falls",
-    "reach": "the switching torque exceeds the torque from outside on every axis",
-    "beyond the layer": "away from the surface every axis loses more than all others gain in the boundary layer",
-    "in the layer": "so it does within its own layer",
-    "least moment": "the least moment of inertia is as told",
-    "largest moment": "the largest moment of inertia is as told",
-    "least slope": "the least slope of the surface is as told",
-    "largest slope": "the largest slope of the surface is as told",
-    "cosine": "the angle in the end is less than a half turn",
-    "angle": "the angle in the end is as told",
-    "less than a half turn": "the boundary layer is thin enough",
-    "rate": "the rate in the end is as told",
-    "form": "V and its derivative along the loop's own equations have exactly the terms the proof is about",
-    "positive": "V is zero on target at rest and positive elsewhere",
-    "descent": "V falls wherever the body turns, on the whole set",
-    "target": "how the target moves drops out of the error's motion",
-    "only equilibrium": "the body can stay at rest on target only, or on the other quaternion of the same attitude",
-    "strict": "a second function falls strictly and stays within a known share of V",
-    "single equilibrium in the set": "the set does not hold the other quaternion's equilibrium",
-    "other equilibrium repels": "rest on the other quaternion is unstable, so that only a set of measure zero ends there",
-    "half turns repel": "half turns, about every axis where weights are equal and about three where they differ, are "
-    "equilibria too, but unstable, so that only a set of measure zero ends there",
-    "jumps lower V": "every switch of the hysteresis lowers V",
-    "convergence": "the set lies in the region of convergence",
-    "holds what is handed over": "every state in which the mode before may end is in the set",
-    "torque": "the torque is within the limit on the whole set",
-    "momentum": "no wheel stores more than it can on the whole set",
-    "end": "outside a small ball V falls in spite of the torque",
-    "start": "the set that is started from does not reach where the bound fails",
-    "stable at the period": "all eigenvalues of the exactly discretised loop lie within the unit circle",
-    "stable at the longest": "so they do at the longest period",
-    "stable in between": "and at every shorter one",
-    "reach exceeds torque": "the switching torque exceeds the torque from outside on every axis, over the whole orbit",
-    "surface holds the target": "on the surface the angle to the target falls",
-    "layer": "the boundary layer lets the motion end no farther away than told",
-    "only the circle": "where V stays as it is the motion is on the circle, or at rest in its middle",
-    "centre outside": "rest in the middle of the circle is outside the set",
-    "x returns": "along X the motion is on its own and returns",
-    "each axis returns": "each axis is stiff and damped",
-    "stays": "no motion leaves the strip, although the control is limited",
-    "nothing returns from beyond": "beyond the boundary no admissible control brings the motion back",
-    "control": "the control is within its limit on the whole set",
-    "no switch of the quaternion sign": "the quaternion that is fed back does not switch on the way",
-}
-
 
 def shown(value: float, unit: str = "", up: bool = False) -> str:
     """A number as it was written, where that takes no more than seven digits; else with four, rounded down, or up where it
@@ -249,7 +172,7 @@ def _hand_over(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     where = place(n, subject) or "from a level set of V"
     either = ", from either quaternion of an attitude" if subject["quaternion_sign"] == "hysteresis" else ""
-    return f"{where} the body comes to rest on target without leaving the set{either}; the set is the same for every inertia"
+    return f"{where} the body comes to rest on target without leaving the set{either}"
 
 
 def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:

@@ -9,7 +9,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.wording import HEADINGS, OBLIGATIONS, eigenvalues, evidence, methods, sentence, unclaimed
+from starhold.certification.obligations import OBLIGATIONS
+from starhold.certification.wording import HEADINGS, eigenvalues, evidence, methods, sentence, unclaimed
 from starhold.cli.console import console
 from starhold.cli.show import print_rows
 from starhold.report.commands import Column

@@ -50,10 +50,10 @@ class System:
         self.parameters = [name for name in others if name not in turning]
         demand(not any(name.startswith(("sin.", "cos.")) for name in (*self.names, *self.parameters)), "an angle is none")
         demand(len(self.names) + len(self.parameters) <= VARIABLES, "there are too many variables")
-        point = [claim.numbers.get(f"equilibrium.{name}") for name in self.names]
-        self.at_point = point[0] is not None
-        demand(all((x is not None) == self.at_point for x in point), "an equilibrium lacks variables")
-        self.shift: State = {name: x or Fraction(0) for name, x in zip(self.names, point, strict=True)}
+        self.at_point = any(f"equilibrium.{name}" in claim.numbers for name in self.names)
+        self.shift: State = {
+            name: claim.numbers.coordinate(f"equilibrium.{name}") if self.at_point else Fraction(0) for name in self.names
+        }
         demand(not any(self.shift[name] for name in self.angles), "an angle is not zero at the equilibrium")
         self.box: dict[str, tuple[Fraction, Fraction]] = {}
         for name in (*self.names, *self.parameters):
@@ -170,7 +170,8 @@ class System:
     def state(self, place: str) -> tuple[Cell, State]:
         """Return the state of the numbers place.x, and a cell that holds it; refuse one outside of the box."""
         demand(not self.angles, "a state with an angle has no exact values")
-        state = {x: self.claim.numbers[f"{place}.{x}"] - self.shift.get(x, 0) for x in (*self.names, *self.parameters)}
+        told = {x: self.claim.numbers.coordinate(f"{place}.{x}") for x in (*self.names, *self.parameters)}
+        state = {x: at - self.shift.get(x, 0) for x, at in told.items()}
         demand(all(low <= state[x] <= high for x, (low, high) in self.box.items()), "a state is outside of the box")
         for cell in self.all:
             sides = [(Poly(dict(surface)).at(state).number, sign) for surface, sign in cell.signs.items()]

@@ -126,12 +126,12 @@ class Held:
         return most(self.rates[0], sizes) + self.push * norm(reach(self.felt, [sizes[name] for name in STATE]))
 
     def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
-        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, for what
+        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b: of what
         is not linear and what comes from outside."""
         h, N, tube, u = self.h, self.N, self.tube(region), self.loop.u
         rest = self.loop.on_target | self.loop.still
         linear = beside(*(slopes(u, letter, rest) for letter in "wq"))
-        A = step([[-x for x in row] for row in times(N, linear)], h)
+        A = over_period([[-x for x in row] for row in times(N, linear)], h)
         wide, turn = (norm(tube.sizes[name] for name in STATE[part]) for part in (RATE, TURN))
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
@@ -147,7 +147,7 @@ class Held:
         ]
 
 
-def step(held: Rows, h: Fraction) -> Rows:
+def over_period(held: Rows, h: Fraction) -> Rows:
     """Return the linear motion of (w, q) over a period in which the acceleration -held (w, q) does not change."""
     return plus(beside(scalar(1), scalar(0)), held, -h) + plus(beside(scalar(h / 2), scalar(1)), held, -h * h / 4)
 

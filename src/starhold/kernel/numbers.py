@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from math import isqrt
+from math import factorial, isqrt
 from typing import Any, TypeAlias, cast
 
 Rows: TypeAlias = list[list[Fraction]]
@@ -162,6 +162,11 @@ def cosine_below(angle: Fraction) -> Fraction:
     for k in range(1, 25):
         total, term = total + term, -term * angle * angle / (2 * k * (2 * k - 1))
     return total
+
+
+def cosine_above(angle: Fraction) -> Fraction:
+    """Return a number not below the cosine of an angle from 0 to 3: the same series and its next term."""
+    return cosine_below(angle) + angle**48 / factorial(48)
 
 
 def root(x: Fraction) -> Fraction:

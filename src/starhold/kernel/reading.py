@@ -42,6 +42,21 @@ class Told(Generic[_T]):
         demand(not self.unread, f"nothing depends on {', '.join(sorted(self.unread))} of the {self.name}")
 
 
+class Numbers(Told[Fraction]):
+    """The numbers of a claim: bounds, which are not negative, and coordinates of places, which are read as such."""
+
+    def __getitem__(self, key: str) -> Fraction:
+        return _bound(super().__getitem__(key))
+
+    def get(self, key: str) -> Fraction | None:
+        """Return a bound that may be absent."""
+        return self[key] if key in self else None
+
+    def coordinate(self, key: str) -> Fraction:
+        """Return a number that may have either sign."""
+        return super().__getitem__(key)
+
+
 @dataclass(frozen=True)
 class Claim:
     """A claim names its theorem, what the loop is taken with, and the loop's programs by their roles; it has the exact
@@ -51,7 +66,7 @@ class Claim:
     taken: Told[bool]
     programs: Told[Program]
     subject: Told[Fraction]
-    numbers: Told[Fraction]
+    numbers: Numbers
     evidence: Told[Any]
 
     def close(self) -> None:
@@ -93,15 +108,14 @@ def _claim(given: Any, programs: Told[Program]) -> Claim:
         Told("words", dict.fromkeys(taken, True)),
         Told("programs", _table(roles, lambda name: programs[name if isinstance(name, str) else ""])),
         Told("subject", _table(subject, rational)),
-        Told("numbers", _table(numbers, _bound)),
+        Numbers("numbers", _table(numbers, rational)),
         Told("evidence", _table(evidence, lambda part: part)),
     )
 
 
-def _bound(given: Any) -> Fraction:
-    found = rational(given)
-    demand(found >= 0, "a number of a claim is negative")
-    return found
+def _bound(x: Fraction) -> Fraction:
+    demand(x >= 0, "a bound is negative")
+    return x
 
 
 def _table(given: Any, read: Callable[[Any], _T]) -> dict[str, _T]:

@@ -127,6 +127,19 @@ class Contracts:
 
 
 @dataclass(frozen=True)
+class Persists:
+    """Some motions x+ = Ax do not come to zero. Evidence: P, somewhere positive, with A'PA - P nowhere negative: x'Px does
+    not fall (Chetaev)."""
+
+    A: Rows
+
+    def check(self, evidence: Any) -> None:
+        A, P = self.A, matrix(evidence, len(self.A), len(self.A))
+        demand(definite(plus(times(transpose(A), times(P, A)), P, -1), False), "a form falls")
+        demand(not definite([[-x for x in row] for row in P], False), "a form is nowhere positive")
+
+
+@dataclass(frozen=True)
 class Definite:
     """A matrix is symmetric and positive definite. Without evidence."""
 
@@ -209,6 +222,6 @@ class Local:
         return OnCells(self.box, {"o": self.outside, "p": lambda cell: whole.on(cell).low > 0, "g": form})
 
 
-Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Definite | Exceeds | OnCells | Local
+Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Persists | Definite | Exceeds | OnCells | Local
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
 """Obligations, each with the name under which its evidence stands."""

@@ -47,11 +47,12 @@ ASSUMPTIONS = {
 
 @dataclass(frozen=True)
 class Statement:
-    """A sentence, the identifiers of what it assumes, and a label of what it is about."""
+    """A sentence, the identifiers of what it assumes, a label of what it is about, and whether it refutes such a claim."""
 
     text: str
     assumptions: tuple[str, ...]
     label: str = ""
+    refutes: bool = False
 
     def written(self) -> str:
         """Return the sentence with its assumptions."""

@@ -7,7 +7,8 @@ from html import escape
 from typing import Any
 
 from starhold.certification.certificate import FILE, Claim, Obligation
-from starhold.certification.wording import HEADINGS, OBLIGATIONS, evidence, methods, recheck, sentence, unclaimed
+from starhold.certification.obligations import OBLIGATIONS
+from starhold.certification.wording import HEADINGS, evidence, methods, recheck, sentence, unclaimed
 from starhold.report.colours import colour
 from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight

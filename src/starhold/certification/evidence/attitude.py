@@ -56,6 +56,8 @@ class Loop:
 
     written_by: dict[str, dict[str, float | None]] = field(default_factory=dict[str, dict[str, float | None]])
     """The numbers that a V which is not the law's own is made of, by its digest."""
+    forms: dict[str, Poly] = field(default_factory=dict[str, Poly])
+    """The polynomials V, by their digests."""
     eigenvalues: list[list[float]] = field(default_factory=list[list[float]])
     """Those of a step near rest, in floats."""
 
@@ -155,7 +157,9 @@ class Loop:
         """Return V as a polynomial."""
         if V is None:
             return Poly({})
-        return AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
+        if V not in self.forms:
+            self.forms[V] = AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
+        return self.forms[V]
 
     def potential(self, V: str | None) -> float:
         """Return the largest of V at rest."""
@@ -164,9 +168,9 @@ class Loop:
         return max(*map(abs, values), 1e-300) if V is not None else 1.0
 
     def kinetic(self, V: str | None) -> list[float]:
-        """Return twice the coefficients of the squares of the rates in V."""
+        """Return twice the sizes of the coefficients of the squares of the rates in V."""
         p = self.form(V)
-        return [2.0 * float(p.terms.get((f"w{k}", f"w{k}"), 0.5)) for k in (1, 2, 3)]
+        return [2.0 * abs(float(p.terms.get((f"w{k}", f"w{k}"), 0.5))) for k in (1, 2, 3)]
 
     def try_to_show(self, claim: dict[str, Any], scales: Mapping[str, float]) -> bool:
         """Add a claim if evidence for it is found."""
@@ -306,7 +310,8 @@ class Loop:
         limits = [
             o
             for name, o in wanted.items()
-            if isinstance(o, Squares) and name.startswith(("torque", "norm", "motor", "wheel"))
+            # What a lost wheel keeps is a number, at any level.
+            if isinstance(o, Squares) and o.p.names and name.startswith(("torque", "norm", "motor", "wheel"))
         ]
         level = cap
         for _ in range(3):

@@ -15,7 +15,7 @@ from starhold.kernel import rules
 from starhold.kernel.numbers import Account, RefusedError, inverse, rational
 from starhold.kernel.polynomials import Poly, multiple
 from starhold.kernel.programs import Program, digest
-from starhold.kernel.reading import Claim, Told
+from starhold.kernel.reading import Claim, Numbers, Told
 from starhold.kernel.theorems import THEOREMS
 
 linalg: Any = import_module("scipy.linalg")
@@ -32,7 +32,7 @@ def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
         Told("words", dict.fromkeys(claim["taken"], True)),
         Told("programs", {role: Program.read(programs[name]) for role, name in claim["programs"].items()}),
         Told("subject", {name: rational(x) for name, x in claim["subject"].items()}),
-        Told("numbers", {name: rational(x) for name, x in claim["numbers"].items()}),
+        Numbers("numbers", {name: rational(x) for name, x in claim["numbers"].items()}),
         Told("evidence", claim["evidence"]),
     )
 
@@ -45,7 +45,7 @@ def obligations(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> tuple[
 
 
 def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping[str, float]) -> dict[str, Any]:
-    """Return a claim with evidence, and without the numbers of the subject that it does not need. NotFoundError where an
+    """Return a claim with evidence, without the numbers and programs that it does not need. NotFoundError where an
     obligation does not hold, or no evidence for it was found."""
     try:
         wanted, known = obligations(claim, programs)
@@ -53,9 +53,12 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
         found = {name: evidence(name, wanted, scales) for name in wanted}
     except RefusedError as reason:
         raise NotFoundError(str(reason)) from None
-    subject = {name: x for name, x in claim["subject"].items() if name not in known.subject.unread}
+    subject, programs = (
+        {name: x for name, x in claim[part].items() if name not in told.unread}
+        for part, told in (("subject", known.subject), ("programs", known.programs))
+    )
     told = claim["evidence"] | {name: x for name, x in found.items() if x is not None}
-    return claim | {"subject": subject, "evidence": told}
+    return claim | {"subject": subject, "programs": programs, "evidence": told}
 
 
 def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[str, float]) -> Any:
@@ -74,6 +77,8 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
         found = [text(c) for c in euler(name, wanted)]
     elif isinstance(o, rules.Contracts):
         found = contracts(o)
+    elif isinstance(o, rules.Persists):
+        found = persists(o)
     try:
         o.check(found)
     except RefusedError as reason:
@@ -118,6 +123,23 @@ def contracts(o: rules.Contracts) -> list[list[str]]:
     solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
     found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
     return [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
+
+
+def persists(o: rules.Persists) -> list[list[str]]:
+    """Return the matrix of a form that grows along x+ = Ax, as A'PA - P = 1 has it, or A'PA - c^2 P with c near 1."""
+    A = np.array([[float(x) for x in row] for row in o.A])
+    for c in (1.0, 1.0 + 1e-6, 1.0 + 1e-4, 1.0 + 1e-2):
+        try:
+            found: Any = linalg.solve_discrete_lyapunov(A.T / c, -np.eye(len(A)))
+        except np.linalg.LinAlgError:
+            continue
+        rows = [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
+        try:
+            o.check(rows)
+        except RefusedError:
+            continue
+        return rows
+    raise NotFoundError("no form was found that grows")
 
 
 def certificate(programs: list[dict[str, Any]], claims: list[dict[str, Any]]) -> dict[str, Any]:

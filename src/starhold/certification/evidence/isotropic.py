@@ -84,9 +84,10 @@ def reach(loop: Loop, shape: Shape) -> Reach:
     """Record V, and find about the largest level (1/s2) below which V falls, by points of a grid."""
 
     def height(measurement: Any) -> Scalar:
-        return shape.value(-1.0, measurement.attitude, measurement.rate)
+        return shape.value(measurement.attitude, measurement.rate)
 
     V, hysteresis = loop.add(height, measurement=ASKED), loop.loop.hysteresis_width
+    loop.written_by[V] = {name: float(x) for name, x in shape._asdict().items()}
     signed: dict[str, Any] = {"hysteresis": hysteresis} if HYSTERESIS in words(loop) else {}
     asked = cast(Sum, obligations(loop.claim(ISOTROPIC, words(loop), V, level=1, **signed), loop.by_digest)[0]["V falls"])
     top = shape.other_equilibrium

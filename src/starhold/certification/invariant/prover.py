@@ -18,7 +18,7 @@ from starhold.certification.evidence.sums import Guess, find, monomials
 from starhold.kernel.numbers import Account, RefusedError, rational
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import Program, digest
-from starhold.kernel.reading import Claim, Told
+from starhold.kernel.reading import Claim, Numbers, Told
 from starhold.kernel.rules import Sum
 from starhold.kernel.theorems import THEOREMS
 from starhold.kernel.theorems.invariant import Function, System
@@ -58,7 +58,7 @@ class Attempt:
         subject, numbers = ({x: rational(v) for x, v in own.items()} for own in (self.subject, self.numbers))
         programs = {role: Program.read(program) for role, program in self.programs.items()}
         words = dict.fromkeys(self.taken, True)
-        told = Told("programs", programs), Told("subject", subject), Told("numbers", numbers)
+        told = Told("programs", programs), Told("subject", subject), Numbers("numbers", numbers)
         return Claim(self.theorem, Told("words", words), *told, Told("evidence", deepcopy(self.hints)))
 
     @cached_property

@@ -8,7 +8,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, invariant, isotropic, pointing, sampling, sliding, station
+from . import attitude, invariant, isotropic, pointing, refuted, sampling, sliding, station
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -22,6 +22,13 @@ THEOREMS: dict[str, Theorem] = {
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
     "points": pointing.points,
+    "V rises": refuted.rises,
+    "V rises near the target": refuted.rises_near_target,
+    "V is negative": refuted.is_negative,
+    "asks for more than the limit": refuted.exceeds_limit,
+    "does not settle between samples": refuted.does_not_settle,
+    "is pushed off its surface": refuted.is_pushed_off,
+    "turns away on its surface": refuted.leads_away,
     "attracts": invariant.attracts,
     "is stable": invariant.stays,
     "is unstable": invariant.leaves,

@@ -177,7 +177,7 @@ def leaves(claim: Claim) -> Shows:
         demand(all(not cell.V[0].at(system.origin).terms for cell in around), "V is not zero at the equilibrium")
         still = (all(not rate.at(system.origin).terms for rate in cell.rates) for cell in around)
         demand(any(still), "the equilibrium is none")
-        way = {x: var("t") * claim.numbers[f"direction.{x}"] for x in system.names}
+        way = {x: var("t") * claim.numbers.coordinate(f"direction.{x}") for x in system.names}
 
         def leading(p: Poly) -> Fraction:
             terms = p.at(way).terms

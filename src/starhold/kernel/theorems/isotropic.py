@@ -7,6 +7,7 @@ what it divides by is positive. Proof: docs/kernel.md, section 3.
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 
 from ..loops import AttitudeLoop
 from ..numbers import demand
@@ -36,7 +37,8 @@ def converges_without_axes(claim: Claim) -> Generator[tuple[str, Obligation], No
     height, fall, q2 = reduced(V), -reduced(slope), u * (2 - u)
     yield "V is least on target", Sum(height, [q2 - t * t], (), [v * v, u * u, q2])
     yield "V falls", Sum(fall, [level - height, q2 - t * t], (), [v * v, q2])
-    return (yield from concluded(loop, [f"every motion from {{V <= {below(level)}}} stays there and"], strictly=True))
+    statement = yield from concluded(loop, [f"every motion from {{V <= {below(level)}}} stays there and"], strictly=True)
+    return replace(statement, label="region")
 
 
 def without_quotients(loop: AttitudeLoop, p: Poly) -> Poly:

@@ -9,7 +9,7 @@ from fractions import Fraction
 from ..loops import AXES, HYSTERESIS, SHORTEST, AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times, transpose
 from ..polynomials import Poly, apply, dot, multiple, poly
-from ..programs import Case
+from ..programs import Case, single
 from ..reading import Claim
 from ..rules import Definite, Exceeds, Obligation, Shown, Squares, Vanishes
 from ..sentences import Statement, above, below
@@ -29,19 +29,11 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target."""
     loop = AttitudeLoop(claim)
     numbers = claim.numbers
-    yield from loop.sound()
-    s = [cases[0].value for cases in loop.read("surface", 3, loop.told) if len(cases) == 1]
-    demand(len(s) == 3, "the surface switches")
-    K = slopes(s, "q", {})
-    for k, (p, row) in enumerate(zip(s, K, strict=True)):
-        yield f"surface {k}", Vanishes(p - loop.w[k] - dot(row, loop.q[1:]))
+    s, K, moved = yield from declared(loop)
     yield "q0 grows on the surface", Squares(dot(loop.q[1:], apply(K, loop.q[1:])), loop.q[1:], 3)
-    # J s' = J w' + J K q'.
-    without = loop.balance([Poly({})] * 3)
-    moved = [a + b for a, b in zip(without, apply(loop.J, apply(K, loop.turning[1:])), strict=True)]
     axes, outside = list[Axis](), [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
     for i in AXES:
-        axes.append(taken_apart(loop, i, moved[i] - loop.e[i], s[i]))
+        axes.append(taken_apart(loop, i, moved[i], s[i]))
         yield f"reach {i}", Exceeds(axes[i].reach, outside[i])
     layered = any(axis.slope is not None for axis in axes)
     squares, ending = Fraction(0), "slides to rest on target, on either quaternion"
@@ -70,6 +62,18 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
         (*assumptions, "unlimited-torque", torque, target, "no-wheels", "sign-at-once" if signed else "quaternion-as-fed"),
         "sliding",
     )
+
+
+def declared(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, tuple[list[Poly], Rows, list[Poly]]]:
+    """Show that the law's surface is s = w + Kq, and return s, K, and J s' less the torques of the law and from outside."""
+    yield from loop.sound()
+    s = [single(cases) for cases in loop.read("surface", 3, loop.told)]
+    K = slopes(s, "q", {})
+    for k, (p, row) in enumerate(zip(s, K, strict=True)):
+        yield f"surface {k}", Vanishes(p - loop.w[k] - dot(row, loop.q[1:]))
+    # J s' = J w' + J K q'.
+    without = zip(loop.balance([Poly({})] * 3), loop.e, apply(loop.J, apply(K, loop.turning[1:])), strict=True)
+    return s, K, [own - e + turned for own, e, turned in without]
 
 
 def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:

@@ -251,7 +251,7 @@ def needs_more_control(claim: Claim) -> Proof:
     """The law asks for more than its limit at a place of the circle itself."""
     loop, numbers = PointLoop(claim), claim.numbers
     circle = yield from declared(loop)
-    y, z, control = numbers["y"], numbers["z"], numbers["control"]
+    y, z, control = numbers.coordinate("y"), numbers.coordinate("z"), numbers["control"]
     norm, axis = numbers.get("limit.norm"), numbers.get("limit.axis")
     demand((norm is None) != (axis is None), "there is not one limit")
     at = {"x1": 0, "x2": y, "x3": z, "v1": 0, "v2": -circle.rate * z, "v3": circle.rate * y, circle.size: 0}
