@@ -25,7 +25,7 @@ optimize: Any = import_module("scipy.optimize")
 Array = NDArray[np.float64]
 
 POINTS = "points"
-LEANS = (0.06, 0.1, 0.15, 0.2, 0.28, 0.35)
+LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
 MORE, FLOOR, LARGER, DEEPEST, ELLIPSOIDS = 1.0 + 1e-9, 1.03, 1.01, 8.0, 6
 """What is given away where numbers are rounded; by how much ellipsoids are larger than the least, for motions come into them
