@@ -8,7 +8,7 @@ from functools import cache
 import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims
-from starhold.certification.evidence.finding import certificate
+from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations
 from starhold.certification.evidence.pointing import find_pointing
 from starhold.certification.subject import make_subject
 from starhold.kernel.programs import digest
@@ -29,6 +29,7 @@ POINTING = {
     "body": (([2.0, 3.0, 4.0], 0.09, 0.009, 0.1), (3.5e-6, 1e-6, math.radians(90))),
     "moving": (([2.0, 3.0, 4.0], 0.09, 0.009, 0.1), (3.5e-6, 1e-6, math.radians(60), 0.02, {"limit": 0.03})),
     "cubesat": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(29))),
+    "calm": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(3))),
     "skew": ((SKEW, K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(10))),
 }
 """Inertia, gains and period; outside torque, error of the command, and the start."""
@@ -79,3 +80,16 @@ def rekeyed(content):
 def text(content):
     """A certificate as a file holds it."""
     return json.dumps(content)
+
+
+def failing(claim, programs):
+    """The names, without places, of what cannot be shown of a claim, of which everything told is read."""
+    wanted, known = obligations(claim, programs)
+    assert not any(told.unread for told in (known.taken, known.programs, known.subject, known.numbers))
+    failed = set()
+    for name in wanted:
+        try:
+            evidence(name, wanted, {})
+        except NotFoundError:
+            failed.add(name.rstrip("-+0123456789 "))
+    return failed

@@ -41,7 +41,11 @@ def pushes(rng, lanes, h, slow):
         s = w + c * q[1:]
         sign = np.select(
             [kinds == 1, kinds == 2, kinds == 3],
-            [np.where((axis * s).sum(0) >= 0, 1, -1), np.where(np.sin(swing * n * h + phase) >= 0, 1, -1), 1 - 2 * ((n // hold) % 2)],
+            [
+                np.where((axis * s).sum(0) >= 0, 1, -1),
+                np.where(np.sin(swing * n * h + phase) >= 0, 1, -1),
+                1 - 2 * ((n // hold) % 2),
+            ],
             1,
         )
         return np.where(kinds == 0, along(s), sign * axis)

@@ -288,15 +288,15 @@ class Oracle:
         fleet = Fleet(self.J, law, n["period"], n["outside"], n["error"], slow, int(self.rng.integers(1000)), 2 * tries)
         states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
         states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]
-        q, w = (np.array(part).T for part in zip(*states, strict=True))
+        start = (np.array(part).T for part in zip(*states, strict=True))
         periods = min(int(n["settling"] / n["period"]), 3000)
-        for k, q, w in fleet.fly(q, w, periods + 300):
-            V = self.lyapunov(q, w) - V0
-            if (V > n["highest"]).any() or (k <= 1 and (np.abs(law(q, w)).max() > n.get("limit", np.inf))):
-                return False
-            if k * n["period"] > n["settling"] and (
-                (turn(q) > n["end.angle"]).any() or (np.linalg.norm(w, axis=0) > n["end.rate"]).any()
+        for k, q, w in fleet.fly(*start, periods + 300):
+            if (self.lyapunov(q, w) - V0 > n["highest"]).any() or (
+                k == 1 and np.abs(law(q, w)).max() > n.get("limit", np.inf)
             ):
+                return False
+            off = (turn(q) > n["end.angle"]) | (np.linalg.norm(w, axis=0) > n["end.rate"])
+            if k * n["period"] > n["settling"] and off.any():
                 return False
         return self.contents(V0, level)
 

@@ -12,7 +12,22 @@ from fractions import Fraction
 from math import prod
 
 from .loops import AXES, AttitudeLoop, slopes
-from .numbers import RefusedError, Rows, beside, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
+from .numbers import (
+    RefusedError,
+    Rows,
+    beside,
+    definite,
+    demand,
+    inverse,
+    norm,
+    plus,
+    reach,
+    root,
+    scalar,
+    times,
+    transpose,
+    up,
+)
 from .polynomials import Poly, apply, cross, dot, most, poly, var, variables
 
 STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
@@ -71,6 +86,7 @@ class Held:
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
+        demand(definite(self.under), "V is not least on target")
 
     def form(self, c: Fraction) -> Rows:
         """Return the matrix of x.Gx + c |q|^2."""
@@ -126,8 +142,8 @@ class Held:
         return most(self.rates[0], sizes) + self.push * norm(reach(self.felt, [sizes[name] for name in STATE]))
 
     def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
-        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b: of what
-        is not linear and what comes from outside."""
+        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, of
+        what is not linear and what comes from outside."""
         h, N, tube, u = self.h, self.N, self.tube(region), self.loop.u
         rest = self.loop.on_target | self.loop.still
         linear = beside(*(slopes(u, letter, rest) for letter in "wq"))

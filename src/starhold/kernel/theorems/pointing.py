@@ -24,7 +24,6 @@ def points(claim: Claim) -> Proof:
     yield from loop.sound()
     held, numbers, samples = Held(loop), claim.numbers, 0
     c, h = numbers["level"], held.h
-    yield "V exceeds a form", Definite(held.under)
     start = yield from contents(loop, loop.lyapunov)
     limited = yield from within_limits(loop)
     region = held.region(c)
@@ -36,12 +35,11 @@ def points(claim: Claim) -> Proof:
     demand(bool(levels), "no level is told")
     for k, told in enumerate(levels):
         end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
-        demand(min(tau, beta) > 0 and 0 < end < c, "a level is not below the one before")
+        demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
         Q, H, rest = held.fall(region)
         pushed = held.push * held.push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(held.felt), held.felt), -tau), H, -beta)
         yield f"V falls {k}", Definite(fallen)
-        yield f"V does not swing {k}", Exceeds(Fraction(1), h * beta)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
         c, region = end, held.region(end)
@@ -49,7 +47,7 @@ def points(claim: Claim) -> Proof:
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
-        demand(min(free, rate, reach, *shares) > 0 and rate < 1, "shares or rates are not between 0 and 1")
+        demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
         after = image(X, shares, *held.linear(region))
         yield f"ellipsoid {k}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
         yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], region.X, -1))
@@ -61,7 +59,7 @@ def points(claim: Claim) -> Proof:
     # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.
     near, slow = angle / 2 - angle**3 / 48 - h / 4 * fastest, fastest - norm(tube.drift) / 2
     for name, most_of, part in (("angle", near, TURN), ("rate", slow, RATE)):
-        yield f"room for the {name}", Exceeds(most_of)
+        demand(most_of > 0, f"the {name} is too small")
         yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in region.X[part]], -1))
     yield "settling", Exceeds(numbers["settling"], h * samples)
     text = (
