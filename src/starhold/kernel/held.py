@@ -13,21 +13,8 @@ from math import prod
 
 from .loops import AXES, AttitudeLoop, slopes
 from .numbers import (
-    RefusedError,
-    Rows,
-    beside,
-    definite,
-    demand,
-    inverse,
-    norm,
-    plus,
-    reach,
-    root,
-    scalar,
-    times,
-    transpose,
-    up,
-)
+    RefusedError, Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up,
+)  # fmt: skip
 from .polynomials import Poly, apply, cross, dot, most, poly, var, variables
 
 STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
@@ -51,8 +38,8 @@ class Region:
 
 @dataclass(frozen=True)
 class Tube:
-    """What motions from a region stay in for a period: sizes (u of the acceleration that is held), how far the rates drift,
-    and how far q turns."""
+    """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
+    drift, and how far q turns."""
 
     sizes: Sizes
     drift: list[Fraction]
