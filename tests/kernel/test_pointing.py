@@ -8,13 +8,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Chain
 from starhold.kernel.check import check
-from starhold.kernel.held import Held
+from starhold.kernel.held import STATE, Held
 from starhold.kernel.loops import AttitudeLoop
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
-from tests.kernel.flights import Fleet, feedback, turn
+from tests.kernel.flights import Fleet, along, feedback, moved, turn
 from tests.kernel.oracle import Oracle, number
 from tests.tiers import leading
 
@@ -34,6 +35,70 @@ def test_the_loop_is_proved_to_point(name):
     assert time.process_time() - begun < 4.0
     assert math.degrees(numbers(content)["end.angle"]) <= PROVED[name]
     assert "the torque is what the law asks for at the last sample" in proved.statement.written()
+
+
+def fleet_of(name, outside, error):
+    """Lanes of a loop under other pushes."""
+    (J, k_rate, k_attitude, h), _ = POINTING[name]
+    J = np.diag(J) if np.ndim(J) == 1 else np.array(J)
+    slow = math.sqrt(k_attitude / 2 / np.linalg.eigvalsh(J).max())
+    return Fleet(J, feedback(J, k_rate, k_attitude), h, outside, error, slow)
+
+
+def held_loop(name, **more):
+    """A loop with a held torque, whose pushes may be others than claimed."""
+    claim = copy.deepcopy(flying(name).claims[0])
+    claim["numbers"] |= {key: str(Fraction(x)) for key, x in more.items()}
+    return Held(AttitudeLoop(read(claim, flying(name).by_digest)))
+
+
+def states_of(oracle, level, count):
+    """States inside of {V <= level}, most of them at its border."""
+    oracle.numbers["level"] = level
+    pairs = [oracle.border(0.0, level * oracle.rng.uniform()) for _ in range(count)]
+    return [np.array(part).T for part in zip(*pairs, strict=True)]
+
+
+def after_a_period(fleet, q, w, unit):
+    """The state after a period in which the error points one way, and the outside torque turns over at a time of its own."""
+    command, turned = fleet.law(q, w) + fleet.error * unit, fleet.rng.uniform()
+    for share, sign in ((turned, 1), (1 - turned, -1)):
+        for _ in range(4):
+            torque = command + sign * fleet.outside * unit
+            q, w = moved(fleet.J, fleet.inverse, q, w, torque, share * fleet.h / 4)
+    return q, w
+
+
+@pytest.mark.parametrize("name", ["moving", "skew"])
+@pytest.mark.parametrize("power", [0.5, 1, 3])
+def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
+    oracle = Oracle(contents("flying", name), contents("flying", name)["claims"][0])
+    level = oracle.numbers["level"] / 30.0**power
+    push = 0.02 * math.sqrt(level * oracle.subject["gains.k_attitude"])
+    held = held_loop(name, outside=push, error=2 * push)
+    region = held.region(Fraction(level))
+    fleet = fleet_of(name, push, 2 * push)
+    q, w = states_of(oracle, level, fleet.lanes)
+    x, tube = np.concatenate([w, q[1:]]), held.tube(region)
+    sizes = np.array([float(region.sizes[name]) for name in STATE])
+    assert (np.abs(x).max(axis=1) <= sizes).all()
+    assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
+    Q, H, rest = held.fall(region)
+    Q, H, felt, (A, pushes) = floats(Q), floats(H), floats(held.felt), held.linear(region)
+    V = oracle.lyapunov(q, w)
+    assert ((x * (H @ x)).sum(0) * (1 + 1e-9) >= V).all()
+    for unit in (fleet.push(0, q, w), fleet.directions(), along(felt @ x)):
+        later, rate = after_a_period(fleet, q, w, unit)
+        most = fleet.h * (3 * push * np.linalg.norm(felt @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
+        assert (oracle.lyapunov(later, rate) - V <= most).all()
+        y = np.concatenate([rate, later[1:]])
+        assert (np.abs(y) <= np.array([[float(tube.sizes[name])] for name in STATE])).all()
+        # What is not linear is a push of the first kind and, beside, of the others.
+        left, (B, b), others = y - floats(A) @ x, pushes[0], pushes[1:]
+        v = np.linalg.solve(floats(B)[:3], left[:3])
+        assert np.linalg.norm(v, axis=0).max() <= float(b)
+        beside = sum(float(b) * np.linalg.norm(floats(B), 2) for B, b in others)
+        assert np.linalg.norm(left[3:] - floats(B)[3:] @ v, axis=0).max() <= beside
 
 
 def one_level(numbers, told, **link):
@@ -63,8 +128,7 @@ def small_ellipsoid(numbers, told):
 
 def wide_entry(numbers, told):
     """Ellipsoids follow one level down, and are said to hold it at once."""
-    claim, loop = copy.deepcopy(flying("calm").claims[0]), flying("calm")
-    held = Held(AttitudeLoop(read(claim, loop.by_digest)))
+    held = held_loop("calm")
     chain = Chain(held, "", 0.0)
     told["levels"] = [told["levels"][0] | {"end": str(Fraction(numbers["level"]) / 2)}]
     numbers["end.angle"], numbers["end.rate"] = chain.tighten(held.region(Fraction(told["levels"][0]["end"])))
@@ -105,17 +169,14 @@ def test_the_claims_that_were_changed_hold(name):
 
 @pytest.mark.parametrize(("name", "reached"), leading([("cubesat", 0.8), ("body", 0.8), ("skew", 0.8)], 2))
 def test_no_flight_leaves_what_is_proved_and_some_come_near(name, reached):
-    (J, k_rate, k_attitude, h), told = POINTING[name]
-    J = np.diag(J) if np.ndim(J) == 1 else np.array(J)
-    n = numbers(contents("flying", name))
-    slow = math.sqrt(k_attitude / 2 / np.linalg.eigvalsh(J).max())
-    fleet = Fleet(J, feedback(J, k_rate, k_attitude), h, *told[:2], slow)
+    told, n = POINTING[name][1], numbers(contents("flying", name))
+    fleet = fleet_of(name, *told[:2])
     # A half from rest at the largest angle, and a half from rest on target, which lies in the last ellipsoid.
     (q, w), (target, _) = fleet.at_rest(told[2]), fleet.at_rest(0.0)
     near = np.arange(fleet.lanes) >= fleet.lanes // 2
     q[:, near], worst, V = target[:, near], 0.0, Oracle(contents("flying", name), contents("flying", name)["claims"][0])
     for k, attitude, rate in fleet.fly(q, w, 3000):
-        ended = near | (k * h > n["settling"])
+        ended = near | (k * fleet.h > n["settling"])
         worst = max(worst, float(turn(attitude)[ended].max()))
         assert np.linalg.norm(rate, axis=0)[ended].max() <= n["end.rate"]
         assert V.lyapunov(attitude, rate).max() <= n["highest"]
