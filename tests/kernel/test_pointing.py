@@ -2,6 +2,7 @@
 
 import copy
 import math
+import random
 import time
 from fractions import Fraction
 
@@ -12,8 +13,11 @@ from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Chain
 from starhold.kernel.check import check
-from starhold.kernel.held import STATE, Held
+from starhold.kernel.held import STATE, Held, Region, least_form
 from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.numbers import root, up
+from starhold.kernel.polynomials import Poly, most, total
+from starhold.kernel.theorems.pointing import periods
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
 from tests.kernel.flights import Fleet, along, feedback, moved, turn
 from tests.kernel.oracle import Oracle, number
@@ -99,6 +103,47 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
         assert np.linalg.norm(v, axis=0).max() <= float(b)
         beside = sum(float(b) * np.linalg.norm(floats(B), 2) for B, b in others)
         assert np.linalg.norm(left[3:] - floats(B)[3:] @ v, axis=0).max() <= beside
+
+
+def test_roots_and_rounded_numbers_are_not_below_and_near():
+    r = random.Random(4)
+    for _ in range(500):
+        x = Fraction(r.randrange(1, 10**9), r.randrange(1, 10**9)) * Fraction(10) ** r.randrange(-30, 30)
+        assert x <= root(x) ** 2 <= x * (1 + Fraction(1, 10**15))
+        assert x <= up(x) <= x * (1 + Fraction(1, 10**15))
+        assert -x <= up(-x) <= -x * (1 - Fraction(1, 10**15))
+    assert root(Fraction(0)) == up(Fraction(0)) == 0
+
+
+@pytest.mark.parametrize("least", ["-1/2", "0", "3/5"])
+def test_a_form_is_nowhere_above_its_polynomial(least):
+    r, low = random.Random(least), Fraction(least)
+    sizes = {name: Fraction(r.randrange(1, 100), 100) for name in STATE} | {"q0": Fraction(1)}
+    for _ in range(20):
+        names = [sorted(r.choices([*STATE, "q0"], k=r.randrange(4))) for _ in range(6)]
+        pairs = [r.choices(STATE, k=2) for _ in names]
+        p = total(
+            Poly({tuple(sorted(m + pair)): Fraction(r.randrange(-9, 10))}) for m, pair in zip(names, pairs, strict=True)
+        )
+        M = least_form(p, Region([], sizes, low))
+        for _ in range(30):
+            x = {name: size * r.choice([-1, 1, Fraction(r.randrange(-100, 101), 100)]) for name, size in sizes.items()}
+            x["q0"] = low + (1 - low) * Fraction(r.randrange(101), 100)
+            form = sum(M[i][k] * x[a] * x[b] for i, a in enumerate(STATE) for k, b in enumerate(STATE))
+            assert form <= p.at(x).number
+            assert abs(p.at(x).number) <= most(p, sizes)
+
+
+@pytest.mark.parametrize(
+    ("fall", "floor", "start", "end"), [("1/2", "1", "3", "2"), ("1/100", "0", "1", "1/50"), ("1", "1", "9", "2")]
+)
+def test_periods_are_enough_and_not_many(fall, floor, start, end):
+    fall, floor, x, end = map(Fraction, (fall, floor, start, end))
+    count = 0
+    while x > end:
+        x, count = floor + (1 - fall) * (x - floor), count + 1
+    assert count <= periods(fall, floor, Fraction(start), end) <= 2 * count + 2
+    assert periods(fall, floor, end, end) == 0
 
 
 def one_level(numbers, told, **link):

@@ -136,6 +136,9 @@ def find_pointing(
     """Find the claim of how near to its target the loop with a held torque comes, and add it. outside: the largest torque
     from outside (N m); error: of the command (N m); the set holds turns of up to `angle` (rad) at up to `rate` (rad/s);
     limit: what the law is to ask for at most, `limit` about each axis or `limit.norm`, without its errors."""
+    if loop.loop.remembers:
+        loop.failed[POINTS] = "the law has a memory"
+        return False
     told: dict[str, Any] = {"period": loop.loop.period, "outside": outside, "error": error} | (limit or {})
     told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
     words, moments = sign_words(loop.loop), np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))
