@@ -134,9 +134,10 @@ def test_a_form_is_nowhere_above_its_polynomial(least):
             assert abs(p.at(x).number) <= most(p, sizes)
 
 
-@pytest.mark.parametrize(
-    ("fall", "floor", "start", "end"), [("1/2", "1", "3", "2"), ("1/100", "0", "1", "1/50"), ("1", "1", "9", "2")]
-)
+SLOWER = [("1/2", "1", "3", "2"), ("1/100", "0", "1", "1/50"), ("1", "1", "9", "2")]
+
+
+@pytest.mark.parametrize(("fall", "floor", "start", "end"), SLOWER)
 def test_periods_are_enough_and_not_many(fall, floor, start, end):
     fall, floor, x, end = map(Fraction, (fall, floor, start, end))
     count = 0

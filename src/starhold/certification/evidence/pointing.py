@@ -27,9 +27,10 @@ Array = NDArray[np.float64]
 POINTS = "points"
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
-MORE, FLOOR, LARGER, DEEPEST, ELLIPSOIDS = 1.0 + 1e-9, 1.03, 1.01, 8.0, 6
-"""What is given away where numbers are rounded; by how much ellipsoids are larger than the least, for motions come into them
-after a finite time; by how much a level may be below the one before; how many ellipsoids there are at most."""
+MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS = 1.0 + 1e-9, 1.03, 1.01, 8.0, 20, 6
+"""What is given away where numbers are rounded; by how much the last level is above its limit, and ellipsoids are larger than
+the least, for motions come into them after a finite time; by how much a level may be below the one before; how many levels
+and ellipsoids there are at most."""
 
 
 @dataclass
@@ -54,7 +55,7 @@ class Chain:
     def descend(self) -> float:
         """Find the levels, and return the last."""
         c = Fraction(self.level)
-        while (found := self.lower(c)) is not None:
+        while len(self.levels) < LEVELS and (found := self.lower(c)) is not None:
             tau, beta, floor = found
             end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
             if end > c * Fraction(9, 10):
