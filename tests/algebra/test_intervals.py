@@ -1,4 +1,4 @@
-"""Intervals hold what exact arithmetic finds between their ends, and a box is covered only where that is shown."""
+"""Intervals hold what exact arithmetic finds between their ends."""
 
 import math
 import operator
@@ -10,7 +10,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from starhold.algebra.intervals import Intervals
-from starhold.certification.boxes import holds_on
 
 finite = st.floats(-1e60, 1e60, allow_subnormal=True)
 pairs = st.tuples(finite, finite).map(sorted)
@@ -64,18 +63,3 @@ def test_arrays_on_either_side():
     for sum_ in (x + np.array([1.0, 1.0]), np.array([1.0, 1.0]) + x):
         assert isinstance(sum_, Intervals)
         np.testing.assert_array_less(sum_.low, [2.0 + 1e-12, 3.0 + 1e-12])
-
-
-@given(st.floats(0.0, 2.0), st.integers(1, 4))
-def test_covers_a_box_exactly_where_the_statement_is_true(bound, first):
-    """x^2 + y^2 < c on the unit square, which is so for c > 2 only."""
-
-    def shown(c):
-        return lambda sides: (sides[0].square() + sides[1].square()).high < c
-
-    assert holds_on(((-1.0, 1.0), (0.0, 1.0)), shown(2.0 + 1e-3), 100_000, first)
-    assert not holds_on(((-1.0, 1.0), (0.0, 1.0)), shown(bound), 3000, first)
-
-
-def test_gives_up_where_boxes_cannot_be_cut():
-    assert not holds_on(((1.0, math.nextafter(1.0, 2.0)),), lambda sides: sides[0].low > 5.0, 10**6)

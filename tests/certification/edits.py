@@ -18,7 +18,7 @@ def claims_of(content):
 
 
 def alone(content, kind):
-    """The content with one claim, which is enough to see whether that claim fails."""
+    """The content with one claim that has no proof of the kernel, which is enough to see whether that claim fails."""
     certificate = content["certificates"][0]
     claim = claims_of(content)[kind]
     # The linear loop alone proves nothing of where the motion ends.
@@ -27,7 +27,7 @@ def alone(content, kind):
     if kind not in ("disturbance", "sliding") and "disturbance" in subject:
         subject = {**subject, "disturbance": 0.0}
     one = {**certificate, "outcome": outcome, "subject": subject, "claims": [claim]}
-    return with_kinds({**content, "certificates": [one]})
+    return with_kinds({**content, "certificates": [one], "claims": [], "programs": {}})
 
 
 def with_kinds(content):

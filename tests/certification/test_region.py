@@ -1,22 +1,15 @@
 """The region of attraction of the modal law: what is claimed, attacked by states that nobody chose."""
 
-import math
-
 import numpy as np
 import pytest
-from flint import fmpq
 from scipy.optimize import minimize
 
 from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import ZERO, add
 from starhold.analysis.departure import start_inside
 from starhold.analysis.trial import fly_claims
-from starhold.certification import region
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.mixed import SHAPES, Shape
-from starhold.certification.motion import Motion
-from starhold.certification.region import ENERGY, holds
-from starhold.certification.subject import make_subject
+from starhold.certification.mixed import Shape
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.scenario.building import build
@@ -39,7 +32,6 @@ def claim_of(loop):
 
 def falling(loop, shape, states):
     """V and V' at the columns of states, by the law's and the models' own equations."""
-    a = loop.law.module.single_root(loop.gains)[0]
     found = np.empty((2, states.shape[1]))
     for lane, state in enumerate(states.T):
         q, w = tuple(state[:4].tolist()), tuple(state[4:7].tolist())
@@ -47,47 +39,40 @@ def falling(loop, shape, states):
         torque, _ = loop.law.command(measurement, loop.gains, loop.craft, NoMemory())
         dq, dw = np.array(derivative(q, w)), np.array(angular_acceleration(w, add(torque, ZERO), loop.craft))
         step = 1e-3 / (1.0 + np.abs(dw).max() + np.abs(dq).max())
-        near = [shape.value(a, state[:4] + k * step * dq, state[4:7] + k * step * dw) for k in (-2, -1, 1, 2)]
+        near = [shape.value(state[:4] + k * step * dq, state[4:7] + k * step * dw) for k in (-2, -1, 1, 2)]
         # V is of the third degree, so that five points give its slope exactly.
-        found[:, lane] = shape.value(a, state[:4], state[4:7]), np.dot([1, -8, 8, -1], near) / (12 * step)
+        found[:, lane] = shape.value(state[:4], state[4:7]), np.dot([1, -8, 8, -1], near) / (12 * step)
     return found
 
 
-@pytest.mark.parametrize("root", [-0.2, ROOT, -1.0, -2.0])
-def test_the_energy_alone_has_the_level_that_was_found_for_it(root):
-    """Rests up to 167 to 174 degrees; levels 3.55 a^2 to 3.80 a^2."""
-    claim = claim_of(loop_of(f'a = {root}\nquaternion_sign = "hysteresis"'))
-    assert claim.outcome == "proved"
-    assert claim.witness == ENERGY._asdict()
-    expected = {-0.2: 3.553, ROOT: 3.583, -1.0: 3.660, -2.0: 3.796}[root]
-    assert 0.985 * expected < claim.numbers["level"] / root**2 < expected
-    assert 166.0 < math.degrees(claim.numbers["slew_angle"]) < 174.0
-
-
-def test_the_published_start_is_outside_the_one_and_inside_the_other():
+@pytest.mark.parametrize("sign_policy", ["as_published", "hysteresis"])
+def test_the_published_start_is_inside(sign_policy):
     start = 'attitude = [0.1414213562373095, 0.3, -0.5, 0.8]\nrate = ["-10 deg/s", "-7 deg/s", "11 deg/s"]'
     craft = CRAFT.replace("attitude = [1, 0, 0, 0.1]\nrate = [0, 0, 0]", start)
-    for sign_policy, inside in (("hysteresis", False), ("shortest", False), ("as_published", True)):
-        loop = loop_of(f'a = {ROOT}\nquaternion_sign = "{sign_policy}"', craft)
-        certificate = certify(loop)
-        assert start_inside(certificate, loop) == {"region": inside}
-        # The start is where it is, whatever sensors with errors see.
-        assert start_inside(certificate, loop.with_parts(*noise(0.0, 1e-3, 1e-3))) == {"region": inside}
-        level = certificate.claim("region").numbers["level"]
-        value = Shape(**certificate.claim("region").witness).value(ROOT, loop.start.attitude, loop.start.rate)
-        # 0.670 against 0.653 to 0.657.
-        assert value / level == pytest.approx(0.664 if inside else 1.026, abs=0.02)
-    assert math.degrees(certificate.claim("region").numbers["rate"]) > 100.0
+    loop = loop_of(f'a = {ROOT}\nquaternion_sign = "{sign_policy}"', craft)
+    certificate = certify(loop)
+    assert start_inside(certificate, loop) == {"region": True}
+    # The start is where it is, whatever sensors with errors see.
+    assert start_inside(certificate, loop.with_parts(*noise(0.0, 1e-3, 1e-3))) == {"region": True}
+    claim = certificate.claim("region")
+    assert Shape(**claim.witness).value(loop.start.attitude, loop.start.rate) < claim.numbers["level"]
 
 
-@pytest.mark.parametrize(("root", "b"), [(ROOT, -0.01), (-2.0, -0.01), (-1.0, -0.1), (-0.4, -1.0), (-1.5, -0.7)])
-@pytest.mark.parametrize("sign_policy", ["as_published", "shortest", "hysteresis"])
+@pytest.mark.parametrize(
+    ("root", "b", "sign_policy"),
+    [
+        # Each root once, and each policy; the other pairs are slow.
+        pytest.param(root, b, policy, marks=() if place % 3 == number else pytest.mark.slow)
+        for place, (root, b) in enumerate([(ROOT, -0.01), (-2.0, -0.01), (-1.0, -0.1), (-0.4, -1.0), (-1.5, -0.7)])
+        for number, policy in enumerate(["as_published", "shortest", "hysteresis"])
+    ],
+)
 def test_v_falls_at_random_states_of_the_set_and_at_the_worst(root, b, sign_policy):
     loop = loop_of(f'a = {root}\nb = {b}\nquaternion_sign = "{sign_policy}"')
     claim = claim_of(loop)
     assert claim.outcome == "proved"
     shape, level = Shape(**claim.witness), claim.numbers["level"]
-    states = shape.draw(root, level, 1000, np.random.default_rng(7))
+    states = shape.draw(level, 1000, np.random.default_rng(7))
     value, slope = falling(loop, shape, states)
     assert value.max() <= level * (1.0 + 1e-9)
     assert value.min() > 0.0
@@ -96,25 +81,12 @@ def test_v_falls_at_random_states_of_the_set_and_at_the_worst(root, b, sign_poli
     def rise(x):
         q = x[:4] / np.linalg.norm(x[:4])
         v, s = falling(loop, shape, np.concatenate([q, x[4:]])[:, None])[:, 0]
-        scale = abs(root) ** 3 * (np.dot(x[4:], x[4:]) / root**2 + (1.0 - q[0] if shape != ENERGY else 0.0))
+        scale = abs(root) ** 3 * (np.dot(x[4:], x[4:]) / root**2 + 1.0 - q[0])
         return -s / max(scale, 1e-12) + 1e3 * max(v / level - 1.0, 0.0)
 
     for lane in np.argsort(-slope / np.sum(states[4:7] ** 2, axis=0))[:3]:
         worst = minimize(rise, states[:7, lane], method="Nelder-Mead", options={"maxiter": 200})
         assert worst.fun > 0.0
-
-
-def test_nothing_larger_is_shown():
-    """The level is within a few percent of where V does not fall, or of the other quaternion's equilibrium."""
-    beta = fmpq(428, 100000)
-    assert holds(ENERGY, beta, fmpq(356, 100))
-    assert not holds(ENERGY, beta, fmpq(37, 10))
-    assert holds(SHAPES[0], beta, fmpq(99, 10))
-    assert not holds(SHAPES[0], beta, fmpq(103, 10))
-    # Beyond the other quaternion's equilibrium, where V' = 0.
-    assert not holds(Shape(5.0, -0.2, 2.0, 0.9), beta, fmpq(93, 10))
-    # A mixed term that outweighs the damping.
-    assert not holds(Shape(5.0, 0.0, 4.1, 0.0), beta, fmpq(1, 100))
 
 
 @pytest.mark.parametrize("inertia", ["[2.0, 3.0, 4.0]", "[[12.0, 0.5, 0.1], [0.5, 14.0, 0.2], [0.1, 0.2, 9.0]]"])
@@ -131,18 +103,6 @@ def test_other_spectra_are_left_undecided_and_say_so():
         claim = claim_of(loop_of(lines))
         assert claim.outcome == "undecided"
         assert "only for phi_0 = phi_1" in claim.obligations[0].evidence["reason"]
-
-
-def test_another_motion_is_not_taken_for_this_one(monkeypatch):
-    loop = loop_of()
-    motion, root = Motion(make_subject(loop)), (fmpq(-428, 1000), fmpq(-1, 100))
-    exact_root = tuple(fmpq(*x.as_integer_ratio()) for x in loop.law.module.single_root(loop.gains))
-    assert region._same_motion(motion, *exact_root)
-    assert not region._same_motion(motion, *root)
-    monkeypatch.setattr(loop.law.module, "single_root", lambda gains: (ROOT * (1.0 + 1e-15), -0.01))
-    claim = claim_of(loop)
-    assert claim.outcome == "undecided"
-    assert "not those" in claim.obligations[0].evidence["reason"]
 
 
 def test_what_is_asked_for_and_not_shown_is_told():

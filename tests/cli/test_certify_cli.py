@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from fractions import Fraction
 
 import pytest
 
@@ -75,9 +76,9 @@ def test_a_refuted_claim_prints_its_state(tmp_path):
     assert "refuted" in done.stdout
     assert outcomes(tmp_path / "out" / "certificate.json")["weak"]["sliding"] == "refuted"
     content = json.loads((tmp_path / "out" / "certificate.json").read_text())
-    obligations = content["certificates"][0]["claims"][0]["obligations"]
-    state = next(o["evidence"]["state"] for o in obligations if o["outcome"] == "refuted")
-    assert f"{state['rate'][0]:.4g}" in done.stdout
+    against = next(claim["numbers"] for claim in content["claims"] if claim["theorem"] == "is pushed off its surface")
+    rate = ", ".join(f"{float(Fraction(against[f'rate.{k}'])):.4g}" for k in range(3))
+    assert f"w = ({rate}) rad/s" in " ".join(done.stdout.replace("│", " ").split())
 
 
 def test_what_nobody_can_prove_is_undecided(tmp_path):

@@ -61,7 +61,7 @@ def test_no_larger_level_is_accepted(name):
         ("cycle", {"numbers": {"member.x": "0"}}, "V is too large at the member"),
         ("cycle", {"numbers": {"member.x": "3"}}, "outside of the box"),
         ("van der Pol", {"numbers": {"equilibrium.x": "1/10"}}, "V is not zero"),
-        ("van der Pol", {"numbers": {"level": "-1"}}, "a level is not positive"),
+        ("van der Pol", {"numbers": {"level": "-1"}}, "a bound is negative"),
         ("van der Pol", {"numbers": {"more": "1"}}, "nothing depends on more"),
         ("van der Pol", {"subject": {"box.x.0": "1"}}, "not inside of the box"),
         ("van der Pol", {"subject": {"box.x.0": "3"}}, "an interval is empty"),

@@ -13,6 +13,7 @@ from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
+from starhold.certification.evidence.attitude import SAMPLED, SLIDING
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import needed, torque_limit
@@ -21,8 +22,7 @@ from starhold.certification.openness import bounded_torque, named
 from starhold.certification.proofs import proved_claims
 from starhold.certification.sampling import APART, sampling
 from starhold.certification.saturation import FREE, saturation
-from starhold.certification.sliding import surface_claim
-from starhold.certification.subject import Subject, described, make_subject
+from starhold.certification.subject import Subject, above, described, make_subject
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
@@ -75,16 +75,21 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
         everywhere = {"rate_everywhere": None, "everything": True}
         claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
-        proved, failed = proved_claims(subject, wanted.slew_angle)
+        proved, failed = proved_claims(subject, wanted.slew_angle, wanted.rate)
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted, proved))
         else:
             if loop.law.hook("single_root") is not None:
                 claims.append(proved.get("region") or _undecided("region", {}, subject, failed[ISOTROPIC]))
-            slides = proved.get("sliding") or (surface_claim(subject) if loop.wheels is None else None)
-            claims.extend([] if slides is None else [slides])
+            if loop.law.hook("surface") is not None and loop.wheels is None:
+                torque = {"torque": [above(m + subject.disturbance) for m in subject.modelled]}
+                claims.append(proved.get("sliding") or _undecided("sliding", torque, subject, failed[SLIDING]))
             claims.extend(_unshown(subject, wanted))
         sampled = proved.get("sampling") or sampling(Motion(subject))
+        if sampled is not None and sampled.proof is None and sampled.outcome != "undecided":
+            numbers = {"period": loop.period, "longest": None, "every_shorter": False}
+            reason = Obligation("form", EXACT, "undecided", {"reason": failed[SAMPLED]})
+            sampled = replace(sampled, numbers=numbers, obligations=(reason,))
         claims.extend([] if sampled is None else [sampled])
         claims = needed(claims, Motion(subject)) if loop.law.lyapunov is not None else claims
     return claims
@@ -96,11 +101,12 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) 
     pushed = subject.disturbance != 0 or subject.modelled_norm != 0
     wheeled = subject.loop.wheels is not None
     limit, box = proved.get("wheels" if wheeled else "torque-limit"), proved.get("inertia")
-    if main is not None and rate != "best" and not main.numbers["everything"]:
+    if main is not None and main.outcome == "proved" and rate != "best" and not main.numbers["everything"]:
         main = None
-    if main is None or limit is None or box is None or pushed:
+    if main is None or main.outcome != "proved" or limit is None or box is None or pushed:
         derived, found, own = converge(subject, rate)
-        main = main or derived
+        # What refutes one V refutes no other.
+        main = derived if main is None or derived.outcome == "proved" != main.outcome else main
         # The law's own V, where it serves, gives the larger sets.
         basin = own or found
     if basin is not None:
@@ -134,6 +140,8 @@ def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
 def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
     limits = {"torque-limit": (), "wheels": FREE}
     assumptions = assumed(subject, limits=limits[kind]) if kind in limits else assumed(subject)
+    if kind == "sliding":
+        assumptions = assumed(subject, outside=("torque from outside bounded on each axis",))
     if kind == "inertia":
         assumptions = told(subject, numbers["tolerance"])
     return Claim(kind, numbers, {}, assumptions, (Obligation("form", EXACT, "undecided", {"reason": reason}),))

@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 from starhold.certification.evidence.attitude import CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
+from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.subject import make_subject
 from starhold.kernel.loops import HYSTERESIS, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
@@ -22,8 +23,9 @@ def differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
 
 
 def _programs(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
+    # A theorem refuses a claim that lacks a program which it is about.
     for role, digest in own.roles.items():
-        if claim["programs"].get(role) != digest:
+        if claim["programs"].get(role, digest) != digest:
             yield f"the program of the {role} is another one"
     for name, x in claim["subject"].items():
         if name not in own.subject or rational(own.subject[name]) != rational(x):
@@ -33,6 +35,8 @@ def _programs(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
 def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     loop, known, wheels = own.loop, own.known, own.loop.wheels
     told = {name: rational(x) for name, x in claim["numbers"].items()}
+    # A larger limit than the loop's refutes more, a torque from outside is what was asked for.
+    side = -1 if claim["theorem"] in REFUTING else 1
     exactly = {"period": loop.period, "hysteresis": loop.hysteresis_width}
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
@@ -43,14 +47,16 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     for name, x in told.items():
         if name in exactly and x != Fraction(exactly[name]):
             yield f"the {name} is another number"
-        if name in least and x < Fraction(int(least[name].p), int(least[name].q)):
+        if name in least and side > 0 and x < Fraction(int(least[name].p), int(least[name].q)):
             yield f"{name} is exceeded"
-        if name in most and isfinite(most[name]) and x > Fraction(most[name]):
+        if name in most and isfinite(most[name]) and side * x > side * Fraction(most[name]):
             yield f"{name} is lower"
 
 
 def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     taken, theorem = set(claim["taken"]), claim["theorem"]
+    if theorem in REFUTING:
+        return
     signed = theorem in (SLIDING, STRICTLY) or (theorem.startswith(CONVERGES) and "both" not in theorem)
     if taken & {SHORTEST, HYSTERESIS} != set(sign_words(own.loop) if signed else []):
         yield "the sign of the quaternion is chosen in another way"

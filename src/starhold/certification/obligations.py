@@ -1,4 +1,4 @@
-"""What has to be shown of claims, in words."""
+"""The obligations of claims, each as what it says."""
 
 OBLIGATIONS = {
     "inertia": "the inertia is symmetric and positive definite",
@@ -14,6 +14,7 @@ OBLIGATIONS = {
     "rates": "no motion from the set turns faster than told",
     "the other equilibrium repels": "V at rest is highest on the other quaternion, where only a set of measure zero ends",
     "the other equilibrium is outside": "the set does not hold the other quaternion's equilibrium",
+    "the other equilibrium is inside": "the set holds the states around the other quaternion's equilibrium",
     "V is level at the other equilibrium": "on the other quaternion V does not depend on the rate to first order",
     "width": "the width of the hysteresis is between 0 and 1",
     "a jump lowers V": "every switch of the hysteresis lowers V",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from fractions import Fraction
-from math import pi
+from math import pi, sqrt
 from typing import Any
 
 from flint import fmpq
@@ -23,15 +23,27 @@ from starhold.certification.certificate import (
 )
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims
-from starhold.certification.evidence.finding import certificate
+from starhold.certification.evidence.finding import certificate, obligations
+from starhold.certification.evidence.refuted import (
+    AWAY,
+    EXCEEDS,
+    NEGATIVE,
+    PUSHED,
+    RISES,
+    RISES_NEAR,
+    UNSETTLED,
+    find_refuted,
+)
 from starhold.certification.subject import Subject, above, below
 from starhold.kernel.check import Proved, check
+from starhold.kernel.rules import Exceeds
+from starhold.kernel.theorems.refuted import State
 
 HOW = {
     **dict.fromkeys(("Vanishes", "Solves"), EXACT),
     **dict.fromkeys(("Definite", "Exceeds"), EXACT_SIGN),
     **dict.fromkeys(("Squares", "Sum"), SQUARES),
-    "Contracts": LYAPUNOV,
+    **dict.fromkeys(("Contracts", "Persists"), LYAPUNOV),
 }
 """How each rule of the kernel shows what it shows."""
 ASSUMPTIONS = {
@@ -56,30 +68,41 @@ IN_THE_LOOP = {"known-target", "bounded-target", "quaternion-as-fed", "sign-at-o
 """What every loop meets as it is composed: its law is told how the target moves, and how the quaternion's sign is chosen."""
 
 
-def proved_claims(subject: Subject, turn: float | None = None) -> tuple[dict[str, Claim], dict[str, str]]:
-    """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds, and why none was
-    found for other theorems. turn: what the set within the limits is to hold (rad)."""
+def proved_claims(
+    subject: Subject, turn: float | None = None, rate: float | None = None
+) -> tuple[dict[str, Claim], dict[str, str]]:
+    """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: what is proved,
+    and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within limits
+    is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any)."""
     found = find_claims(subject, turn)
+    find_refuted(found, turn, rate)
     if not found.claims:
         return {}, found.failed
     content = certificate(found.programs, found.claims)
     claims = [made(proved, given, found) for proved, given in zip(check(json.dumps(content)), found.claims, strict=True)]
-    return {claim.kind: claim for claim in reversed(claims)}, found.failed
+    # What is refuted is what was asked for, where less may be proved.
+    against = [claim for claim in claims if claim.outcome == "refuted"]
+    return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
 
 
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
     """Return a claim with the numbers, assumptions and obligations that the kernel tells of it."""
     label, numbers = proved.statement.label, proved.claim.numbers.content
     witness = loop.written_by.get(given["programs"].get("lyapunov", ""), {})
-    told = _NUMBERS[label](numbers, loop)
-    obligations = {(name.rstrip("+-0123456789 "), HOW[rule]): None for name, rule in proved.shown}
+    steps = {(name.rstrip("+-0123456789 "), HOW[rule]): None for name, rule in proved.shown}
+    shown = [Obligation(name, how, "proved") for name, how in steps]
+    if proved.statement.refutes:
+        name, told, against = refutation(proved, given, loop)
+        shown = [Obligation(name, next(how for own, how in steps if own == name), "refuted", against)]
+    else:
+        told = _NUMBERS[label](numbers, loop)
     programs = {name: loop.by_digest[name] for name in given["programs"].values()}
     return Claim(
         label,
         told,
         dict(witness),
         assumed(proved.statement.assumptions, loop),
-        tuple(Obligation(name, how, "proved") for name, how in obligations),
+        tuple(shown),
         Proof(dict(given), programs),
     )
 
@@ -164,3 +187,43 @@ _NUMBERS = {
     "sampling": _sampled,
     "sliding": _slid,
 }
+
+
+def refutation(proved: Proved, given: Mapping[str, Any], loop: Loop) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """Return which obligation does not hold, the numbers of the claim that needs it, and what shows that."""
+    numbers, theorem = proved.claim.numbers.content, proved.claim.theorem
+    found = {name: o for name, o in obligations(given, loop.by_digest)[0].items() if isinstance(o, Exceeds)}
+
+    def values(name: str) -> tuple[float, float]:
+        return float(found[name].large), float(found[name].small)
+
+    def state(turn: str = "turn") -> dict[str, Any]:
+        read = State(*([numbers.get(f"{name}.{k}", Fraction(0)) for k in range(3)] for name in (turn, "rate")))
+        x = [float(x) for x in read.values.values()]
+        return {"state": {"attitude": x[:4], "rate": x[4:]}}
+
+    if theorem in (RISES, RISES_NEAR):
+        fastest = numbers.get("fastest")
+        rate = None if fastest is None else float(fastest)
+        asked = {"rate_everywhere": rate, "everything": rate is None} if theorem == RISES else {}
+        return "V is non-increasing", asked, state() | {"V'": values("V is non-increasing")[0]}
+    if theorem == NEGATIVE:
+        return "V is least on target", {}, state() | {"V": -values("V is least on target")[0]}
+    if theorem == EXCEEDS:
+        kind, angle = "axis" if "limit" in numbers else "norm", float(numbers["angle"])
+        begun = {"everything": False, "slew_angle": angle, "rate": None, "rate_everywhere": None}
+        limit = {"limit": float(numbers["limit" if kind == "axis" else "limit.norm"]), "kind": kind}
+        return "torque", begun | limit, state() | {"torque": sqrt(values("torque")[0])}
+    if theorem == UNSETTLED:
+        size = abs(complex(*loop.eigenvalues[0]))
+        told = {"period": float(numbers["period"]), "radius": size, "eigenvalues": loop.eigenvalues}
+        return "step", told | {"longest": None, "every_shorter": False}, {"eigenvalue": loop.eigenvalues[0]}
+    torque = [float(numbers.get(f"outside.{k}", 0)) for k in range(3)]
+    if theorem == PUSHED:
+        place = torque.index(max(torque))
+        large, small = values(f"reach {place}")
+        where = {} if loop.pushed_at is None else {"position": loop.pushed_at}
+        return "reach", {"torque": torque}, {"axis": place + 1, "reach": small, "torque": large, **where, **state()}
+    assert theorem == AWAY
+    axis = state()["state"]["attitude"][1:]
+    return "q0 grows on the surface", {"torque": torque}, {"axis": axis, "q.Kq": -values("q0 grows on the surface")[0]}

@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 from flint import arb, fmpq
 
-from starhold.algebra.intervals import Intervals
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
@@ -167,12 +166,6 @@ def above(x: Any) -> float:
 def below(x: Any) -> float:
     """A float not above a rational."""
     return -above(-x)
-
-
-def enclosed(x: Any) -> Intervals:
-    """The narrowest interval of floats around a rational."""
-    low, high = below(x), above(x)
-    return Intervals(low) if low == high else Intervals(low, high)
 
 
 def exact_craft(inertia: Any, torque_limit: Any, gravity: Any) -> Craft:

@@ -17,7 +17,6 @@ from flint import ctx
 from starhold.checker.claims import CLAIMS, UNLIMITED
 from starhold.checker.exact import CheckError, Obligation, Verdict, demand, limited
 from starhold.checker.reading import read_file, shallow
-from starhold.checker.refutation import refutation
 from starhold.checker.shapes import (
     CLAIM,
     FILE,
@@ -218,6 +217,10 @@ def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, st
     shaped(claim, PROVED, "the claim")
     proved = proofs[int(claim["proof"])]
     demand(proved.statement.label == claim["kind"], f"the proof is of another kind of claim: {proved.statement.label}")
+    refuted = proved.statement.refutes
+    demand(claim["outcome"] == ("refuted" if refuted else "proved"), "the outcome is not that of the proof")
+    if refuted:
+        return [("", "not claimed", f"refuted by the kernel: {proved.statement.text}")]
     names = dict.fromkeys(name.rstrip("+-0123456789 ") for name, _ in proved.shown)
     return [(name, "holds", BY_THE_KERNEL) for name in names]
 
@@ -242,7 +245,7 @@ def _claim(subject: LoopSubject, about: Mapping[str, Any], claim: Any) -> list[t
     told = [*told, *(f"without the {name}" for name in absent)]
     demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
     if claim["outcome"] != "proved":
-        return _unproved(subject, claim)
+        return _unproved(claim)
     shaped(claim["numbers"], NUMBERS[claim["kind"]], "the numbers")
     shaped(claim["witness"], WITNESS[claim["kind"]], "the witness")
     shown = proofs()
@@ -270,8 +273,8 @@ def _verdict(proof: Obligation) -> tuple[str, Verdict, str]:
     return (name if how else "", "fails", fault) if reason is None else (name if how else "", "holds", reason)
 
 
-def _unproved(subject: LoopSubject, claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
-    """Nothing of such a claim counts as proved; a refutation must be one."""
+def _unproved(claim: Mapping[str, Any]) -> list[tuple[str, Verdict, str]]:
+    """Nothing of such a claim counts as proved; one that is refuted has a proof of that."""
     for part, shapes in (("numbers", NUMBERS), ("witness", WITNESS)):
         shape, given = shapes[claim["kind"]], claim[part]
         known = all(key in shape and (value is None or shape[key](value)) for key, value in given.items())
@@ -282,11 +285,8 @@ def _unproved(subject: LoopSubject, claim: Mapping[str, Any]) -> list[tuple[str,
         how, proved = HOWS.get(obligation["name"], ()), obligation["outcome"] == "proved"
         demand(obligation["how"] in how, f"there is no obligation {obligation['name']} that is shown so")
         demand(not (proved and obligation["evidence"]), "what is proved has no evidence against it")
+        demand(obligation["outcome"] != "refuted", "what is refuted comes without a proof")
     found: list[tuple[str, Verdict, str]] = []
     for obligation in claim["obligations"]:
-        name, verdict, reason = obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"
-        if obligation["outcome"] == "refuted":
-            shown, fault = _guarded(partial(refutation, subject, claim, obligation))
-            verdict, reason = ("fails", f"not refuted: {fault}") if shown is None else ("not claimed", f"refuted: {shown}")
-        found.append((name, verdict, reason))
+        found.append((obligation["name"], "not claimed", f"{obligation['outcome']}, the claim is not proved"))
     return found

@@ -29,11 +29,9 @@ from starhold.checker.exact import (
 )
 from starhold.checker.frame import is_even
 from starhold.checker.loop import ExactLoop
-from starhold.checker.modal import ModalRegion
 from starhold.checker.odd_region import OddRegion
 from starhold.checker.region import BALLS, EXACT, ROOTS, SIGN, Numbers, Region, optional
 from starhold.checker.subject import LoopSubject
-from starhold.checker.surface import Sliding
 from starhold.checker.torque import bounded, keeps_within
 from starhold.checker.wheels import holds_target, keeps_momenta
 
@@ -273,23 +271,9 @@ def stepped(loop: ExactLoop, period: Any) -> list[Any]:
     return fmpq_mat(upper + lower).charpoly().coeffs()
 
 
-def sliding(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
-    """A law with a surface reaches it against torque from outside, and ends on target or near it."""
-    proof = Sliding(subject, claim["numbers"])
-    found: list[Obligation] = [
-        ("form", EXACT, proof.form),
-        ("reach exceeds torque", SIGN, proof.reaches),
-        ("surface holds the target", SIGN, proof.holds),
-    ]
-    if proof.layered():
-        found.append(("layer", SIGN, proof.layer))
-    last = "other equilibrium repels" if subject.sign_policy == "as_published" else "no switch of the quaternion sign"
-    return [*found, (last, SIGN, proof.cover), ("numbers", "", proof.ends)]
-
-
-def region(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
-    """Every motion of a loop of the law `modal` from {V <= level} stays there and comes to rest on target."""
-    return ModalRegion(subject, claim["numbers"], claim["witness"]).proofs()
+def by_the_kernel(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
+    """Refuse a claim that only the kernel proves."""
+    raise CheckError("such a claim comes with a proof, or is not proved")
 
 
 UNLIMITED, _FREE = "torque not limited", "neither torque nor wheels limited, wheels without friction"
@@ -323,6 +307,6 @@ CLAIMS: dict[str, Kind] = {
         sampling,
         beside=("no stored momentum",),
     ),
-    "sliding": Kind(_instead(_BASE[5], "torque from outside bounded on each axis"), sliding),
-    "region": Kind(_BASE, region),
+    "sliding": Kind(_instead(_BASE[5], "torque from outside bounded on each axis"), by_the_kernel),
+    "region": Kind(_BASE, by_the_kernel),
 }

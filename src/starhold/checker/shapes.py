@@ -94,7 +94,7 @@ FILE: dict[str, Test] = {
     "programs": _object,
     **dict.fromkeys(("claims", "certificates"), _list(_object)),
 }
-PROVED: dict[str, Test] = {"kind": _text, "outcome": _one("proved"), "proof": lambda x: type(x) is int and x >= 0}
+PROVED: dict[str, Test] = {"kind": _text, "outcome": _one("proved", "refuted"), "proof": lambda x: type(x) is int and x >= 0}
 """A claim that the file has a proof of, by its place."""
 CERTIFICATE: dict[str, Test] = {
     "name": lambda x: _text(x) and len(x) <= 1_000,

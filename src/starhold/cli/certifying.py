@@ -74,7 +74,7 @@ def check(
         findings = check_file(path)
         whole = passed(findings)
         others = compare_programs(path, load(scenario)) if whole and scenario is not None else []
-    if any(found.reason == BY_THE_KERNEL for found in findings):
+    if any(finding.reason == BY_THE_KERNEL for finding in findings):
         print_compared(others, scenario if whole else None)
     print_findings(findings)
     if others or not whole:

@@ -1,7 +1,7 @@
 """A loop with its torque held between samples: how V changes in a period, and the linear motion, from sets of states.
 
 J w' = u + d - w x Jw with u = the law's torque at the last sample and an error. What errors and torques d from outside do is
-bounded by what they are; what is of higher order in the period, or not linear, by the size of the set. Docs/kernel.md, 8.
+bounded by what they are; what is of higher order in the period, or not linear, by the size of the set. Docs/kernel.md, 9.
 """
 
 from __future__ import annotations

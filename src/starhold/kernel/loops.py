@@ -143,9 +143,9 @@ class AttitudeLoop:
         self.autonomous([V])
         return V - V.at(self.on_target | self.still)
 
-    def autonomous(self, parts: Sequence[Poly]) -> None:
-        """Refuse what depends on more than the state (and the inertia)."""
-        names = {name for part in parts for name in part.names if name[0] not in "qwj"}
+    def autonomous(self, parts: Sequence[Poly], kept: str = "") -> None:
+        """Refuse what depends on more than the state (and the inertia), and what is `kept`."""
+        names = {name for part in parts for name in part.names if name[0] not in "qwj" + kept}
         demand(not names, f"the motion depends on more than the state: {', '.join(sorted(names))}")
 
     def slopes_along(self, p: Poly, acceleration: Sequence[Poly]) -> Poly:

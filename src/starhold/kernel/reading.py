@@ -50,7 +50,7 @@ class Numbers(Told[Fraction]):
 
     def get(self, key: str) -> Fraction | None:
         """Return a bound that may be absent."""
-        return self[key] if key in self else None
+        return self[key] if key in self.content else None
 
     def coordinate(self, key: str) -> Fraction:
         """Return a number that may have either sign."""

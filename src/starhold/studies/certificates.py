@@ -36,15 +36,15 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
     loops: dict[str, ClosedLoop] = {}
     for entry in scenario.laws:
         loops |= certified_loops(scenario, entry, build(scenario, entry)) if scenario.body == "rigid-body" else {}
-    found: list[str] = []
+    differing: list[str] = []
     for given in content["certificates"]:
         places = [claim["proof"] for claim in given["claims"] if "proof" in claim]
         if places and given["name"] not in loops:
-            found.append(f"{given['name']}: the scenario has no such law")
+            differing.append(f"{given['name']}: the scenario has no such law")
             continue
-        own = [text for place in places for text in differences(content["claims"][place], loops[given["name"]])]
-        found += [f"{given['name']}: {text}" for text in dict.fromkeys(own)]
-    return found
+        texts = [text for place in places for text in differences(content["claims"][place], loops[given["name"]])]
+        differing += [f"{given['name']}: {text}" for text in dict.fromkeys(texts)]
+    return differing
 
 
 def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:

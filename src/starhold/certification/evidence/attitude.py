@@ -10,6 +10,7 @@ from math import acos, asin, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
@@ -39,6 +40,10 @@ CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "c
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 WRITTEN: dict[str, float | None] = {"stiffness": None, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
 """The numbers of a V that is the law's own."""
+LEANS = 4e-3
+"""The share of the law's own V that a mixed term takes."""
+FASTER = 1.0 + 1e-2
+"""How much faster than the least bound a rate is told to be at most."""
 NEAR = 1.1
 """How many times the least level those of other limits may be, to be looked at again."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
@@ -60,6 +65,8 @@ class Loop:
     """The polynomials V, by their digests."""
     eigenvalues: list[list[float]] = field(default_factory=list[list[float]])
     """Those of a step near rest, in floats."""
+    pushed_at: list[float] | None = None
+    """Where on the orbit (m) the gravity gradient pushes the motion off the law's surface."""
 
     @property
     def loop(self) -> ClosedLoop:
@@ -186,6 +193,11 @@ class Loop:
         """Find where motions end, by the law's own V or by the kinetic energy in its place. turn: what the set within the
         limits is to hold (rad)."""
         V, signs = self.lyapunov(), sign_words(self.loop)
+        try:
+            self.form(V)
+        except RefusedError as reason:
+            self.failed[CONVERGES] = str(reason)
+            return
         widths = {"hysteresis": self.loop.hysteresis_width} if HYSTERESIS in signs else {}
         ways = [
             (theorem, words)
@@ -205,7 +217,7 @@ class Loop:
                 self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
                 return
         if not signs:
-            self.show_strictly()
+            self.show_strictly(turn)
 
     def show_any_inertia(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> None:
         """Find the claim for every inertia, by the law's own V or by the kinetic energy and its stiffness."""
@@ -217,7 +229,7 @@ class Loop:
         energy = self.lyapunov(-float(rest.given[0].terms.get(("q1",), 0)))
         self.try_to_show(self.claim(every, words, energy, **more), self.scales(energy))
 
-    def show_strictly(self) -> None:
+    def show_strictly(self, turn: float | None = None) -> None:
         """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that falls strictly: V' is linear in s and epsilon."""
         words = [w for w in self.words if w != OUTSIDE]
         try:
@@ -236,6 +248,8 @@ class Loop:
             return
         V = self.crossed(*(float(f"{x:.4g}") for x in found[:2]))
         self.try_to_show(self.claim(STRICTLY, words, V), self.scales(V))
+        # The law's own V falls where the body is not too fast, and has the larger sets within the limits.
+        self.show_limits(STRICTLY, words, self.leaning(LEANS), {"fastest": 1}, turn)
 
     def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
         """Return what has to be shown of V'."""
@@ -259,6 +273,22 @@ class Loop:
         self.written_by[found] = WRITTEN | {"stiffness": s, "epsilon": epsilon}
         return found
 
+    def leaning(self, share: float) -> str:
+        """Record the law's own V and epsilon q.Jw, at most this share of it."""
+        loop, own = self.loop, self.form(self.lyapunov())
+        scaled: Any = np.linalg.solve(np.linalg.cholesky(curvature(own, "w")), tensor(loop.craft.inertia))
+        most = float(np.linalg.norm(scaled, 2))
+        epsilon = float(f"{share * sqrt(-float(own.terms.get(('q0',), 0)) / 2.0) / most:.3g}")
+
+        def energy(measurement: Measurement, gains: Any, craft: Any) -> Any:
+            lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
+            return loop.law.lyapunov(measurement, gains, craft) + epsilon * lean  # pyright: ignore
+
+        plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
+        found = self.add(energy, measurement=ASKED, gains=loop.gains, craft=plant)
+        self.written_by[found] = WRITTEN | {"epsilon": epsilon}
+        return found
+
     def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any], turn: float | None) -> bool:
         """Find the largest level on which everything is within its limits; False where that does not hold the turn."""
         loop, known, wheels = self.loop, self.known, self.loop.wheels
@@ -269,6 +299,9 @@ class Loop:
             numbers |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
         if WHEELS in words:
             numbers["momentum"] = float(known.total_momentum)
+            if self.too_little_momentum():
+                self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
+                return False
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
         if wheels is not None and wheels.allocation == 0 and isfinite(max(*wheels.torque_limit, *wheels.momentum_limit)):
             for k, (torque, momentum) in enumerate(zip(wheels.torque_limit, wheels.momentum_limit, strict=True)):
@@ -290,16 +323,25 @@ class Loop:
             if turn is not None and held["angle"] < turn:
                 break
             told = numbers | held | ({} if turn is None else {"angle": turn})
+            if "fastest" in numbers:
+                slowest = float(np.linalg.eigvalsh(curvature(form, "w"))[0])
+                told["fastest"] = sqrt(2.0 * float(lower) / slowest) * FASTER
             if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
                 return True
         return False
+
+    def too_little_momentum(self) -> bool:
+        """Tell whether a body at rest on a target that turns has more momentum than is told."""
+        loop, known = self.loop, self.known
+        stored = np.array(loop.rotors) @ np.array(loop.wheels.axes) if loop.wheels is not None else np.zeros(3)
+        least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0]) * (1.0 - 1e-12)
+        return float(known.total_momentum) + float(np.linalg.norm(stored)) < least * float(known.target_rate)
 
     def cap(self, theorem: str, words: list[str], V: str) -> float:
         """Return a level below V where other rests are, or where the sign of the quaternion changes."""
         p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
         values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        half = theorem == EVENLY or SHORTEST in words
-        return inf if HYSTERESIS in words else min(values[1:]) if half else values[0]
+        return min(values[1:]) if theorem == EVENLY or SHORTEST in words else inf
 
     def largest_level(self, claim: dict[str, Any], V: str, cap: float) -> Fraction | None:
         """Return the largest level that keeps all limits of a claim, and stays below the cap."""
@@ -327,20 +369,21 @@ class Loop:
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
         """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less."""
-        P, N = (
-            np.array(
-                [[form.slope(f"{x}{i}").slope(f"{x}{k}").at(NOWHERE).number for k in (1, 2, 3)] for i in (1, 2, 3)],
-                dtype=float,
-            )
-            for x in "wq"
-        )
+        P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
-            angle = 2.0 * acos(max(1.0 - float(level) / s, -0.98))
+            angle = 2.0 * acos(max(1.0 - float(level) / s, -1.0))
         else:
             angle = 2.0 * asin(min(sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
-        return {"angle": angle * less, "rate": rate * less}
+        # Above V at the other rest every turn is in the set.
+        return {"angle": angle if float(level) > 2.0 * s > 0.0 else angle * less, "rate": rate * less}
+
+
+def curvature(form: Poly, x: str) -> NDArray[np.float64]:
+    """Return the second derivative of V by the rate (w) or the attitude (q) where both vanish."""
+    slopes = [[form.slope(f"{x}{i}").slope(f"{x}{k}").at(NOWHERE).number for k in (1, 2, 3)] for i in (1, 2, 3)]
+    return np.array(slopes, dtype=np.float64)
 
 
 def highest(o: Squares, scales: Mapping[str, float]) -> float | None:

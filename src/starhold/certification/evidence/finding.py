@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from fractions import Fraction
 from importlib import import_module
@@ -50,7 +51,10 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
     try:
         wanted, known = obligations(claim, programs)
         Account.left = 10**12
-        found = {name: evidence(name, wanted, scales) for name in wanted}
+        with warnings.catch_warnings():
+            # The kernel decides of what an ill-conditioned matrix gives.
+            warnings.simplefilter("ignore", linalg.LinAlgWarning)
+            found = {name: evidence(name, wanted, scales) for name in wanted}
     except RefusedError as reason:
         raise NotFoundError(str(reason)) from None
     subject, programs = (

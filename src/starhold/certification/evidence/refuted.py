@@ -25,6 +25,8 @@ from starhold.parts.environments.gravity_gradient import gravity_gradient
 RISES, RISES_NEAR, NEGATIVE = "V rises", "V rises near the target", "V is negative"
 EXCEEDS, UNSETTLED = "asks for more than the limit", "does not settle between samples"
 PUSHED, AWAY = "is pushed off its surface", "turns away on its surface"
+REFUTING = (RISES, RISES_NEAR, NEGATIVE, EXCEEDS, UNSETTLED, PUSHED, AWAY)
+"""The theorems that refute."""
 Floats = NDArray[np.float64]
 VARIABLES = ("w1", "w2", "w3", "q1", "q2", "q3")
 TRIES = 10_000
@@ -43,7 +45,7 @@ def find_refuted(loop: Loop, turn: float | None = None, rate: float | None = Non
             _ = against_near(loop) or (rate is not None and against_far(loop, rate))
         limited = [claim for claim in ends if {"limit", "limit.norm"} & claim["numbers"].keys()]
         if ends and turn is not None and not limited and flown.wheels is None:
-            against_limit(loop, ends[0]["programs"]["lyapunov"], turn)
+            _ = against_limit(loop, loop.lyapunov(), turn) or against_limit(loop, ends[0]["programs"]["lyapunov"], turn)
     if hasattr(flown.law.module, "surface") and SLIDING not in shown and flown.wheels is None:
         against_surface(loop)
     if SAMPLED not in shown and any(abs(complex(*z)) > 1.0 for z in loop.eigenvalues):
@@ -189,22 +191,29 @@ def against_surface(loop: Loop) -> bool:
     roles, flown = loop.roles, loop.loop
     roles["surface"] = loop.add(flown.law.module.surface, measurement=ASKED, gains=flown.gains)
     try:
-        pushed = [(PUSHED, {f"outside.{i}": most}) for i, most in enumerate(pushes(loop))]
+        for i, (most, place) in enumerate(pushes(loop)):
+            beside = (1e-3 + 2.0 * float(getattr(flown.gains, "boundary_layer", 0.0))) * np.eye(3)[i]
+            numbers = {f"outside.{i}": most, **state(np.zeros(3), beside)}
+            if loop.try_to_show(loop.claim(PUSHED, [], None, **numbers), {}):
+                loop.pushed_at = place
+                return True
         K = tensor(flown.gains.surface_gain)
         axis = np.linalg.eigh(0.5 * (K + K.T))[1][:, 0]
-        ways = [*pushed, (AWAY, {name: x for name, x in state(0.5 * axis).items() if name.startswith("turn")})]
-        return any(loop.try_to_show(loop.claim(theorem, [], None, **numbers), {}) for theorem, numbers in ways)
+        turned = {name: x for name, x in state(0.5 * axis).items() if name.startswith("turn")}
+        return loop.try_to_show(loop.claim(AWAY, [], None, **turned), {})
     finally:
         del roles["surface"]
 
 
-def pushes(loop: Loop) -> list[float]:
-    """Return a torque about each axis that there is somewhere on the orbit, a little less than the most."""
-    flown, most = loop.loop, np.zeros(3)
-    if flown.has("gravity-gradient"):
-        distance = float(perigee(flown)[0].mid())
-        directions = np.random.default_rng(0).normal(size=(2000, 3))
-        directions *= distance / np.linalg.norm(directions, axis=1, keepdims=True)
-        strength = 3.0 * flown.craft.gravity / distance**5
-        most = np.max([gravity_gradient(tuple(d), strength, flown.craft) for d in directions.tolist()], axis=0)
-    return [(float(x) + number(loop.known.disturbance)) * (1.0 - 1e-9) for x in most]
+def pushes(loop: Loop) -> list[tuple[float, list[float] | None]]:
+    """Return a torque about each axis that there is somewhere on the orbit, a little less than the most, and where."""
+    flown, most = loop.loop, number(loop.known.disturbance)
+    if not flown.has("gravity-gradient"):
+        return [(most, None)] * 3
+    distance = float(perigee(flown)[0].mid())
+    directions = np.random.default_rng(0).normal(size=(2000, 3))
+    directions *= distance / np.linalg.norm(directions, axis=1, keepdims=True)
+    strength = 3.0 * flown.craft.gravity / distance**5
+    found = np.array([gravity_gradient(tuple(d), strength, flown.craft) for d in directions.tolist()])
+    # Floats told where.
+    return [((most + float(own.max())) * (1.0 - 1e-9), directions[int(np.argmax(own))].tolist()) for own in found.T]

@@ -105,7 +105,8 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
     numbers, V = loop.claim.numbers, loop.lyapunov
     level, fastest = numbers.get("level"), numbers.get("fastest")
     motion, known = loop.balance(loop.u), list[Poly]()
-    loop.autonomous(motion)
+    # With nothing from outside H is constant in the axes of a target at rest: a function of the attitude.
+    loop.autonomous(motion, kept="" if loop.outside or loop.moving else "h")
     said = ["from every attitude and rate the body"]
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
@@ -119,6 +120,7 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
         slope = loop.slopes_along(V, NOTHING) + dot(loop.w, motion)
     else:
         slope = loop.slopes_along(V, loop.acceleration)
+    loop.autonomous([slope])
     yield "V is non-increasing", Squares(-slope, z, least, known, [loop.sphere])
     return said
 
@@ -148,11 +150,13 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         higher = V.at({"q0": 0}) - claim.numbers["level"]
         yield "the sign never changes", Squares(higher, [poly(1), *loop.q[1:], *loop.w], 1, (), border, energy)
         said.append("comes to rest on target by the shorter turn")
-    elif level is not None and not loop.any_inertia:
+    elif level is not None and not loop.any_inertia and V.at(loop.opposite | loop.still).number > level:
         yield "the other equilibrium is outside", Exceeds(V.at(loop.opposite | loop.still).number, level)
         said.append("comes to rest on target")
     else:
-        demand(level is None, "a level for every inertia needs a sign of the quaternion")
+        demand(level is None or not loop.any_inertia, "a level for every inertia needs a sign of the quaternion")
+        if level is not None:
+            yield "the other equilibrium is inside", Exceeds(level, V.at(loop.opposite | loop.still).number)
         for k, name in enumerate(loop.still if strictly else ()):
             yield f"V is level at the other equilibrium {k}", Vanishes(V.slope(name).at(loop.opposite | loop.still))
         lower = V.at(loop.opposite | loop.still) - V.at(loop.still)
@@ -189,7 +193,7 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part:
 
     def near(angle: Fraction) -> list[Poly]:
         # |q0| and q0 are at least the cosine; for less than a half turn so is q0^2 at least its square.
-        cosine = cosine_below(angle / 2)
+        cosine = cosine_below(angle / 2) if angle <= 6 else Fraction(-1)
         return [loop.q[0] - cosine, *([loop.q[0] * loop.q[0] - cosine * cosine] if cosine >= 0 else [])]
 
     def slow(rate: Fraction) -> list[Poly]:

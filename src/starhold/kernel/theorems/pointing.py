@@ -1,5 +1,5 @@
 """The theorem about the loop that flies: the torque is held between samples, torques from outside and errors of the command
-are bounded, and motions from a large set come as near to the target as is told. Proof: docs/kernel.md, section 8."""
+are bounded, and motions from a large set come as near to the target as is told. Proof: docs/kernel.md, section 9."""
 
 from __future__ import annotations
 

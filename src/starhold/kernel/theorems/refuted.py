@@ -7,7 +7,7 @@ and no wheels turn: all claims hold of such a loop too.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -16,13 +16,13 @@ from ..numbers import cosine_above, demand
 from ..polynomials import Poly, apply, dot, poly, var
 from ..programs import single
 from ..reading import Claim
-from ..rules import Exceeds, Obligation, Persists
+from ..rules import Exceeds, Persists
 from ..sentences import Statement, above, below
+from .attitude import Proof
 from .limits import TORQUE
 from .sampling import linear_loop, near_rest
 from .sliding import declared, taken_apart
 
-Proof = Generator[tuple[str, Obligation], None, Statement]
 CALM = ("no-outside-torque", "target-at-rest", "no-wheels")
 """What is assumed of all that acts from outside."""
 MOTION = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators", "continuous-torque", "unlimited-torque")
@@ -111,29 +111,28 @@ def exceeds_limit(claim: Claim) -> Proof:
     low, high = (loop.lyapunov.at(one.values).number for one in (state, rest))
     demand(low <= high, "V is larger at the state than at the rest")
     squares, most = [x * x for x in torque(loop, state)], limit or norm or Fraction(0)
-    yield "more than the limit", Exceeds(max(squares) if norm is None else sum(squares, Fraction(0)), most * most)
+    yield "torque", Exceeds(max(squares) if norm is None else sum(squares, Fraction(0)), most * most)
     text = f"every set of V that holds all rests turned by up to {above(angle)} rad holds a state where the law asks for "
-    return Statement(f"{text}more than {below(most)} N m", (*MOTION, *CALM), TORQUE, True)
+    return Statement(f"{text}more than {below(most)} N m", (*MOTION[:5], *CALM), TORQUE, True)
 
 
 def does_not_settle(claim: Claim) -> Proof:
     """Near rest, with the torque held for the period, some motions do not come to rest."""
-    *_, step = yield from linear_loop(claim)
-    h = claim.numbers["period"]
+    (*_, step), h = (yield from linear_loop(claim)), claim.numbers["period"]
     yield "step", Persists(step(h))
     text = f"near rest, with the torque held for {below(h)} s, some motions do not come to rest"
     return Statement(text, (*MOTION[:4], *CALM, "linear-motion"), "sampling", True)
 
 
 def is_pushed_off(claim: Claim) -> Proof:
-    """A torque from outside of `outside.i` exceeds what the law switches about axis i: it pushes s_i away from zero."""
-    loop = AttitudeLoop(claim)
+    """A torque from outside of `outside.i` exceeds what the law switches about axis i: it pushes s_i away from zero, as at a
+    state where s_i > 0."""
+    loop, state = AttitudeLoop(claim), State.told(claim)
     s, _, moved = yield from declared(loop)
-    told = [i for i in AXES if f"outside.{i}" in claim.numbers]
-    demand(len(told) == 1, "there is not one axis")
-    i = told[0]
+    i = next((i for i in AXES if f"outside.{i}" in claim.numbers), 0)
     push = claim.numbers[f"outside.{i}"]
     yield f"reach {i}", Exceeds(push, taken_apart(loop, i, moved[i], s[i]).reach)
+    yield "beside the surface", Exceeds(s[i].at(state.values).number)
     text = f"a torque from outside of {below(push)} N m about axis {i + 1} exceeds what the law switches"
     return Statement(text, (*MOTION, "bounded-outside-torque", *CALM[1:]), "sliding", True)
 
