@@ -2,11 +2,14 @@
 
 import copy
 import json
+import math
 from functools import cache
 
 import starhold as sh
+from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims
-from starhold.certification.evidence.finding import certificate
+from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations
+from starhold.certification.evidence.pointing import find_pointing
 from starhold.certification.subject import make_subject
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build
@@ -28,9 +31,37 @@ LAWS = [
 """Laws of built-in scenarios of which something is proved."""
 
 
+K_RATE, K_ATTITUDE = 0.0292368, 0.0081213333
+WHEEL_ERROR = K_RATE * 1.2e-4 + K_ATTITUDE * math.radians(24 / 3600) / 2 + 0.04 * 0.2 * 1.2e-4
+"""What a gyro that errs by 1.2e-4 rad/s and an attitude that errs by 24 arc seconds make of the command (N m)."""
+SKEW = [[0.05, 0.001, 0.002], [0.001, 0.065, 0.003], [0.002, 0.003, 0.025]]
+POINTING = {
+    "body": (([2.0, 3.0, 4.0], 0.09, 0.009, 0.1), (3.5e-6, 1e-6, math.radians(90))),
+    "moving": (([2.0, 3.0, 4.0], 0.09, 0.009, 0.1), (3.5e-6, 1e-6, math.radians(60), 0.02, {"limit": 0.03})),
+    "cubesat": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(29))),
+    "calm": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(3))),
+    "skew": ((SKEW, K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(10))),
+}
+"""Inertia, gains and period; outside torque, error of the command, and the start."""
+
+
+@cache
+def flying(name):
+    """What was found about a loop with a held torque, errors and torques from outside."""
+    (inertia, k_rate, k_attitude, period), told = POINTING[name]
+    law = {"type": "lyapunov", "k_rate": k_rate, "k_attitude": k_attitude}
+    kept = {"simulation": {"duration": "1 min", "control_period": period}, "name": name, "law": [law]}
+    given = sh.scenario({"spacecraft": {"inertia": inertia}} | kept)
+    loop = Loop(make_subject(build(given, given.laws[0])))
+    assert find_pointing(loop, *told), loop.failed
+    return loop
+
+
 @cache
 def found(scenario, law):
-    """What was found about a law of a built-in scenario, or of one by hand."""
+    """What was found about a law of a built-in scenario, of one by hand, or of one with its torque held."""
+    if scenario == "flying":
+        return flying(law)
     if scenario == "by hand":
         given = sh.scenario(QUIET | {"name": law, "law": [BY_HAND[law]]})
         loop = build(given, given.laws[0])
@@ -59,3 +90,16 @@ def rekeyed(content):
 def text(content):
     """A certificate as a file holds it."""
     return json.dumps(content)
+
+
+def failing(claim, programs):
+    """The names, without places, of what cannot be shown of a claim, of which everything told is read."""
+    wanted, known = obligations(claim, programs)
+    assert not any(told.unread for told in (known.taken, known.programs, known.subject, known.numbers))
+    failed = set()
+    for name in wanted:
+        try:
+            evidence(name, wanted, {})
+        except NotFoundError:
+            failed.add(name.rstrip("-+0123456789 "))
+    return failed

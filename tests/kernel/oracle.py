@@ -7,6 +7,8 @@ from fractions import Fraction
 import numpy as np
 from scipy.optimize import least_squares
 
+from tests.kernel.flights import Fleet, turn
+
 STEP = 1e-6
 PLAIN = {
     "plus": lambda a, b: a + b,
@@ -70,7 +72,7 @@ class Oracle:
         return np.array([self.rng.choice([-1, 1]) * self.numbers.get(f"outside.{k}", 1e-3) for k in range(3)])
 
     def inputs(self, q, w, e, r, a, H):
-        h = H - self.J @ (w + r) if "wheels" in self.words else np.zeros(3)
+        h = H - self.J @ (w + r) if "wheels" in self.words else np.zeros(np.shape(w))
         told = {
             "attitude": q, "rate": w, "body_rate": w + r, "target_rate": r, "target_acceleration": a, "external_torque": e,
             "position": self.rng.normal(size=3), "wheel_momentum": h, "magnetic_field": self.rng.normal(size=3),
@@ -92,7 +94,7 @@ class Oracle:
         return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ a, h
 
     def lyapunov(self, q, w):
-        given, _ = self.inputs(q, w, *[np.zeros(3)] * 4)
+        given, _ = self.inputs(q, w, *[np.zeros(np.shape(w))] * 4)
         return run(self.programs["lyapunov"], given | self.plant())[0]
 
     def slope(self, q, w, T):
@@ -275,6 +277,42 @@ class Oracle:
 
         longest = [radius(h) for h in np.geomspace(1e-3, 1, 30) * n["longest"]] if "longest" in n else []
         return radius(n["period"]) <= n["radius"] * (1 + 1e-9) and n["radius"] < 1 and all(x < 1 + 1e-9 for x in longest)
+
+    def points(self, tries):
+        """Whether nothing leaves what is claimed in flights under pushes that are chosen against it."""
+        n, zero = self.numbers, np.zeros(3)
+        V0, level = self.lyapunov(np.eye(4)[0], zero), n["level"]
+
+        def law(q, w):
+            return run(self.programs["law"], self.inputs(q, w, *[np.zeros(w.shape)] * 4)[0])
+
+        _, stiffness = self.linear()
+        slow = math.sqrt(np.linalg.eigvals(np.linalg.solve(self.J, stiffness)).real.min() / 2)
+        fleet = Fleet(self.J, law, n["period"], n["outside"], n["error"], slow, int(self.rng.integers(1000)), 2 * tries)
+        states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
+        states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]
+        start = (np.array(part).T for part in zip(*states, strict=True))
+        periods = min(int(n["settling"] / n["period"]), 3000)
+        for k, q, w in fleet.fly(*start, periods + 300):
+            if (self.lyapunov(q, w) - V0 > n["highest"]).any() or (
+                k == 1 and np.abs(law(q, w)).max() > n.get("limit", np.inf)
+            ):
+                return False
+            off = (turn(q) > n["end.angle"]) | (np.linalg.norm(w, axis=0) > n["end.rate"])
+            if k * n["period"] > n["settling"] and off.any():
+                return False
+        return self.contents(V0, level)
+
+    def border(self, V0, rest):
+        """A state of the set's border, of which rest is the part of V that it has at rest."""
+        q, w = self.shrunk(turned(self.rng), V0, rest), self.direction()
+        low, high = 0.0, 1.0
+        while self.lyapunov(q, high * w) - V0 < self.numbers["level"]:
+            high *= 2.0
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.lyapunov(q, middle * w) - V0 <= self.numbers["level"] else (low, middle)
+        return q, low * w
 
     def reaches(self, tries):
         n, J = self.numbers, self.J

@@ -26,6 +26,7 @@ SUITES = {
     "without axes": ("landing", "rounded", 0),
     "layer": ("cubesat-slew", "sliding", 0),
     "norm": ("by hand", "norm", 1),
+    "points": ("flying", "cubesat", 0),
     "evenly": ("wheels-orbital", "wheel", 0),
     "evenly whatever the inertia": ("wheels-orbital", "wheel", 2),
     "wheels": ("wheels-orbital", "wheel", 1),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from math import factorial
+from math import factorial, isqrt
 from typing import Any, TypeAlias, cast
 
 Rows: TypeAlias = list[list[Fraction]]
@@ -142,6 +142,11 @@ def scalar(c: Fraction | int, count: int = 3) -> Rows:
     return [[Fraction(c) * (i == k) for k in range(count)] for i in range(count)]
 
 
+def beside(a: Rows, b: Rows) -> Rows:
+    """Return a matrix with the columns of both."""
+    return [[*s, *t] for s, t in zip(a, b, strict=True)]
+
+
 def cosine_below(angle: Fraction) -> Fraction:
     """Return a number not above the cosine of an angle from 0 to 3: its alternating series, ended after a negative term."""
     demand(0 <= angle <= 3, "an angle is not between 0 and 3")
@@ -155,3 +160,28 @@ def cosine_below(angle: Fraction) -> Fraction:
 def cosine_above(angle: Fraction) -> Fraction:
     """Return a number not below the cosine of an angle from 0 to 3: the same series and its next term."""
     return cosine_below(angle) + angle**48 / factorial(48)
+
+
+def root(x: Fraction) -> Fraction:
+    """Return a short number that is not below the square root of a number that is not negative, and hardly above it."""
+    demand(x >= 0, "a root is of a negative number")
+    Account.spend(4, longest([x]))
+    places = 64 + max(0, x.denominator.bit_length() - x.numerator.bit_length()) // 2
+    return Fraction(isqrt((x.numerator << 2 * places) // x.denominator) + 1, 1 << places) if x else x
+
+
+def up(x: Fraction) -> Fraction:
+    """Return a short number that is not below a number, and hardly above it."""
+    Account.spend(2, longest([x]))
+    places = 64 + max(0, x.denominator.bit_length() - x.numerator.bit_length())
+    return Fraction(-((-x.numerator << places) // x.denominator), 1 << places)
+
+
+def norm(v: Iterable[Fraction]) -> Fraction:
+    """Return a number that is not below the Euclidean norm, and hardly above it."""
+    return root(sum((x * x for x in v), Fraction(0)))
+
+
+def reach(a: Rows, v: Sequence[Fraction]) -> list[Fraction]:
+    """Return how large a matrix makes a vector whose components are no larger than those of v."""
+    return [sum((abs(x) * y for x, y in zip(row, v, strict=True)), Fraction(0)) for row in a]

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
+from math import prod
 from typing import Any, TypeAlias
 
-from .numbers import Account, demand, longest, rational, read_dict
+from .numbers import Account, demand, longest, rational, read_dict, up
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -140,6 +141,15 @@ def minus(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
     """Return the vector product."""
     return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]
+
+
+def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
+    """Return a number that |p| does not exceed where no variable exceeds its size."""
+    found = Fraction(0)
+    for m, c in p.terms.items():
+        Account.spend(len(m) + 1, longest([c, found]))
+        found += up(abs(c) * prod(sizes[name] for name in m))
+    return up(found)
 
 
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:

@@ -18,6 +18,8 @@ ASSUMPTIONS = {
     "no-outside-torque": "there is no torque from outside",
     "known-outside-torque": "a torque from outside is as the law is told",
     "bounded-outside-torque": "a torque from outside is at most as told",
+    "bounded-push": "torques from outside and errors of the command are no larger than told",
+    "held-torque": "the torque is what the law asks for at the last sample, and the error",
     "target-at-rest": "the target is at rest",
     "known-target": "the target's motion is as the law is told",
     "bounded-target": "the target turns, and its rate changes, no faster than told",

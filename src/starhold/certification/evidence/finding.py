@@ -27,14 +27,14 @@ class NotFoundError(Exception):
 
 
 def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
-    """Return a claim as the kernel has it, without its evidence."""
+    """Return a claim as the kernel has it, with the evidence that theorems ask for themselves."""
     return Claim(
         claim["theorem"],
         Told("words", dict.fromkeys(claim["taken"], True)),
         Told("programs", {role: Program.read(programs[name]) for role, name in claim["programs"].items()}),
         Told("subject", {name: rational(x) for name, x in claim["subject"].items()}),
         Numbers("numbers", {name: rational(x) for name, x in claim["numbers"].items()}),
-        Told("evidence", {}),
+        Told("evidence", claim["evidence"]),
     )
 
 
@@ -61,11 +61,8 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
         {name: x for name, x in claim[part].items() if name not in told.unread}
         for part, told in (("subject", known.subject), ("programs", known.programs))
     )
-    return claim | {
-        "subject": subject,
-        "programs": programs,
-        "evidence": {name: x for name, x in found.items() if x is not None},
-    }
+    told = claim["evidence"] | {name: x for name, x in found.items() if x is not None}
+    return claim | {"subject": subject, "programs": programs, "evidence": told}
 
 
 def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[str, float]) -> Any:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from ..reading import Claim
 from ..rules import Obligation
 from ..sentences import Statement
-from . import attitude, invariant, isotropic, refuted, sampling, sliding, station
+from . import attitude, invariant, isotropic, pointing, refuted, sampling, sliding, station
 
 Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
 
@@ -22,6 +22,7 @@ THEOREMS: dict[str, Theorem] = {
     "converges without a preferred axis": isotropic.converges_without_axes,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
+    "points": pointing.points,
     "V rises": refuted.rises,
     "V rises near the target": refuted.rises_near_target,
     "V is negative": refuted.is_negative,

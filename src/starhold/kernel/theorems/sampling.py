@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from fractions import Fraction
 
+from ..held import over_period
 from ..loops import AttitudeLoop, slopes
-from ..numbers import Rows, demand, plus, scalar, times
+from ..numbers import Rows, beside, demand, plus, times
 from ..polynomials import Poly, poly
 from ..programs import Piecewise
 from ..reading import Claim
@@ -35,13 +36,7 @@ def linear_loop(
     yield from vanish("rest on target", [p.at(rest) for p in u])
     C, K = (slopes([-p for p in u], letter, rest) for letter in "wq")
     held = times([[poly(x).number for x in row] for row in loop.J_inverse], beside(C, K))
-
-    def step(h: Fraction) -> Rows:
-        # w+ = w + h J^-1 u, q+ = q + h w/2 + h^2 J^-1 u/4.
-        upper, lower = beside(scalar(1), scalar(0)), beside(scalar(h / 2), scalar(1))
-        return plus(upper, held, -h) + plus(lower, held, -h * h / 4)
-
-    return loop, (C, K), step
+    return loop, (C, K), lambda h: over_period(held, h)
 
 
 def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
@@ -64,8 +59,3 @@ def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
         yield "another step", Contracts(step(other))
         said += f", and it is stable for a period of {below(other)} s"
     return Statement(said, (*loop.assumed, "linear-motion"), "sampling")
-
-
-def beside(a: Rows, b: Rows) -> Rows:
-    """Return two matrices side by side."""
-    return [[*s, *t] for s, t in zip(a, b, strict=True)]

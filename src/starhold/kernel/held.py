@@ -1,0 +1,206 @@
+"""A loop with its torque held between samples: how V changes in a period, and the linear motion, from sets of states.
+
+J w' = u + d - w x Jw with u = the law's torque at the last sample and an error. What errors and torques d from outside do is
+bounded by what they are; what is of higher order in the period, or not linear, by the size of the set. Docs/kernel.md, 10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import prod
+
+from .loops import AXES, AttitudeLoop, slopes
+from .numbers import (
+    RefusedError,
+    Rows,
+    beside,
+    definite,
+    demand,
+    inverse,
+    norm,
+    plus,
+    reach,
+    root,
+    scalar,
+    times,
+    transpose,
+    up,
+)  # fmt: skip
+from .polynomials import Poly, apply, cross, dot, most, poly, var, variables
+
+STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
+RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
+Sizes = dict[str, Fraction]
+
+
+@dataclass(frozen=True)
+class Region:
+    """A set of states at samples: x.X^-1 x <= 1 for x = (w, q1, q2, q3), q0 >= least, and |x_i| at most the sizes."""
+
+    X: Rows
+    sizes: Sizes
+    least: Fraction
+
+    def within(self, X: Rows) -> Region:
+        """Return the part that lies in an ellipsoid too."""
+        sizes = {name: min(self.sizes[name], root(X[i][i])) for i, name in enumerate(STATE)}
+        return Region(X, self.sizes | sizes, self.least)
+
+
+@dataclass(frozen=True)
+class Tube:
+    """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
+    drift, and how far q turns."""
+
+    sizes: Sizes
+    drift: list[Fraction]
+    turned: Fraction
+
+
+class Held:
+    """A loop with its torque held for a period, and V = s (1 - q0) + x.Gx."""
+
+    def __init__(self, loop: AttitudeLoop) -> None:
+        numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
+        self.loop, self.h, self.outside, self.error = loop, numbers["period"], numbers["outside"], numbers["error"]
+        self.push = self.outside + self.error
+        demand(self.h > 0, "a period is not positive")
+        demand(not (loop.outside or loop.moving or loop.wheels), "the loop is taken with nothing")
+        loop.autonomous(loop.u)
+        self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
+        self.gyroscopic = cross(loop.w, apply(loop.J, loop.w))
+        self.pull, self.bend = apply(self.N, loop.u), apply(self.N, self.gyroscopic)
+        # V' to V'''' while the acceleration u is held.
+        acceleration = [u - g for u, g in zip(variables("u"), self.bend, strict=True)]
+        self.rates = [loop.slopes_along(V, acceleration)]
+        for _ in range(3):
+            self.rates.append(loop.slopes_along(self.rates[-1], acceleration))
+        mean = self.rates[0] + self.h / 2 * self.rates[1] + self.h * self.h / 6 * self.rates[2]
+        self.mean = mean.at({f"u{k + 1}": p for k, p in enumerate(self.pull)})
+        self.s = -V.terms.get(("q0",), Fraction(0))
+        self.G = [[V.slope(i).slope(k).at(dict.fromkeys(STATE, 0)).number / 2 for k in STATE] for i in STATE]
+        demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
+        # What a torque does to V: felt x.
+        self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
+        # 2 (1 - q0) >= |q|^2.
+        self.under = self.form(self.s / 2)
+        demand(definite(self.under), "V is not least on target")
+
+    def form(self, c: Fraction) -> Rows:
+        """Return the matrix of x.Gx + c |q|^2."""
+        return [[entry + c * (i == k > 2) for k, entry in enumerate(row)] for i, row in enumerate(self.G)]
+
+    def region(self, c: Fraction) -> Region:
+        """Return what holds {V <= c}. Over w V is least s (1 - q0) + q.Sq, with S >= -lean, and |q|^2 <= 2 (1 - q0)."""
+        (ww, wq), (_, qq) = ([[row[b] for row in self.G[a]] for b in (RATE, TURN)] for a in (RATE, TURN))
+        S = plus(qq, times(transpose(wq), times(inverse(ww), wq)), -1)
+        lean = max(Fraction(0), *(sum((abs(x) for x in S[i]), -S[i][i] - abs(S[i][i])) for i in AXES))
+        demand(self.s > 2 * lean and c >= 0, "V is not least on target")
+        least = 1 - up(c / (self.s - 2 * lean))
+        demand(least > -1, "a level holds the other quaternion of the target")
+        turn = root(1 - least * least) if least > 0 else Fraction(1)
+        X = [[c * x for x in row] for row in inverse(self.under)]
+        sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
+        return Region(X, sizes | {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in STATE[TURN]}, least)
+
+    def tube(self, region: Region) -> Tube:
+        """Return what motions stay in for a period."""
+        sizes, held = region.sizes, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
+        pushed = [u + self.push * norm(row) for u, row in zip(held.values(), self.N, strict=True)]
+
+        def reached(wide: list[Fraction]) -> list[Fraction]:
+            columns = zip(STATE[RATE], pushed, self.bend, strict=True)
+            return [sizes[x] + self.h * (p + most(g, named(STATE[RATE], wide))) for x, p, g in columns]
+
+        wide = settled(reached)
+        turned = self.h / 2 * norm(wide)
+        far = {name: min(sizes[name] + turned, Fraction(1)) for name in STATE[TURN]}
+        drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
+        return Tube({"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held, drift, turned)
+
+    def fall(self, region: Region) -> tuple[Rows, Rows, Fraction]:
+        """Return Q, H and r such that V changes in a period by h (push |felt x| + r - x.Qx) at most, and V <= x.Hx."""
+        h, tube = self.h, self.tube(region)
+        bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
+        pushed = [self.push * norm(row) for row in self.N]
+        # How far pushes take the rates from where they go without.
+        away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(bent, d), strict=True)])
+        slope = {name: most(self.rates[0].slope(name), tube.sizes) for name in ("q0", *STATE)}
+        rest = h**3 / 24 * most(self.rates[3], tube.sizes)
+        rest += self.push / 2 * norm(reach(self.felt, [*tube.drift, *[tube.turned] * 3]))
+        rest += reach([[slope[name] for name in STATE[RATE]]], away)[0] / 2
+        rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
+        # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
+        over = self.form(self.s / (1 + region.least))
+        return least_form(-self.mean, region), over, rest
+
+    def swing(self, region: Region) -> Fraction:
+        """Return a bound of |V'| between samples."""
+        sizes = self.tube(region).sizes
+        return most(self.rates[0], sizes) + self.push * norm(reach(self.felt, [sizes[name] for name in STATE]))
+
+    def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
+        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, of
+        what is not linear and what comes from outside."""
+        h, N, tube, u = self.h, self.N, self.tube(region), self.loop.u
+        rest = self.loop.on_target | self.loop.still
+        linear = beside(*(slopes(u, letter, rest) for letter in "wq"))
+        A = over_period([[-x for x in row] for row in times(N, linear)], h)
+        wide, turn = (norm(tube.sizes[name] for name in STATE[part]) for part in (RATE, TURN))
+        demand(region.least > 0 and turn < 1, "a region is not near the target")
+        # As q0 > 0 at all times, 1 - q0 <= |q|^2.
+        x, near = [var(name) for name in STATE], region.sizes | {"v": turn * turn}
+        unlike = [p - own - g for p, own, g in zip(u, apply(linear, x), self.gyroscopic, strict=True)]
+        bent = [[most(g.slope(name), tube.sizes) for name in STATE[RATE]] for g in self.gyroscopic]
+        odd = [most(p.at({"q0": 1 - var("v")}), near) + y for p, y in zip(unlike, reach(bent, tube.drift), strict=True)]
+        uneven = self.outside + norm(odd)
+        return A, [
+            ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], self.error + uneven),
+            (scalar(0) + N, h * h / 8 * uneven),
+            (scalar(0) + scalar(1), h / 2 * wide * turn * (1 + turn)),
+        ]
+
+
+def over_period(held: Rows, h: Fraction) -> Rows:
+    """Return the linear motion of (w, q) over a period in which the acceleration -held (w, q) does not change."""
+    return plus(beside(scalar(1), scalar(0)), held, -h) + plus(beside(scalar(h / 2), scalar(1)), held, -h * h / 4)
+
+
+def least_form(p: Poly, region: Region) -> Rows:
+    """Return the matrix of a form that p is not below: two factors of x are taken out of every monomial, what is left lies
+    in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
+    sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
+    middle, radius = scalar(0, 6), scalar(0, 6)
+    for m, c in p.terms.items():
+        own, power = [name for name in m if name != "q0"], m.count("q0")
+        demand(len(own) > 1, "the torque is not zero at rest on target")
+        # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
+        *left, i, k = own
+        high = c * prod(sizes[name] for name in left)
+        even = all(left.count(name) % 2 == 0 for name in left) and (power == 0 or region.least >= 0)
+        low = -high if not even else Fraction(0) if left else high * region.least**power
+        ends = up(-min(low, high)), up(max(low, high))
+        for a, b in ((place[i], place[k]), (place[k], place[i])):
+            middle[a][b] += (ends[1] - ends[0]) / 4
+            radius[a][b] += (ends[1] + ends[0]) / 4
+    for i, row in enumerate(radius):
+        middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
+    return middle
+
+
+def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
+    """Return values by names."""
+    return dict(zip(names, values, strict=True))
+
+
+def settled(change: Callable[[list[Fraction]], list[Fraction]]) -> list[Fraction]:
+    """Return bounds that a monotone change leaves bounds: what begins within them at no time leaves them."""
+    found = [Fraction(0)] * 3
+    for _ in range(ITERATIONS):
+        further = change(found)
+        if all(x <= y for x, y in zip(further, found, strict=True)):
+            return found
+        found = [up(x + x / 2**20) for x in further]
+    raise RefusedError("the period is too long for the rates")

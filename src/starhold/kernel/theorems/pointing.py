@@ -1,0 +1,93 @@
+"""The theorem about the loop that flies: the torque is held between samples, torques from outside and errors of the command
+are bounded, and motions from a large set come as near to the target as is told. Proof: docs/kernel.md, section 10."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from ..held import RATE, TURN, Held
+from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
+from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
+from ..reading import Claim
+from ..rules import Definite, Exceeds
+from ..sentences import Statement, above, below, enumerated
+from .attitude import Proof, contents
+from .limits import within_limits
+
+
+def points(claim: Claim) -> Proof:
+    """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
+    by no more than end.angle and turns no faster than end.rate. The torque is what the law asks for at the last sample and
+    an error, |error| <= error; torques from outside are no more than `outside`."""
+    loop = AttitudeLoop(claim)
+    yield from loop.sound()
+    held, numbers, samples = Held(loop), claim.numbers, 0
+    c, h = numbers["level"], held.h
+    start = yield from contents(loop, loop.lyapunov)
+    limited = yield from within_limits(loop)
+    region = held.region(c)
+    signs = {SHORTEST, HYSTERESIS} & claim.taken.content.keys()
+    if any(claim.taken.get(word) for word in (SHORTEST, HYSTERESIS)):
+        yield "the sign never changes", Exceeds(region.least)
+    yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(region))
+    levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
+    demand(bool(levels), "no level is told")
+    for k, told in enumerate(levels):
+        end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
+        demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
+        Q, H, rest = held.fall(region)
+        pushed = held.push * held.push / (4 * tau) + rest
+        fallen = plus(plus(Q, times(transpose(held.felt), held.felt), -tau), H, -beta)
+        yield f"V falls {k}", Definite(fallen)
+        yield f"level {k}", Exceeds(end, pushed / beta)
+        samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
+        c, region = end, held.region(end)
+    for k, told in enumerate(ellipsoids):
+        shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
+        X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
+        free = 1 - sum(shares)
+        demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
+        after = image(X, shares, *held.linear(region))
+        yield f"ellipsoid {k}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
+        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], region.X, -1))
+        fall = 1 - rate * free
+        samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
+        region = region.within(X)
+    angle, fastest = numbers["end.angle"], numbers["end.rate"]
+    tube = held.tube(region)
+    # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.
+    near, slow = angle / 2 - angle**3 / 48 - h / 4 * fastest, fastest - norm(tube.drift) / 2
+    for name, most_of, part in (("angle", near, TURN), ("rate", slow, RATE)):
+        demand(most_of > 0, f"the {name} is too small")
+        yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in region.X[part]], -1))
+    yield "settling", Exceeds(numbers["settling"], h * samples)
+    text = (
+        f"every motion from {{V <= {below(numbers['level'])}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
+        f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
+        f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside of up to"
+        f" {below(held.outside)} N m and errors of the command of up to {below(held.error)} N m"
+    )
+    assumptions = ("rigid-body", "inertia-as-given", "bounded-push", "held-torque", *limited.assumptions, "target-at-rest")
+    sign = "sign-at-once" if signs else "quaternion-as-fed"
+    said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
+    return Statement(text + said, (*assumptions, "no-wheels", sign), "pointing")
+
+
+def image(X: Rows, shares: Sequence[Fraction], A: Rows, pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
+    """Return the matrix of an ellipsoid that holds Ax + the sum of B v, of x.X^-1 x <= 1 and |v| <= b."""
+    found = [[entry / (1 - sum(shares)) for entry in row] for row in times(A, times(X, transpose(A)))]
+    for (B, b), share in zip(pushes, shares, strict=True):
+        found = plus(found, times(B, transpose(B)), b * b / share)
+    return found
+
+
+def periods(fall: Fraction, floor: Fraction, start: Fraction, end: Fraction) -> int:
+    """Return after how many periods a number is below `end` that in each comes down to (1 - fall) x + fall floor at most:
+    (1 - fall)^n <= (1 + fall n / 64)^-64."""
+    if start <= end:
+        return 0
+    ratio = up((start - floor) / (end - floor))
+    for _ in range(6):
+        ratio = root(ratio)
+    return -((64 * (1 - ratio)) // fall)

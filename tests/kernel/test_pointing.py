@@ -1,0 +1,229 @@
+"""The loop that flies: what is proved of it, flights that are chosen against that, and false claims."""
+
+import copy
+import math
+import random
+import time
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from starhold.certification.evidence.claims import floats
+from starhold.certification.evidence.finding import read
+from starhold.certification.evidence.pointing import Chain
+from starhold.kernel.check import check
+from starhold.kernel.held import STATE, Held, Region, least_form
+from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.numbers import root, up
+from starhold.kernel.polynomials import Poly, most, total
+from starhold.kernel.theorems.pointing import periods
+from tests.kernel.certificates import POINTING, contents, failing, flying, text
+from tests.kernel.flights import Fleet, along, feedback, moved, turn
+from tests.kernel.oracle import Oracle, number
+from tests.tiers import leading
+
+PROVED = {"body": 0.13, "cubesat": 0.10, "moving": 0.13, "skew": 0.10, "calm": 0.10}
+"""Within how many degrees motions are to end."""
+
+
+def numbers(content):
+    return {name: number(x) for name, x in content["claims"][0]["numbers"].items()}
+
+
+@pytest.mark.parametrize("name", PROVED)
+def test_the_loop_is_proved_to_point(name):
+    content = contents("flying", name)
+    begun = time.process_time()
+    (proved,) = check(text(content))
+    assert time.process_time() - begun < 4.0
+    assert math.degrees(numbers(content)["end.angle"]) <= PROVED[name]
+    assert "the torque is what the law asks for at the last sample" in proved.statement.written()
+
+
+def fleet_of(name, outside, error):
+    """Lanes of a loop under other pushes."""
+    (J, k_rate, k_attitude, h), _ = POINTING[name]
+    J = np.diag(J) if np.ndim(J) == 1 else np.array(J)
+    slow = math.sqrt(k_attitude / 2 / np.linalg.eigvalsh(J).max())
+    return Fleet(J, feedback(J, k_rate, k_attitude), h, outside, error, slow)
+
+
+def held_loop(name, **more):
+    """A loop with a held torque, whose pushes may be others than claimed."""
+    claim = copy.deepcopy(flying(name).claims[0])
+    claim["numbers"] |= {key: str(Fraction(x)) for key, x in more.items()}
+    return Held(AttitudeLoop(read(claim, flying(name).by_digest)))
+
+
+def states_of(oracle, level, count):
+    """States inside of {V <= level}, most of them at its border."""
+    oracle.numbers["level"] = level
+    pairs = [oracle.border(0.0, level * oracle.rng.uniform()) for _ in range(count)]
+    return [np.array(part).T for part in zip(*pairs, strict=True)]
+
+
+def after_a_period(fleet, q, w, unit):
+    """The state after a period in which the error points one way, and the outside torque turns over at a time of its own."""
+    command, turned = fleet.law(q, w) + fleet.error * unit, fleet.rng.uniform()
+    for share, sign in ((turned, 1), (1 - turned, -1)):
+        for _ in range(4):
+            torque = command + sign * fleet.outside * unit
+            q, w = moved(fleet.J, fleet.inverse, q, w, torque, share * fleet.h / 4)
+    return q, w
+
+
+@pytest.mark.parametrize("name", ["moving", "skew"])
+@pytest.mark.parametrize("power", [0.5, 1, 3])
+def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
+    oracle = Oracle(contents("flying", name), contents("flying", name)["claims"][0])
+    level = oracle.numbers["level"] / 30.0**power
+    push = 0.02 * math.sqrt(level * oracle.subject["gains.k_attitude"])
+    held = held_loop(name, outside=push, error=2 * push)
+    region = held.region(Fraction(level))
+    fleet = fleet_of(name, push, 2 * push)
+    q, w = states_of(oracle, level, fleet.lanes)
+    x, tube = np.concatenate([w, q[1:]]), held.tube(region)
+    sizes = np.array([float(region.sizes[name]) for name in STATE])
+    assert (np.abs(x).max(axis=1) <= sizes).all()
+    assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
+    Q, H, rest = held.fall(region)
+    Q, H, felt, (A, pushes) = floats(Q), floats(H), floats(held.felt), held.linear(region)
+    V = oracle.lyapunov(q, w)
+    assert ((x * (H @ x)).sum(0) * (1 + 1e-9) >= V).all()
+    for unit in (fleet.push(0, q, w), fleet.directions(), along(felt @ x)):
+        later, rate = after_a_period(fleet, q, w, unit)
+        most = fleet.h * (3 * push * np.linalg.norm(felt @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
+        assert (oracle.lyapunov(later, rate) - V <= most).all()
+        y = np.concatenate([rate, later[1:]])
+        assert (np.abs(y) <= np.array([[float(tube.sizes[name])] for name in STATE])).all()
+        # What is not linear is a push of the first kind and, beside, of the others.
+        left, (B, b), others = y - floats(A) @ x, pushes[0], pushes[1:]
+        v = np.linalg.solve(floats(B)[:3], left[:3])
+        assert np.linalg.norm(v, axis=0).max() <= float(b)
+        beside = sum(float(b) * np.linalg.norm(floats(B), 2) for B, b in others)
+        assert np.linalg.norm(left[3:] - floats(B)[3:] @ v, axis=0).max() <= beside
+
+
+def test_roots_and_rounded_numbers_are_not_below_and_near():
+    r = random.Random(4)
+    for _ in range(500):
+        x = Fraction(r.randrange(1, 10**9), r.randrange(1, 10**9)) * Fraction(10) ** r.randrange(-30, 30)
+        assert x <= root(x) ** 2 <= x * (1 + Fraction(1, 10**15))
+        assert x <= up(x) <= x * (1 + Fraction(1, 10**15))
+        assert -x <= up(-x) <= -x * (1 - Fraction(1, 10**15))
+    assert root(Fraction(0)) == up(Fraction(0)) == 0
+
+
+@pytest.mark.parametrize("least", ["-1/2", "0", "3/5"])
+def test_a_form_is_nowhere_above_its_polynomial(least):
+    r, low = random.Random(least), Fraction(least)
+    sizes = {name: Fraction(r.randrange(1, 100), 100) for name in STATE} | {"q0": Fraction(1)}
+    for _ in range(20):
+        names = [sorted(r.choices([*STATE, "q0"], k=r.randrange(4))) for _ in range(6)]
+        pairs = [r.choices(STATE, k=2) for _ in names]
+        p = total(
+            Poly({tuple(sorted(m + pair)): Fraction(r.randrange(-9, 10))}) for m, pair in zip(names, pairs, strict=True)
+        )
+        M = least_form(p, Region([], sizes, low))
+        for _ in range(30):
+            x = {name: size * r.choice([-1, 1, Fraction(r.randrange(-100, 101), 100)]) for name, size in sizes.items()}
+            x["q0"] = low + (1 - low) * Fraction(r.randrange(101), 100)
+            form = sum(M[i][k] * x[a] * x[b] for i, a in enumerate(STATE) for k, b in enumerate(STATE))
+            assert form <= p.at(x).number
+            assert abs(p.at(x).number) <= most(p, sizes)
+
+
+SLOWER = [("1/2", "1", "3", "2"), ("1/100", "0", "1", "1/50"), ("1", "1", "9", "2")]
+
+
+@pytest.mark.parametrize(("fall", "floor", "start", "end"), SLOWER)
+def test_periods_are_enough_and_not_many(fall, floor, start, end):
+    fall, floor, x, end = map(Fraction, (fall, floor, start, end))
+    count = 0
+    while x > end:
+        x, count = floor + (1 - fall) * (x - floor), count + 1
+    assert count <= periods(fall, floor, Fraction(start), end) <= 2 * count + 2
+    assert periods(fall, floor, end, end) == 0
+
+
+def one_level(numbers, told, **link):
+    """A single level, from which no ellipsoid follows, and motions end where it says."""
+    told["levels"], told["ellipsoids"] = [told["levels"][0] | link], []
+    numbers |= {"end.angle": 0.2, "end.rate": 0.2, "settling": 5.0}
+
+
+def low_level(numbers, told):
+    one_level(numbers, told, end="1/1000000000")
+
+
+def fast_fall(numbers, told):
+    one_level(numbers, told, tau="1000", beta="399/100")
+    told["levels"] = [told["levels"][0] | {"end": str(Fraction(numbers["level"]) / 2**k)} for k in (1, 2, 3, 4, 5)]
+
+
+def small_ellipsoid(numbers, told):
+    last = told["ellipsoids"][-1]
+    shrunk = {
+        "shape": [[str(Fraction(x) / 4) for x in row] for row in last["shape"]],
+        "reach": str(4 * Fraction(last["reach"])),
+    }
+    told["ellipsoids"].append(last | shrunk)
+    numbers |= {"end.angle": numbers["end.angle"] * 0.6, "settling": numbers["settling"] * 1.2}
+
+
+def wide_entry(numbers, told):
+    """Ellipsoids follow one level down, and are said to hold it at once."""
+    held = held_loop("calm")
+    chain = Chain(held, "", 0.0)
+    told["levels"] = [told["levels"][0] | {"end": str(Fraction(numbers["level"]) / 2)}]
+    numbers["end.angle"], numbers["end.rate"] = chain.tighten(held.region(Fraction(told["levels"][0]["end"])))
+    told["ellipsoids"] = [one | {"reach": "1000001/1000000"} for one in chain.ellipsoids]
+    numbers["settling"] = 15.0
+
+
+FALSE = {
+    "turns from rest": lambda numbers, told: numbers.update({"angle": 1.5 * numbers["angle"]}),
+    "V between samples": lambda numbers, told: numbers.update(highest=0.5 * numbers["level"]),
+    "V falls": fast_fall,
+    "level": low_level,
+    "ellipsoid": small_ellipsoid,
+    "entry": wide_entry,
+    "end of the angle": lambda numbers, told: numbers.update({"end.angle": 0.6 * numbers["end.angle"]}),
+    "end of the rate": lambda numbers, told: numbers.update({"end.rate": 0.4 * numbers["end.rate"]}),
+    "settling": lambda numbers, told: numbers.update(settling=numbers["settling"] / 50),
+}
+
+
+@pytest.mark.parametrize("hypothesis", FALSE)
+def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis):
+    name = "calm" if hypothesis == "entry" else "cubesat"
+    content = contents("flying", name)
+    (claim,) = content["claims"]
+    exact = {key: number(x) for key, x in claim["numbers"].items()}
+    FALSE[hypothesis](exact, claim["evidence"])
+    claim["numbers"] = {key: str(Fraction(x)) for key, x in exact.items()}
+    assert failing(claim, content["programs"]) == {hypothesis}
+    assert not all(Oracle(content, claim, seed).holds() for seed in range(3))
+
+
+@pytest.mark.parametrize("name", ["cubesat", "calm"])
+def test_the_claims_that_were_changed_hold(name):
+    content = contents("flying", name)
+    assert Oracle(content, content["claims"][0]).holds()
+
+
+@pytest.mark.parametrize(("name", "reached"), leading([("cubesat", 0.8), ("body", 0.8), ("skew", 0.8)], 2))
+def test_no_flight_leaves_what_is_proved_and_some_come_near(name, reached):
+    told, n = POINTING[name][1], numbers(contents("flying", name))
+    fleet = fleet_of(name, *told[:2])
+    # A half from rest at the largest angle, and a half from rest on target, which lies in the last ellipsoid.
+    (q, w), (target, _) = fleet.at_rest(told[2]), fleet.at_rest(0.0)
+    near = np.arange(fleet.lanes) >= fleet.lanes // 2
+    q[:, near], worst, V = target[:, near], 0.0, Oracle(contents("flying", name), contents("flying", name)["claims"][0])
+    for k, attitude, rate in fleet.fly(q, w, 3000):
+        ended = near | (k * fleet.h > n["settling"])
+        worst = max(worst, float(turn(attitude)[ended].max()))
+        assert np.linalg.norm(rate, axis=0)[ended].max() <= n["end.rate"]
+        assert V.lyapunov(attitude, rate).max() <= n["highest"]
+    assert reached * n["end.angle"] <= worst <= n["end.angle"]
