@@ -180,9 +180,12 @@ class Oracle:
     def state(self, q, w, V0, level):
         if self.lyapunov(q, w) <= V0:
             return False
-        before = None
+        before, kept = None, self.bounded("momentum", "wheels")
+        # Where nothing acts from outside the momentum does not change.
+        alone = not {"outside torque", "moving target"} & set(self.words)
         for _ in range(3):
-            u, T, h = self.law(q, w, *self.environment())
+            *found, H = self.environment()
+            u, T, h = self.law(q, w, *found, kept if alone else H)
             if before is not None and not np.allclose(T, before, rtol=1e-6, atol=1e-9 * (np.abs(u).max() + np.abs(T).max())):
                 return False
             before = T

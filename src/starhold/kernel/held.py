@@ -13,7 +13,20 @@ from math import prod
 
 from .loops import AXES, AttitudeLoop, slopes
 from .numbers import (
-    RefusedError, Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up,
+    RefusedError,
+    Rows,
+    beside,
+    definite,
+    demand,
+    inverse,
+    norm,
+    plus,
+    reach,
+    root,
+    scalar,
+    times,
+    transpose,
+    up,
 )  # fmt: skip
 from .polynomials import Poly, apply, cross, dot, most, poly, var, variables
 
