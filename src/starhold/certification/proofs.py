@@ -143,7 +143,7 @@ def _limit(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     each = {
-        name: [above(_exact(numbers[f"{key}.{k}"])) for k in range(len(loop.loop.rotors))]
+        name: [above(_exact(numbers[at])) if (at := f"{key}.{k}") in numbers else None for k in range(len(loop.loop.rotors))]
         for name, key in (("motors", "motors"), ("wheel_momentum", "stored"))
     }
     return _set(numbers, loop) | {"momentum": float(numbers["momentum"])} | each

@@ -13,11 +13,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
+from itertools import combinations
 from typing import TypeAlias
 
 from .numbers import Rows, demand, inverse
 from .polynomials import Poly, apply, cross, dot, minus, poly, total, var, variables
-from .programs import Asking, Exactly, Piecewise, known, single
+from .programs import Asking, Case, Exactly, Piecewise, joined, known, single
 from .reading import Claim
 from .rules import Definite, Shown, vanish
 
@@ -138,6 +139,17 @@ class AttitudeLoop(Loop):
         return self.read("law", 3)
 
     @cached_property
+    def sides(self) -> Piecewise:
+        """Return the cases of the law's three torques together, which are continuous."""
+        demand(all(a.agrees(b) for cases in self.law for a, b in combinations(cases, 2)), "the law's torque jumps")
+        return joined(self.law)
+
+    @cached_property
+    def quiet(self) -> Case:
+        """Return the case that holds around all rests."""
+        return around(self.sides, self.still)
+
+    @cached_property
     def u(self) -> list[Poly]:
         """Return the torque of a law that does not switch."""
         return [single(cases) for cases in self.law]
@@ -188,6 +200,14 @@ class AttitudeLoop(Loop):
         yield from vanish(
             "turning", minus(self.single("turning", 4, wired("q", self.q), wired("rate", self.w)), self.turning)
         )
+
+
+def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
+    """Return the one case that holds around rest, where none of its conditions is on its border."""
+    sides = [[(Poly(dict(p)).at(rest).number, truth) for p, truth in case.guards] for case in cases]
+    holds = [all(x != 0 and (x > 0) == truth for x, truth in own) for own in sides]
+    demand(holds.count(True) == 1, "the law switches at rest")
+    return cases[holds.index(True)]
 
 
 def slopes(parts: Sequence[Poly], letter: str, at: Mapping[str, Poly | Fraction | int]) -> Rows:

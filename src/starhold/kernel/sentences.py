@@ -25,7 +25,7 @@ ASSUMPTIONS = {
     "bounded-target": "the target turns, and its rate changes, no faster than told",
     "no-wheels": "no wheels turn",
     "frictionless-wheels": "wheels have no friction, and share the torque by least squares",
-    "unlimited-wheels": "wheels are not limited",
+    "unlimited-wheels": "wheels have no limits but those told",
     "bounded-momentum": "body and wheels have no more momentum together than told",
     "linear-motion": "the motion is linear, as it is near rest",
     "quaternion-as-fed": "the quaternion that is fed back never jumps",

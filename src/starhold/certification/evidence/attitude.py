@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from math import acos, asin, inf, isfinite, sqrt
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved
+from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved, squares
 from starhold.certification.subject import Subject, above
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
@@ -301,13 +301,24 @@ class Loop:
                 self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
                 return False
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
-        if wheels is not None and wheels.allocation == 0 and isfinite(max(*wheels.torque_limit, *wheels.momentum_limit)):
-            for k, (torque, momentum) in enumerate(zip(wheels.torque_limit, wheels.momentum_limit, strict=True)):
-                numbers |= {f"motors.{k}": torque, f"stored.{k}": momentum * (1.0 - BAND)}
+        shared = wheels is not None and wheels.allocation == 0
+        motors = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)} if shared else {}
+        stored = (
+            {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)} if shared else {}
+        )
+        if motors or stored:
+            numbers |= motors | stored
         elif isfinite(limit):
             numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
         else:
             return False
+        if "fastest" not in numbers and SHORTEST not in words:
+            # A law that clips may keep its limits everywhere.
+            claim = self.claim(theorem, words, V, **numbers)
+            if "V is non-increasing" not in obligations(claim, self.by_digest)[0] and self.try_to_show(
+                claim, self.scales(V)
+            ):
+                return True
         claim = self.claim(theorem, words, V, level=1, **numbers)
         cap = self.cap(theorem, words, V)
         level = self.largest_level(claim, V, cap)
@@ -353,6 +364,9 @@ class Loop:
             # What a lost wheel keeps is a number, at any level.
             if isinstance(o, Squares) and o.p.names and name.startswith(("torque", "norm", "motor", "wheel"))
         ]
+        if "V is non-increasing" not in wanted:
+            # What is clipped may hold at any level.
+            limits = [o for o in limits if squares(replace(o, known=o.known[:-1]), self.scales(V)) is None]
         level = cap
         for _ in range(3):
             scales = self.scales(V, level if isfinite(level) else None)

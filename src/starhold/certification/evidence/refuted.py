@@ -14,11 +14,10 @@ from starhold.certification.evidence.attitude import ASKED, CONVERGES, SAMPLED, 
 from starhold.certification.evidence.finding import read
 from starhold.certification.matrices import number
 from starhold.certification.subject import perigee
-from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.loops import AttitudeLoop, around
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.theorems.refuted import State, slope
-from starhold.kernel.theorems.sampling import near_rest
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 
@@ -72,7 +71,7 @@ def against_near(loop: Loop) -> bool:
     exact = wired(loop, V)
     try:
         theorems = [(NEGATIVE, -exact.lyapunov)]
-        u = [near_rest(cases, exact.on_target | exact.still) for cases in exact.law]
+        u = [around(cases, exact.on_target | exact.still).value for cases in exact.law]
         theorems.append((RISES_NEAR, slope(exact, u)))
     except RefusedError as reason:
         loop.failed[RISES_NEAR] = str(reason)

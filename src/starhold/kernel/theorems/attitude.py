@@ -34,7 +34,7 @@ def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False) -
     said = yield from is_non_increasing(loop, z, 6 if strictly else 3)
     if not strictly:
         # At rest the law's torque is zero only where q is.
-        resting = [p.at(loop.still) for p in loop.balance(loop.u)]
+        resting = [p.at(loop.still) for p in loop.balance(loop.quiet.value)]
         yield "only equilibrium", Solves(resting, loop.q[1:], [loop.sphere])
     return (yield from concluded(loop, said, strictly))
 
@@ -45,7 +45,7 @@ def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
     own, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), claim.numbers.get("level")
     yield from least_on_target(loop, own)
     said = yield from is_non_increasing(loop, [*loop.w, *(q * x for q in loop.q for x in loop.w)], 3)
-    at_half_turns, *pull = (-dot(own, loop.balance(loop.u)).at(loop.still)).powers("q0")
+    at_half_turns, *pull = (-dot(own, loop.balance(loop.quiet.value)).at(loop.still)).powers("q0")
     demand(not at_half_turns.terms, "the torque at rest is not zero at every half turn")
     yield "rests at half turns only", Squares(horner(pull, loop.q[0]), own, 3, modulo=[loop.sphere])
     demand(all(len(m) == 2 and "q0" not in m for m in resting.terms), "V at rest is no form of q1, q2, q3")
@@ -72,12 +72,10 @@ def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
 
 def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
     """V' <= -c times the squares of the first of z, everywhere or, with a level, on {V <= level}, which is then not left; if
-    `fastest` is told, there the rate is at most that."""
+    `fastest` is told, there the rate is at most that. Where the law has cases, V' <= -c in all that hold around no rest."""
     numbers, V, w = loop.claim.numbers, loop.lyapunov, loop.w
     level, fastest = numbers.get("level"), numbers.get("fastest")
-    motion, known = loop.balance(loop.u), list[Poly]()
-    # With nothing from outside H is constant in the axes of a target at rest: a function of the attitude.
-    loop.autonomous(motion, kept="" if loop.outside or loop.moving else "h")
+    known = list[Poly]()
     said = ["from every attitude and rate the body"]
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
@@ -86,11 +84,19 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
         yield "rates", Squares(slow, [poly(1), *loop.q, *w], 0, [numbers["level"] - V], [loop.sphere])
         known = [slow * x * x for x in w]
         said.append(f"turns no faster than {above(fastest)} rad/s and")
-    # Of any inertia V = w.Jw/2 + U(q), so that V' = w.Jw' + U'.
-    slope = loop.slopes_along(V, NONE if loop.any_inertia else loop.acceleration)
-    slope = slope + dot(w, motion) * loop.any_inertia
-    loop.autonomous([slope])
-    yield "V is non-increasing", Squares(-slope, z, least, known, [loop.sphere])
+    for case, side in enumerate(loop.sides):
+        motion = loop.balance(side.value)
+        # With nothing from outside H is constant in the axes of a target at rest: a function of the attitude.
+        loop.autonomous([*motion, *side.known], kept="" if loop.outside or loop.moving else "h")
+        # Of any inertia V = w.Jw/2 + U(q), so that V' = w.Jw' + U'.
+        slope = loop.slopes_along(V, NONE if loop.any_inertia else apply(loop.J_inverse, motion))
+        slope = slope + dot(w, motion) * loop.any_inertia
+        loop.autonomous([slope])
+        name, held = f"V is non-increasing {case}" if len(loop.sides) > 1 else "V is non-increasing", [*known, *side.known]
+        if side is loop.quiet:
+            yield name, Squares(-slope, z, least, held, [loop.sphere])
+        else:
+            yield name, Squares(-slope, [poly(1), *z], 0, held, [loop.sphere], [poly(1)])
     return said
 
 
