@@ -133,7 +133,10 @@ def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         }
     # Of an inertia that is not known no rate is told.
     level, angle, rate = (below(_exact(numbers[n])) if n in numbers else None for n in ("level", "angle", "rate"))
-    return {"level": level, "start": level, "everything": False, "slew_angle": angle, "rate": rate, "rate_everywhere": None}
+    wide = "start.angle" in numbers and numbers["start.angle"] > 2 * Fraction(pi)
+    everywhere = below(_exact(numbers["start.rate"])) if wide else None
+    held = {"slew_angle": angle, "rate": rate, "rate_everywhere": everywhere}
+    return {"level": level, "start": level, "everything": False} | held
 
 
 def _limit(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:

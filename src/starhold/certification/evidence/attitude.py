@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from math import acos, asin, inf, isfinite, sqrt
+from math import acos, asin, inf, isfinite, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from starhold.certification.evidence.finding import NotFoundError, complete, obl
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved, squares
 from starhold.certification.subject import Subject, above
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
-from starhold.kernel.numbers import RefusedError
+from starhold.kernel.numbers import RefusedError, demand
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
 from starhold.kernel.rules import Solves, Squares
@@ -44,6 +44,8 @@ LEANS = 4e-3
 """The share of the law's own V that a mixed term takes."""
 FASTER = 1.0 + 1e-2
 """How much faster than the least bound a rate is told to be at most."""
+BISECTIONS = 6
+"""Of a level, between it and four times it."""
 NEAR = 1.1
 """How many times the least level those of other limits may be, to be looked at again."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
@@ -214,7 +216,9 @@ class Loop:
                 more = {name: x for name, x in more.items() if name != "rate"}
                 self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
                 return
-        if not signs:
+        if signs:
+            self.show_bounded([*(w for w in self.words if w != OUTSIDE), *signs], widths, turn)
+        else:
             self.show_strictly(turn)
 
     def show_any_inertia(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> None:
@@ -249,12 +253,67 @@ class Loop:
         # The law's own V falls where the body is not too fast, and has the larger sets within the limits.
         self.show_limits(STRICTLY, words, self.leaning(LEANS), {"fastest": 1}, turn)
 
+    def show_bounded(self, words: list[str], widths: dict[str, Any], turn: float | None) -> None:
+        """Find a set in which the law's own V falls, for the rate is bounded there, and a set within limits."""
+        for theorem, V in ((CONVERGES, self.lyapunov()), (STRICTLY, self.leaning(LEANS))):
+            level = self.highest_falling(theorem, words, V, widths)
+            if level is None:
+                continue
+            told = widths | self.slowly(V, level) | self.contents(self.form(V), level)
+            if HYSTERESIS in words:
+                told |= self.everywhere(V, level)
+            if self.try_to_show(self.claim(theorem, words, V, level=level, **told), self.scales(V, float(level))):
+                self.show_limits(theorem, words, V, widths | {"fastest": 1}, turn)
+                return
+
+    def highest_falling(self, theorem: str, words: list[str], V: str, widths: dict[str, Any]) -> Fraction | None:
+        """Return about the largest level up to which V falls, where the quaternion's sign changes too."""
+
+        def falls(level: float) -> bool:
+            told = widths | self.slowly(V, Fraction(level))
+            try:
+                wanted, _ = obligations(self.claim(theorem, words, V, level=level, **told), self.by_digest)
+            except RefusedError as reason:
+                self.failed[theorem] = str(reason)
+                return False
+            needed = [o for name, o in wanted.items() if name.startswith(("V is non-increasing", "a jump lowers"))]
+            return all(isinstance(o, Squares) and squares(o, self.scales(V, level)) is not None for o in needed)
+
+        cap = self.cap(theorem, words, V) * (1.0 - float(GIVEN_AWAY[0]) - LEANS**2 * (theorem == STRICTLY))
+        if isfinite(cap) and falls(cap):
+            return Fraction(cap)
+        tried = [min(cap, self.potential(V) * 4.0**k) for k in range(-5, 16)]
+        held = [falls(tried[0])]
+        while held[-1] and len(held) < len(tried):
+            held.append(falls(tried[len(held)]))
+        if not held[0]:
+            self.failed.setdefault(theorem, "V falls on no set that was tried")
+            return None
+        low, high = (tried[-1],) * 2 if held[-1] else tried[len(held) - 2 : len(held)]
+        for _ in range(BISECTIONS if high > low else 0):
+            middle = sqrt(low * high)
+            low, high = (middle, high) if falls(middle) else (low, middle)
+        return Fraction(low)
+
+    def slowly(self, V: str, level: Fraction) -> dict[str, Any]:
+        """Return the rate that is not exceeded on a set, a little more."""
+        slowest = float(np.linalg.eigvalsh(curvature(self.form(V), "w"))[0])
+        return {"fastest": sqrt(2.0 * float(level) / slowest) * FASTER}
+
+    def everywhere(self, V: str, level: Fraction) -> dict[str, Any]:
+        """Return the largest rate for which a set holds every attitude, a little less; nothing where it holds none."""
+        spare = float(level) - self.potential(V)
+        if spare <= 0.0:
+            return {}
+        rate = sqrt(2.0 * spare / float(np.linalg.eigvalsh(curvature(self.form(V), "w"))[-1]))
+        return {"start.angle": float(np.nextafter(2.0 * pi, 7.0)), "start.rate": rate * (1.0 - LEANS)}
+
     def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
         """Return what has to be shown of V'."""
         claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
-        found = obligations(claim, self.by_digest)[0]["V is non-increasing"]
-        assert isinstance(found, Squares)
-        return found
+        found = obligations(claim, self.by_digest)[0].get("V is non-increasing")
+        demand(isinstance(found, Squares), "a law that switches has no V that falls strictly")
+        return found  # pyright: ignore[reportReturnType]
 
     def crossed(self, s: float, epsilon: float) -> str:
         """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw."""
@@ -333,8 +392,7 @@ class Loop:
                 break
             told = numbers | held | ({} if turn is None else {"angle": turn})
             if "fastest" in numbers:
-                slowest = float(np.linalg.eigvalsh(curvature(form, "w"))[0])
-                told["fastest"] = sqrt(2.0 * float(lower) / slowest) * FASTER
+                told |= self.slowly(V, lower)
             if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
                 return True
         return False

@@ -269,7 +269,7 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
 
 
 def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
-    """Return exact factors with a singular matrix, that takes to zero, in short numbers, what the guess takes almost there."""
+    """Return exact factors with a singular matrix, that takes to zero what the guess takes almost there."""
     head, size = len(problem.columns) - len(problem.pairs), len(problem.z)
     G = np.zeros((size, size))
     for (i, k), v in zip(problem.pairs, guess[head:], strict=True):

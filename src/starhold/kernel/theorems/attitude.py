@@ -30,7 +30,7 @@ def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False) -
     w = loop.w
     yield from least_on_target(loop)
     z = [*w, *loop.q[1:] * strictly, *(q * x for q in loop.q for x in w)]
-    z += [w[i] * w[k] for i in range(3) for k in range(i, 3)] * strictly
+    z += [w[i] * w[k] for i in range(3) for k in range(i, 3)] * (strictly or "fastest" in claim.numbers)
     said = yield from is_non_increasing(loop, z, 6 if strictly else 3)
     if not strictly:
         # At rest the law's torque is zero only where q is.
