@@ -30,7 +30,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     unlimited = ["unlimited-wheels"] * (loop.wheels and (not told or len(told) < 2 * count))
     if limit is None and norm is None and not told:
         return Statement("", ("unlimited-torque", *unlimited))
-    known, bounded, bounds, assumed = list[Poly](), list[Poly](), list[str](), list[str]()
+    known, bounded, bounds, assumed = list[Poly](), list[list[Poly]](), list[str](), list[str]()
     if loop.outside:
         outside = [numbers[f"outside.{k}"] for k in range(3)]
         known += [most - sign * e for most, e in zip(outside, loop.e, strict=True) for sign in (1, -1)]
@@ -41,7 +41,7 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     vectors += [("momentum", loop.H, "a momentum of up to {} N m s")] * loop.wheels
     for name, vector, text in vectors:
         known.append(numbers[name] * numbers[name] - dot(vector, vector))
-        bounded += vector
+        bounded.append(vector)
         bounds.append(text.format(below(numbers[name])))
     assumed += ["bounded-target"] * loop.moving + ["bounded-momentum"] * loop.wheels + unlimited
     known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
@@ -68,7 +68,8 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         for n, case in enumerate(cases):
             load = rest + dot([row[k] for k in used], case.value)
             # Of what is bounded from outside only what the load depends on.
-            z = [poly(1), *q, *w, *(x for x in bounded if x.names <= load.names)]
+            felt = [vector for vector in bounded if any(x.names <= load.names for x in vector)]
+            z = [poly(1), *q, *w, *(x for vector in felt for x in vector)]
             if load.terms:
                 full = name if len(cases) == 1 else f"{name} {n}"
                 yield full, within(bound, load, z, w, [*case.known, *known], [loop.sphere])
