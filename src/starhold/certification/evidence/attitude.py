@@ -260,8 +260,6 @@ class Loop:
             if level is None:
                 continue
             told = widths | self.slowly(V, level) | self.contents(self.form(V), level)
-            if HYSTERESIS in words:
-                told |= self.everywhere(V, level)
             if self.try_to_show(self.claim(theorem, words, V, level=level, **told), self.scales(V, float(level))):
                 self.show_limits(theorem, words, V, widths | {"fastest": 1}, turn)
                 return
@@ -299,14 +297,6 @@ class Loop:
         """Return the rate that is not exceeded on a set, a little more."""
         slowest = float(np.linalg.eigvalsh(curvature(self.form(V), "w"))[0])
         return {"fastest": sqrt(2.0 * float(level) / slowest) * FASTER}
-
-    def everywhere(self, V: str, level: Fraction) -> dict[str, Any]:
-        """Return the largest rate for which a set holds every attitude, a little less; nothing where it holds none."""
-        spare = float(level) - self.potential(V)
-        if spare <= 0.0:
-            return {}
-        rate = sqrt(2.0 * spare / float(np.linalg.eigvalsh(curvature(self.form(V), "w"))[-1]))
-        return {"start.angle": float(np.nextafter(2.0 * pi, 7.0)), "start.rate": rate * (1.0 - LEANS)}
 
     def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
         """Return what has to be shown of V'."""
@@ -438,7 +428,8 @@ class Loop:
         return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
-        """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less."""
+        """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less, and
+        the rate up to which it holds every attitude."""
         P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
@@ -446,8 +437,13 @@ class Loop:
         else:
             angle = 2.0 * asin(min(sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
-        # Above V at the other rest every turn is in the set.
-        return {"angle": angle if float(level) > 2.0 * s > 0.0 else angle * less, "rate": rate * less}
+        if not float(level) > 2.0 * s > 0.0:
+            return {"angle": angle * less, "rate": rate * less}
+        # Above V at the other rest every turn is in the set. A mixed term is at most 2 lean sqrt(s T) of the kinetic energy T.
+        lean = 0.5 * LEANS * any({"q", "w"} == {name[0] for name in m} for m in form.terms)
+        energy = (sqrt(lean * lean * s + float(level) - 2.0 * s) - lean * sqrt(s)) ** 2
+        fastest = sqrt(2.0 * energy / float(np.linalg.eigvalsh(P)[-1])) * less
+        return {"angle": angle, "rate": rate * less, "start.angle": float(np.nextafter(2.0 * pi, 7.0)), "start.rate": fastest}
 
 
 def curvature(form: Poly, x: str) -> NDArray[np.float64]:
