@@ -241,7 +241,7 @@ def _height(loop: ClosedLoop, programs: Any) -> Height:
 def _told(states: Array) -> Measurement:
     """Return measurements at states about a target at rest."""
     attitude, rate = (cast(Any, tuple(states[rows])) for rows in (ROWS.attitude, ROWS.rate))
-    return Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO)
+    return Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
 
 
 def stable_period(loop: ClosedLoop) -> float | None:
@@ -271,7 +271,7 @@ def _slopes(loop: ClosedLoop, step: float) -> Array:
 
 def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
     """Return the law's torque after a small turn (q) and at a rate, without wheels."""
-    told = Measurement((1.0, *turn), rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period, ZERO)
+    told = Measurement((1.0, *turn), rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
     memory = loop.law.remember(loop.gains, loop.known, loop.period)
     return np.array(loop.law.command(told, loop.gains, loop.known, memory)[0])
 

@@ -30,7 +30,11 @@ def assumption(identifier: str) -> Assumption:
     """Return what an identifier stands for."""
     if identifier.startswith(WITHOUT):
         part = identifier.removeprefix(WITHOUT)
-        return Assumption(f"without the {part}", lambda span: [(True, f"{HAS}{part}")])
+
+        def there(span: Any) -> Unmet:
+            return [(True, f"{HAS}{part}")]
+
+        return Assumption(f"without the {part}", there)
     return ASSUMPTIONS[identifier]
 
 

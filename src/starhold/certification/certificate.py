@@ -48,6 +48,11 @@ class Proof:
     claim: dict[str, Any]
     programs: dict[str, Any]
 
+    @property
+    def roles(self) -> dict[str, Any]:
+        """Return the programs by their roles."""
+        return {role: self.programs[name] for role, name in self.claim["programs"].items()}
+
 
 @dataclass(frozen=True, repr=False)
 class Claim:
@@ -125,7 +130,7 @@ class Certificate:
             # The proof that is told for all claims has those that are decided, in their order.
             place = [one for one in self.claims if one.outcome != "undecided"].index(claim)
             proof = Proof(self.proof["claims"][place], self.proof["programs"])
-        return {} if proof is None else {role: proof.programs[name] for role, name in proof.claim["programs"].items()}
+        return {} if proof is None else proof.roles
 
     def claim(self, kind: str) -> Claim | None:
         """The claim of a kind, where one is made."""

@@ -91,8 +91,8 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
 def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
     """Return what a claim assumes beyond what its loop meets as it is composed."""
     wheeled = loop.loop.wheels is not None
-    left = IN_THE_LOOP | (set() if loop.known.moving else {"target-at-rest"}) | (set() if wheeled else {"no-wheels"})
-    named = [name for name in identifiers if name not in left]
+    own = {"target-at-rest": loop.known.moving, "no-wheels": wheeled} | dict.fromkeys(IN_THE_LOOP, False)
+    named = [name for name in identifiers if own.get(name, True)]
     if wheeled and UNLIMITED in named:
         # Without friction, too.
         named = [WHEELS if name == UNLIMITED else name for name in named if name != FRICTIONLESS]
