@@ -3,12 +3,13 @@
 import math
 
 TEXTBOOK = (
-    "rigid body",
-    "inertia exactly as given",
-    "exact measurement and ideal actuators",
-    "torque applied continuously",
-    "torque not limited",
-    "no torque from outside but what the law cancels",
+    "rigid-body",
+    "inertia-as-given",
+    "exact-measurement",
+    "ideal-actuators",
+    "continuous-torque",
+    "unlimited-torque",
+    "known-outside-torque",
 )
 
 

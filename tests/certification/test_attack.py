@@ -14,12 +14,11 @@ from starhold.analysis.trial import draw
 from starhold.certification.frame import take_apart, take_cross
 from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
-from starhold.certification.potential import Spring
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
-from tests.certification.loops import certified, textbook
+from tests.certification.loops import certified, energy, textbook
 
 LOOPS = textbook()
 NAMES = sorted(name for name in LOOPS if not name.startswith("sliding"))
@@ -109,7 +108,7 @@ def test_no_proved_obligation_breaks(name):
             function = Function(loop, claim.witness)
             level = claim.numbers["level"]
             reach = 50.0 * function.s if level is None else min(level, 1e6 * function.s)
-            states = draw(STATES // 3, function.P, function.frame.potential, reach, random)
+            states = draw(STATES // 3, function.value, reach, random)
             # Some near rest, where the derivative is smallest.
             states[4:7, ::3] *= 10.0 ** random.uniform(-9, 0, size=states[4:7, ::3].shape[1])
             attack(loop, claim, function, states)
@@ -162,7 +161,7 @@ def test_the_attack_breaks_what_is_false(kind, numbers, witness):
     function = Function(loop, strong.witness)
     level = strong.numbers["level"]
     level = 50.0 * function.s if level is None else level
-    states = draw(20_000, function.P, function.frame.potential, level, np.random.default_rng(1))
+    states = draw(20_000, function.value, level, np.random.default_rng(1))
     with pytest.raises(AssertionError):
         attack(loop, strong, function, states)
 
@@ -178,7 +177,7 @@ def test_no_proved_surface_breaks(name):
     random = np.random.default_rng(12)
     J = np.array(loop.craft.inertia)
     K = np.diag(loop.gains.surface_gain) if np.ndim(loop.gains.surface_gain) == 1 else np.array(loop.gains.surface_gain)
-    states = draw(STATES, J, Spring(0.05), 0.5, random)
+    states = draw(STATES, energy(J, 0.05), 0.5, random)
     states[4:7] *= 10.0 ** random.uniform(-6, 0, size=states.shape[1])
     s = states[4:7] + K @ states[1:4]
     push = np.array(claim.numbers["torque"])[:, None] * np.sign(s)

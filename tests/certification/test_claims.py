@@ -11,12 +11,11 @@ from starhold.certification.certify import certify
 from starhold.certification.frame import take_apart
 from starhold.certification.matrices import floats, number
 from starhold.certification.motion import Motion
-from starhold.certification.potential import Spring
 from starhold.certification.subject import make_subject
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
-from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, certified, loop_of, random_craft, tensor, textbook
+from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, certified, energy, loop_of, random_craft, tensor, textbook
 from tests.equations import two_body_gravity_gradient
 
 LOOPS = textbook()
@@ -141,7 +140,7 @@ def test_disturbed_flights_end_within_the_ultimate_bound(name, sign_policy):
     J = tensor(loop.craft.inertia)
     random = np.random.default_rng(6)
     frame = take_apart(Motion(make_subject(loop)))
-    states = draw(6, floats(frame.P), frame.potential, n["start"], random)
+    states = draw(6, energy(floats(frame.P), number(frame.potential.s)), n["start"], random)
     directions = random.normal(size=(3, 6))
     directions /= np.linalg.norm(directions, axis=0)
     away = np.array([True, False] * 3)
@@ -219,7 +218,7 @@ def test_other_inertias_of_the_box_converge(name):
         tried += 1
         # The plant's inertia only; these laws use theirs for the gains, and form I for the gyroscopic torque too.
         flown = replace(loop, craft=body)
-        states = draw(64, J, Spring(0.04), 0.08, random)
+        states = draw(64, energy(J, 0.04), 0.08, random)
         ends = simulate_many(flown, states, 12_000).states
         assert np.abs(ends[1:4]).max() < 0.02
         assert np.abs(ends[4:7]).max() < 0.02

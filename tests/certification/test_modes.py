@@ -94,7 +94,7 @@ def test_a_mode_towards_a_target_that_claims_leave_out_is_checked_without_it(tmp
     assert passed(check_file(tmp_path / "certificate.json"))
     over = found["mission: detumble to point"].certificate
     assert (over.outcome, over.claims[0].numbers["rate"]) == ("proved", None)
-    assert over.claims[0].assumptions[-1] == "without the target sun"
+    assert over.claims[0].assumptions[-1] == "without:target sun"
 
 
 def test_a_law_with_a_memory_is_handed_to_without_a_claim():

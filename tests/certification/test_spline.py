@@ -11,14 +11,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from starhold.algebra.polynomial import exact
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import ZERO, add, cross, subtract
 from starhold.analysis.trial import draw
 from starhold.certification.certify import certify
-from starhold.certification.matrices import floats, number
-from starhold.certification.matrices import rows as rows_of
-from starhold.certification.potential import Spring
+from starhold.certification.matrices import number
 from starhold.certification.spline import spline_bounds
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
@@ -30,7 +27,7 @@ from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import tensor
 from starhold.parts.targets.history import Knots, knots_of, tabulate
 from tests.certification.edits import checked
-from tests.certification.loops import FULL, free, loop_of
+from tests.certification.loops import FULL, energy, free, loop_of
 
 
 def history(seed, count, step, spread=0.4):
@@ -234,7 +231,7 @@ def test_no_state_of_the_set_needs_more_torque_than_told_anywhere_on_the_spline(
     claim = certify(loop, "pd").claim("torque-limit")
     assert claim.outcome == "proved"
     random, count = np.random.default_rng(1), 4000
-    states = draw(count, floats(rows_of(tensor(FULL.inertia))), Spring(exact(0.018)), claim.numbers["start"], random)
+    states = draw(count, energy(tensor(FULL.inertia), 0.018), claim.numbers["start"], random)
     spline, t = (
         RotationSpline(times, Rotation.from_quat(attitudes, scalar_first=True)),
         random.uniform(0.0, times[-1], count),

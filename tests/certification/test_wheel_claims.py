@@ -143,8 +143,8 @@ def test_momentum_that_piles_up_is_not_passed_over():
     pulled = rotors("wheel", EVEN, ORBITAL).without("target").with_parts(loop.target)
     pulled = replace(pulled, law=loop.law, gains=loop.gains)
     found = certify(pulled).claim("convergence")
-    assert "no torque from outside" in found.assumptions
-    assert "no torque from outside but what the law cancels" not in found.assumptions
+    assert "no-outside-torque" in found.assumptions
+    assert "known-outside-torque" not in found.assumptions
 
 
 def test_claims_that_are_not_built_say_so():

@@ -15,7 +15,7 @@ from starhold.certification.evidence.pointing import Chain
 from starhold.kernel.check import check
 from starhold.kernel.held import STATE, Held, Region, least_form
 from starhold.kernel.loops import AttitudeLoop
-from starhold.kernel.numbers import root, up
+from starhold.kernel.numbers import Account, root, up
 from starhold.kernel.polynomials import Poly, most, total
 from starhold.kernel.theorems.pointing import periods
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
@@ -51,7 +51,7 @@ def fleet_of(name, outside, error):
 
 def held_loop(name, **more):
     """A loop with a held torque, whose pushes may be others than claimed."""
-    claim = copy.deepcopy(flying(name).claims[0])
+    claim, Account.left = copy.deepcopy(flying(name).claims[0]), 10**12
     claim["numbers"] |= {key: str(Fraction(x)) for key, x in more.items()}
     return Held(AttitudeLoop(read(claim, flying(name).by_digest)))
 
@@ -106,6 +106,7 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
 
 
 def test_roots_and_rounded_numbers_are_not_below_and_near():
+    Account.open()
     r = random.Random(4)
     for _ in range(500):
         x = Fraction(r.randrange(1, 10**9), r.randrange(1, 10**9)) * Fraction(10) ** r.randrange(-30, 30)
@@ -117,6 +118,7 @@ def test_roots_and_rounded_numbers_are_not_below_and_near():
 
 @pytest.mark.parametrize("least", ["-1/2", "0", "3/5"])
 def test_a_form_is_nowhere_above_its_polynomial(least):
+    Account.open()
     r, low = random.Random(least), Fraction(least)
     sizes = {name: Fraction(r.randrange(1, 100), 100) for name in STATE} | {"q0": Fraction(1)}
     for _ in range(20):
@@ -140,6 +142,7 @@ SLOWER = [("1/2", "1", "3", "2"), ("1/100", "0", "1", "1/50"), ("1", "1", "9", "
 @pytest.mark.parametrize(("fall", "floor", "start", "end"), SLOWER)
 def test_periods_are_enough_and_not_many(fall, floor, start, end):
     fall, floor, x, end = map(Fraction, (fall, floor, start, end))
+    Account.open()
     count = 0
     while x > end:
         x, count = floor + (1 - fall) * (x - floor), count + 1

@@ -141,7 +141,7 @@ def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str
     limits = {"torque-limit": (), "wheels": FREE}
     assumptions = assumed(subject, limits=limits[kind]) if kind in limits else assumed(subject)
     if kind == "sliding":
-        assumptions = assumed(subject, outside=("torque from outside bounded on each axis",))
+        assumptions = assumed(subject, outside=("bounded-outside-torque",))
     if kind == "inertia":
         assumptions = told(subject, numbers["tolerance"])
     return Claim(kind, numbers, {}, assumptions, (Obligation("form", EXACT, "undecided", {"reason": reason}),))

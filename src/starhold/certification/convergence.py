@@ -9,7 +9,8 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from starhold.algebra.polynomial import Polynomial, exact, pieces
-from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, WHEELS, Claim, Obligation
+from starhold.certification.assumptions import UNLIMITED, WHEELS
+from starhold.certification.certificate import EXACT, EXACT_SIGN, LASALLE, Claim, Obligation
 from starhold.certification.frame import (
     Cross,
     Frame,
@@ -39,23 +40,24 @@ from starhold.certification.refutation import rising_state, unlike_positive
 from starhold.certification.subject import Subject, below
 
 ASSUMPTIONS = (
-    "rigid body",
-    "inertia exactly as given",
-    "exact measurement and ideal actuators",
-    "torque applied continuously",
-    "torque not limited",
-    "no torque from outside but what the law cancels",
+    "rigid-body",
+    "inertia-as-given",
+    "exact-measurement",
+    "ideal-actuators",
+    "continuous-torque",
+    UNLIMITED,
+    "known-outside-torque",
 )
 ALMOST = fmpq(2**20 - 1, 2**20)
 """How much of a bound that must not be reached is used."""
 
 
 def assumed(subject: Subject, **instead: tuple[str, ...]) -> tuple[str, ...]:
-    """The assumptions of claims of convergence about a subject, with other texts in place of `limits` and `outside`."""
-    limits, outside = ASSUMPTIONS[4:]
+    """The assumptions of claims of convergence about a subject, with others in place of `limits` and `outside`."""
+    limits, outside = ASSUMPTIONS[5:]
     if subject.loop.wheels is not None:
         limits = WHEELS
-    return (*ASSUMPTIONS[:4], *instead.get("limits", (limits,)), *instead.get("outside", (outside,)))
+    return (*ASSUMPTIONS[:5], *instead.get("limits", (limits,)), *instead.get("outside", (outside,)))
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ def disturbance(basin: Basin) -> Claim | None:
     if torque == 0:
         return None
     torque = exact(above(torque))
-    assumptions = assumed(motion.subject, outside=("torque from outside bounded in norm",))
+    assumptions = assumed(motion.subject, outside=("unknown-outside-torque",))
     numbers: dict[str, Any] = {"torque": number(torque)}
 
     def refused(name: str, reason: str) -> Claim:

@@ -262,8 +262,8 @@ def _refused(subject: Subject, families: list[Family], tolerance: float) -> Clai
 
 def told(subject: Subject, tolerance: float | None) -> tuple[str, ...]:
     """The assumptions of the claim; for a tolerance of None any inertia."""
-    body, _, *others = assumed(subject, outside=("no torque from outside", "target at rest"))
-    return (body, *(() if tolerance is None else ("inertia within the tolerance",)), *others)
+    body, _, *others = assumed(subject, outside=("no-outside-torque", "target-at-rest"))
+    return (body, *(() if tolerance is None else ("inertia-within-tolerance",)), *others)
 
 
 def _function(motion: Motion) -> Polynomial:

@@ -11,7 +11,8 @@ from flint import arb, fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial, exact, jointly
-from starhold.certification.certificate import BALLS, UNLIMITED, Claim, Obligation
+from starhold.certification.assumptions import UNLIMITED
+from starhold.certification.certificate import BALLS, Claim, Obligation
 from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.frame import contents
 from starhold.certification.gyroscopic import GyroscopicTorque, gyroscopic_torque, is_gyroscopic
@@ -109,7 +110,7 @@ def needed(claims: Sequence[Claim], motion: Motion) -> list[Claim]:
     if len(pieces) < 2 or not _everywhere(pieces, exact(limit), kind):
         return [*claims]
     return [
-        c if c.proof else replace(c, assumptions=tuple(text for text in c.assumptions if text != UNLIMITED)) for c in claims
+        c if c.proof else replace(c, assumptions=tuple(name for name in c.assumptions if name != UNLIMITED)) for c in claims
     ]
 
 

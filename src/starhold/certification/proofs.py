@@ -10,13 +10,12 @@ from typing import Any
 
 from flint import fmpq
 
+from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.certificate import (
     EXACT,
     EXACT_SIGN,
     LYAPUNOV,
     SQUARES,
-    UNLIMITED,
-    WHEELS,
     Claim,
     Obligation,
     Proof,
@@ -46,24 +45,6 @@ HOW = {
     **dict.fromkeys(("Contracts", "Persists"), LYAPUNOV),
 }
 """How each rule of the kernel shows what it shows."""
-ASSUMPTIONS = {
-    "rigid-body": "rigid body",
-    "inertia-as-given": "inertia exactly as given",
-    "exact-measurement": "exact measurement and ideal actuators",
-    "ideal-actuators": "exact measurement and ideal actuators",
-    "continuous-torque": "torque applied continuously",
-    "unlimited-torque": UNLIMITED,
-    "unlimited-wheels": WHEELS,
-    "no-outside-torque": "no torque from outside",
-    "known-outside-torque": "no torque from outside but what the law cancels",
-    "bounded-outside-torque": "torque from outside bounded on each axis",
-    "frictionless-wheels": "wheels without friction",
-    "bounded-momentum": "total momentum at most as told",
-    "linear-motion": "linear motion near rest on a target at rest",
-}
-"""What the kernel's identifiers are called."""
-OF_A_LOOP = {"target-at-rest": "target at rest", "no-wheels": "no stored momentum"}
-"""What a claim assumes only of a loop whose target moves, or that has wheels."""
 IN_THE_LOOP = {"known-target", "bounded-target", "quaternion-as-fed", "sign-at-once"}
 """What every loop meets as it is composed: its law is told how the target moves, and how the quaternion's sign is chosen."""
 
@@ -108,16 +89,14 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
 
 
 def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
-    """Return what a claim assumes, once each."""
-    own = {"target-at-rest": loop.known.moving, "no-wheels": loop.loop.wheels is not None}
-    named = [
-        ASSUMPTIONS[name] if name in ASSUMPTIONS else OF_A_LOOP[name]
-        for name in identifiers
-        if name not in IN_THE_LOOP and own.get(name, True)
-    ]
-    if loop.loop.wheels is not None and UNLIMITED in named:
-        named = [WHEELS if name == UNLIMITED else name for name in named if name != "wheels without friction"]
-    return tuple(dict.fromkeys(named))
+    """Return what a claim assumes beyond what its loop meets as it is composed."""
+    wheeled = loop.loop.wheels is not None
+    own = {"target-at-rest": loop.known.moving, "no-wheels": wheeled} | dict.fromkeys(IN_THE_LOOP, False)
+    named = [name for name in identifiers if own.get(name, True)]
+    if wheeled and UNLIMITED in named:
+        # Without friction, too.
+        named = [WHEELS if name == UNLIMITED else name for name in named if name != FRICTIONLESS]
+    return tuple(named)
 
 
 def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:

@@ -8,7 +8,8 @@ import numpy as np
 from flint import arb, fmpq_mat
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.certificate import EXACT_SIGN, WHEELS, Claim, Obligation
+from starhold.certification.assumptions import UNLIMITED, WHEELS
+from starhold.certification.certificate import EXACT_SIGN, Claim, Obligation
 from starhold.certification.matrices import (
     Rows,
     characteristic_roots,
@@ -26,14 +27,15 @@ from starhold.certification.motion import Motion, ShapeError
 from starhold.certification.subject import above
 
 ASSUMPTIONS = (
-    "rigid body",
-    "inertia exactly as given",
-    "exact measurement and ideal actuators",
-    "linear motion near rest on a target at rest",
-    "torque not limited",
-    "no torque from outside",
+    "rigid-body",
+    "inertia-as-given",
+    "exact-measurement",
+    "ideal-actuators",
+    "linear-motion",
+    UNLIMITED,
+    "no-outside-torque",
 )
-STILL_WHEELS = "no stored momentum"
+STILL_WHEELS = "no-wheels"
 ROOTS = "certified roots"
 APART = "inertia, gains and period are too far apart in size"
 MOST_BITS = 1_000
@@ -47,7 +49,7 @@ def sampling(motion: Motion) -> Claim | None:
     loop = motion.subject.loop
     assumptions = ASSUMPTIONS
     if loop.wheels is not None:
-        assumptions = (*(WHEELS if a == "torque not limited" else a for a in ASSUMPTIONS), STILL_WHEELS)
+        assumptions = (*(WHEELS if a == UNLIMITED else a for a in ASSUMPTIONS), STILL_WHEELS)
     J, period = motion.subject.inertia, exact(loop.period)
 
     def undecided(reason: str) -> Claim:

@@ -8,6 +8,7 @@ import numpy as np
 from flint import fmpq
 
 from starhold.algebra.polynomial import Polynomial, exact, jointly
+from starhold.certification.assumptions import FRICTIONLESS
 from starhold.certification.certificate import BALLS, EXACT_SIGN, Claim, Obligation
 from starhold.certification.convergence import Basin, assumed, reached
 from starhold.certification.limits import (
@@ -27,7 +28,7 @@ from starhold.parts.effectors.wheels import BAND, Wheels
 
 TRIES = (1e-4, 1e-3)
 """Each wheel is bounded twice, so that more digits would take seconds."""
-FREE = ("wheels without friction", "total momentum at most as told")
+FREE = (FRICTIONLESS, "bounded-momentum")
 
 
 def saturation(basin: Basin, turn: float | None = None) -> Claim | None:

@@ -190,7 +190,7 @@ def _of_station(name: str, subject: StationSubject, given: Any, proofs: Sequence
         shaped(claim, CLAIM, "the claim")
         for obligation in claim["obligations"]:
             shaped(obligation, OBLIGATION, "an obligation")
-    absent = [f"without the {name}" for name in given["subject"]["assumed_away"]]
+    absent = [f"without:{name}" for name in given["subject"]["assumed_away"]]
     demand(not any("proof" in claim for claim in given["claims"]), "a claim of a station tells of a proof")
     places: list[int] = given.get("proof", [])
     own = [proofs[place] for place in places]
@@ -246,7 +246,7 @@ def _claim(subject: LoopSubject, about: Mapping[str, Any], claim: Any) -> list[t
     demand(claim["outcome"] == outcome_of(outcomes), "the outcome does not follow from the obligations")
     told, proofs = _obliges(subject, claim)
     # What the loop has beside what the claim is about is left out by name.
-    told = [*told, *(f"without the {name}" for name in absent)]
+    told = [*told, *(f"without:{name}" for name in absent)]
     demand(claim["assumptions"] == told, "the assumptions are not those of such a claim")
     if claim["outcome"] != "proved":
         return _unproved(claim)

@@ -276,16 +276,17 @@ def by_the_kernel(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     raise CheckError("such a claim comes with a proof, or is not proved")
 
 
-UNLIMITED, _FREE = "torque not limited", "neither torque nor wheels limited, wheels without friction"
+UNLIMITED, _FREE = "unlimited-torque", "unlimited-wheels"
 _BASE = (
-    "rigid body",
-    "inertia exactly as given",
-    "exact measurement and ideal actuators",
-    "torque applied continuously",
+    "rigid-body",
+    "inertia-as-given",
+    "exact-measurement",
+    "ideal-actuators",
+    "continuous-torque",
     UNLIMITED,
-    "no torque from outside but what the law cancels",
+    "known-outside-torque",
 )
-_BOX = "inertia within the tolerance"
+_BOX = "inertia-within-tolerance"
 
 
 def _instead(old: str, *new: str) -> tuple[str, ...]:
@@ -296,17 +297,15 @@ CLAIMS: dict[str, Kind] = {
     "convergence": Kind(_BASE, convergence),
     "hand-over": Kind(_BASE, hand_over),
     "torque-limit": Kind(_instead(UNLIMITED), torque_limit, wheels=False),
-    "wheels": Kind(
-        _instead(UNLIMITED, "wheels without friction", "total momentum at most as told"), wheels_limits, wheels=True
-    ),
+    "wheels": Kind(_instead(UNLIMITED, "frictionless-wheels", "bounded-momentum"), wheels_limits, wheels=True),
     # What a law cancels of a torque that depends on the inertia is not what another inertia feels.
-    "inertia": Kind((_BASE[0], _BOX, *_BASE[2:5], "no torque from outside", "target at rest"), inertia, _BOX),
-    "disturbance": Kind(_instead(_BASE[5], "torque from outside bounded in norm"), disturbance),
+    "inertia": Kind((_BASE[0], _BOX, *_BASE[2:6], "no-outside-torque", "target-at-rest"), inertia, _BOX),
+    "disturbance": Kind(_instead(_BASE[6], "unknown-outside-torque"), disturbance),
     "sampling": Kind(
-        (*_BASE[:3], "linear motion near rest on a target at rest", _BASE[4], "no torque from outside"),
+        (*_BASE[:4], "linear-motion", _BASE[5], "no-outside-torque"),
         sampling,
-        beside=("no stored momentum",),
+        beside=("no-wheels",),
     ),
-    "sliding": Kind(_instead(_BASE[5], "torque from outside bounded on each axis"), by_the_kernel),
+    "sliding": Kind(_instead(_BASE[6], "bounded-outside-torque"), by_the_kernel),
     "region": Kind(_BASE, by_the_kernel),
 }

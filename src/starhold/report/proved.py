@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from starhold.certification.assumptions import texts
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, evidence, methods, recheck, sentence, unclaimed
@@ -101,7 +102,7 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> st
         f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(statement))}. "
         f"<small>By {escape(methods(claim))}.</small>{why}</span></summary>\n"
         f'<div class="wide"><table class="text"><tbody>{rows}</tbody></table></div>{_numbers(claim)}'
-        f"<p><b>Assuming</b> {escape('; '.join(claim.assumptions))}.</p></details>\n"
+        f"<p><b>Assuming</b> {escape('; '.join(texts(claim.assumptions)))}.</p></details>\n"
     )
 
 

@@ -70,7 +70,8 @@ def points(claim: Claim) -> Proof:
     )
     assumptions = ("rigid-body", "inertia-as-given", "bounded-push", "held-torque", *limited.assumptions, "target-at-rest")
     sign = "sign-at-once" if signs else "quaternion-as-fed"
-    said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
+    asked = f"{limited.text} but for errors" if limited.text else ""
+    said = "".join(f"; {part}" for part in (enumerated(start), asked) if part)
     return Statement(text + said, (*assumptions, "no-wheels", sign), "pointing")
 
 
