@@ -37,6 +37,7 @@ ASKED = program.ASKED["rigid-body"]
 TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
 """The other quaternion of the target, and half turns."""
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
+NEARBY = "converges near the inertia"
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 WRITTEN: dict[str, float | None] = {"stiffness": None, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
 """The numbers of a V that is the law's own."""

@@ -1,0 +1,74 @@
+"""Finds the claim about bodies whose inertia is near the one that the law was designed for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from math import floor, sqrt
+from typing import Any
+
+import numpy as np
+
+from starhold.certification.evidence.attitude import NEARBY, Loop, sign_words
+from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.squares import cofactors, largest_number, posed, settled, solved
+from starhold.kernel.loops import HYSTERESIS, SHORTEST, WHEELS
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.rules import Squares
+from starhold.parts.craft import tensor
+
+KNOWN = 18
+"""So many of the monomials of V' are enough."""
+LESS = (1e-3, 3e-3, 1e-2)
+"""Shares of the largest tolerance that are given away."""
+CALM = (1.0, 0.5, 0.25, 0.1, 0.05)
+"""Shares of the mixed term in V that are tried: with less of it the set is larger."""
+
+
+def find_near(loop: Loop, tolerance: float | None = None) -> None:
+    """Find the claim for the largest tolerance, at most 1, or for the one that is asked for. V = w.Jw/2 + 2 s (1 - q0) +
+    epsilon q.Jw, of which V' is linear in s, epsilon and epsilon times the tolerance."""
+    words = [word for word in loop.words if word == WHEELS]
+    told = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0))
+    try:
+        base, stiff, leaning, shifted = (falling(loop, words, *each) for each in told)
+    except RefusedError as reason:
+        loop.failed[NEARBY] = str(reason)
+        return
+    A, B, D = stiff.p - base.p, leaning.p - base.p, leaning.p - shifted.p
+    others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, KNOWN), strict=True) for c in parts]
+    z, J = base.z[:KNOWN], tensor(loop.loop.craft.inertia)
+    scales = dict.fromkeys(("w1", "w2", "w3"), sqrt(float(abs(A.terms[("q1", "w1")]) / J.max())) if A.terms else 1.0)
+    # Divided by epsilon it is linear in the tolerance.
+    largest = min(largest_number(posed(B, [-base.p, -A], others, z), scales, D) or 0.0, 1.0)
+    shown = max(largest if largest == 1.0 else floor(1e3 * largest * (1.0 - LESS[0])) / 1e3, 0.0)
+    loop.failed[NEARBY] = f"shown up to {100.0 * shown:.3g} %" if shown > 0.0 else "not shown for any tolerance"
+    if tolerance is not None and tolerance > largest:
+        return
+    for t in [min(tolerance or 1.0, largest)] if largest == 1.0 or tolerance else [largest * (1.0 - x) for x in LESS]:
+        t = float(f"{t:.3g}")
+        found = solved(posed(base.p, [-A, D * Fraction(t) - B], others, z), scales)
+        if found is not None and near(loop, words, t, *(float(f"{x:.4g}") for x in found[:2])):
+            return
+
+
+def falling(loop: Loop, words: list[str], s: float, epsilon: float, tolerance: float) -> Squares:
+    """Return what has to be shown of V', less what is known of the inertia."""
+    more = {"tolerance": tolerance, "lean": epsilon, "inertia.most": 1}
+    found = obligations(loop.claim(NEARBY, words, loop.crossed(s, epsilon), **more), loop.by_digest)[0]["V is non-increasing"]
+    assert isinstance(found, Squares)
+    return replace(found, p=settled(found)[0], known=())
+
+
+def near(loop: Loop, words: list[str], tolerance: float, s: float, epsilon: float) -> bool:
+    """Tell whether the claim is shown with this V."""
+    J, V = tensor(loop.loop.craft.inertia), loop.crossed(s, epsilon)
+    most = (float(np.linalg.eigvalsh(J)[-1]) + tolerance * float(np.trace(J))) * (1.0 + 1e-9)
+    told: dict[str, Any] = {"tolerance": tolerance, "lean": epsilon, "inertia.most": most}
+    if SHORTEST in sign_words(loop.loop):
+        level = (2.0 * s - 0.5 * epsilon**2 * most) * (1.0 - 1e-6)
+        if level <= 0.0:
+            return False
+        held = loop.contents(loop.form(V), Fraction(level))
+        told |= {"level": level, "angle": held["angle"], "rate": sqrt(2.0 * level / most) * (1.0 - 1e-7)}
+    return loop.try_to_show(loop.claim(NEARBY, [*words, *sign_words(loop.loop)], V, **told), loop.scales(V))
