@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from math import floor, sqrt
+from math import floor, log10, sqrt
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from starhold.certification.evidence.attitude import NEARBY, Loop, sign_words
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, settled, solved
-from starhold.kernel.loops import HYSTERESIS, SHORTEST, WHEELS
+from starhold.kernel.loops import SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.rules import Squares
 from starhold.parts.craft import tensor
@@ -21,8 +21,6 @@ KNOWN = 18
 """So many of the monomials of V' are enough."""
 LESS = (1e-3, 3e-3, 1e-2)
 """Shares of the largest tolerance that are given away."""
-CALM = (1.0, 0.5, 0.25, 0.1, 0.05)
-"""Shares of the mixed term in V that are tried: with less of it the set is larger."""
 
 
 def find_near(loop: Loop, tolerance: float | None = None) -> None:
@@ -38,24 +36,32 @@ def find_near(loop: Loop, tolerance: float | None = None) -> None:
     A, B, D = stiff.p - base.p, leaning.p - base.p, leaning.p - shifted.p
     others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, KNOWN), strict=True) for c in parts]
     z, J = base.z[:KNOWN], tensor(loop.loop.craft.inertia)
-    scales = dict.fromkeys(("w1", "w2", "w3"), sqrt(float(abs(A.terms[("q1", "w1")]) / J.max())) if A.terms else 1.0)
+    unit = sqrt(float(abs(A.terms[("q1", "w1")]) / J.max())) if A.terms else 1.0
+    scales = {f"w{k}": unit for k in (1, 2, 3)}
     # Divided by epsilon it is linear in the tolerance.
-    largest = min(largest_number(posed(B, [-base.p, -A], others, z), scales, D) or 0.0, 1.0)
-    shown = max(largest if largest == 1.0 else floor(1e3 * largest * (1.0 - LESS[0])) / 1e3, 0.0)
-    loop.failed[NEARBY] = f"shown up to {100.0 * shown:.3g} %" if shown > 0.0 else "not shown for any tolerance"
-    if tolerance is not None and tolerance > largest:
+    largest = largest_number(posed(B, [-base.p, -A], others, z), scales, D) or 0.0
+    if largest <= 0.0:
+        loop.failed[NEARBY] = "not shown for any tolerance"
         return
-    for t in [min(tolerance or 1.0, largest)] if largest == 1.0 or tolerance else [largest * (1.0 - x) for x in LESS]:
-        t = float(f"{t:.3g}")
+    tried = [1.0] if largest > 1.0 else [three_digits(largest * (1.0 - share)) for share in LESS]
+    for t in tried if tolerance is None else [tolerance] * (tolerance <= tried[0]):
         found = solved(posed(base.p, [-A, D * Fraction(t) - B], others, z), scales)
         if found is not None and near(loop, words, t, *(float(f"{x:.4g}") for x in found[:2])):
             return
+    loop.failed[NEARBY] = f"shown up to {100.0 * tried[0]:.3g} %"
+
+
+def three_digits(x: float) -> float:
+    """Return a number rounded down to three digits."""
+    unit = 10.0 ** (floor(log10(x)) - 2)
+    return float(f"{floor(x / unit) * unit:.3g}")
 
 
 def falling(loop: Loop, words: list[str], s: float, epsilon: float, tolerance: float) -> Squares:
     """Return what has to be shown of V', less what is known of the inertia."""
     more = {"tolerance": tolerance, "lean": epsilon, "inertia.most": 1}
-    found = obligations(loop.claim(NEARBY, words, loop.crossed(s, epsilon), **more), loop.by_digest)[0]["V is non-increasing"]
+    claim = loop.claim(NEARBY, words, loop.crossed(s, epsilon), **more)
+    found = obligations(claim, loop.by_digest)[0]["V is non-increasing"]
     assert isinstance(found, Squares)
     return replace(found, p=settled(found)[0], known=())
 
