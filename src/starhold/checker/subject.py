@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from flint import arb, fmpq
+from flint import arb
 
 from starhold.algebra.polynomial import Monomial, Polynomial, constants
 from starhold.algebra.vector import cross, dot, scale, subtract

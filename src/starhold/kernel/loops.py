@@ -78,9 +78,9 @@ class Loop:
 
 
 class AttitudeLoop(Loop):
-    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are. `near`: such
-    a J near the given one, J0: no entry is off by more than `tolerance` sqrt(J0_ii J0_kk). `quotients`: programs may divide
-    by the state, but not by quotients, and take no roots of it."""
+    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are. `near`:
+    such a J near the given one, J0: no entry is off by more than `tolerance` sqrt(J0_ii J0_kk). `quotients`: programs may
+    divide by the state, but not by quotients, and take no roots of it."""
 
     driven = ("w1", "w2", "w3")
 
