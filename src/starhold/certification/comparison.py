@@ -7,8 +7,7 @@ from fractions import Fraction
 from math import inf, isfinite
 from typing import Any
 
-from starhold.certification.evidence.attitude import CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
-from starhold.certification.evidence.claims import ANY_ANGLE
+from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends

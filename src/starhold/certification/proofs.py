@@ -21,8 +21,8 @@ from starhold.certification.certificate import (
     Obligation,
     Proof,
 )
-from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.claims import ANY_ANGLE, find_claims, find_taken_over
+from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
+from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import certificate, obligations
 from starhold.certification.evidence.refuted import (
     AWAY,
@@ -148,7 +148,10 @@ def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         }
     # Of an inertia that is not known no rate is told.
     level, angle, rate = (below(_exact(numbers[n])) if n in numbers else None for n in ("level", "angle", "rate"))
-    return {"level": level, "start": level, "everything": False, "slew_angle": angle, "rate": rate, "rate_everywhere": None}
+    whole = numbers.get("start.angle") == ANY_ANGLE
+    everywhere = below(_exact(numbers["start.rate"])) if whole else None
+    begun = {"slew_angle": angle, "rate": rate, "rate_everywhere": everywhere}
+    return {"level": level, "start": level, "everything": False, **begun}
 
 
 def _limit(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:

@@ -41,6 +41,8 @@ NEARBY = "converges near the inertia"
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 WRITTEN: dict[str, float | None] = {"stiffness": None, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
 """The numbers of a V that is the law's own."""
+ANY_ANGLE = 7
+"""An angle (rad) that no turn exceeds."""
 LEANS = 4e-3
 """The share of the law's own V that a mixed term takes."""
 FASTER = 1.0 + 1e-2

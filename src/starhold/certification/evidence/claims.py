@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.certification.evidence.attitude import ASKED, CONVERGES, EVENLY, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
+from starhold.certification.evidence.attitude import (
+    ANY_ANGLE,
+    ASKED,
+    CONVERGES,
+    EVENLY,
+    SAMPLED,
+    SLIDING,
+    STRICTLY,
+    Loop,
+    sign_words,
+)
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.inertia import find_near
 from starhold.certification.evidence.isotropic import find_isotropic
@@ -24,8 +34,6 @@ from starhold.parts.craft import tensor
 ENDING = (CONVERGES, EVENLY, STRICTLY)
 """Theorems about where motions of the given body end."""
 LIMITS = {"limit", "limit.norm", "motors.0"}
-ANY_ANGLE = 7
-"""An angle (rad) that no turn exceeds."""
 
 
 def find_claims(subject: Subject, turn: float | None = None, tolerance: float | None = None) -> Loop:

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from starhold.certification.evidence.attitude import NEARBY, Loop, sign_words
+from starhold.certification.evidence.attitude import ANY_ANGLE, NEARBY, Loop, sign_words
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, settled, solved
-from starhold.kernel.loops import SHORTEST, WHEELS
+from starhold.kernel.loops import HYSTERESIS, WHEELS
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.rules import Squares
 from starhold.parts.craft import tensor
@@ -21,6 +21,8 @@ KNOWN = 18
 """So many of the monomials of V' are enough."""
 LESS = (1e-3, 3e-3, 1e-2)
 """Shares of the largest tolerance that are given away."""
+CALM = (0.5, 0.25, 0.12, 0.06, 0.03)
+"""Shares of the mixed term in V that are tried."""
 
 
 def find_near(loop: Loop, tolerance: float | None = None) -> None:
@@ -45,9 +47,19 @@ def find_near(loop: Loop, tolerance: float | None = None) -> None:
         return
     tried = [1.0] if largest > 1.0 else [three_digits(largest * (1.0 - share)) for share in LESS]
     for t in tried if tolerance is None else [tolerance] * (tolerance <= tried[0]):
-        found = solved(posed(base.p, [-A, D * Fraction(t) - B], others, z), scales)
-        if found is not None and near(loop, words, t, *(float(f"{x:.4g}") for x in found[:2])):
-            return
+        mixed = B - D * Fraction(t)
+        found = solved(posed(base.p, [-A, -mixed], others, z), scales)
+        pairs = [] if found is None else [(found[0], found[1])]
+        if pairs and HYSTERESIS in sign_words(loop.loop):
+            # With less of the mixed term the set is larger.
+            for epsilon in (share * pairs[0][1] for share in CALM):
+                found = solved(posed(base.p + mixed * Fraction(epsilon), [-A], others, z), scales)
+                pairs += [] if found is None else [(found[0], epsilon)]
+        choices = [made(loop, t, *(float(f"{x:.4g}") for x in pair)) for pair in pairs]
+        choices.sort(key=lambda told: told[1].get("level", 0), reverse=True)
+        for V, told in choices:
+            if loop.try_to_show(loop.claim(NEARBY, [*words, *sign_words(loop.loop)], V, **told), loop.scales(V)):
+                return
     loop.failed[NEARBY] = f"shown up to {100.0 * tried[0]:.3g} %"
 
 
@@ -66,15 +78,25 @@ def falling(loop: Loop, words: list[str], s: float, epsilon: float, tolerance: f
     return replace(found, p=settled(found)[0], known=())
 
 
-def near(loop: Loop, words: list[str], tolerance: float, s: float, epsilon: float) -> bool:
-    """Tell whether the claim is shown with this V."""
-    J, V = tensor(loop.loop.craft.inertia), loop.crossed(s, epsilon)
+def made(loop: Loop, tolerance: float, s: float, epsilon: float) -> tuple[str, dict[str, Any]]:
+    """Return this V, and the numbers of the claim with it."""
+    J, V, signs = tensor(loop.loop.craft.inertia), loop.crossed(s, epsilon), sign_words(loop.loop)
     most = (float(np.linalg.eigvalsh(J)[-1]) + tolerance * float(np.trace(J))) * (1.0 + 1e-9)
     told: dict[str, Any] = {"tolerance": tolerance, "lean": epsilon, "inertia.most": most}
-    if SHORTEST in sign_words(loop.loop):
-        level = (2.0 * s - 0.5 * epsilon**2 * most) * (1.0 - 1e-6)
-        if level <= 0.0:
-            return False
-        held = loop.contents(loop.form(V), Fraction(level))
-        told |= {"level": level, "angle": held["angle"], "rate": sqrt(2.0 * level / most) * (1.0 - 1e-7)}
-    return loop.try_to_show(loop.claim(NEARBY, [*words, *sign_words(loop.loop)], V, **told), loop.scales(V))
+    if not signs:
+        return V, told
+    # V where the sign of the quaternion changes, at least.
+    level = 2.0 * s - 0.5 * epsilon**2 * most
+    if HYSTERESIS in signs:
+        h = loop.loop.hysteresis_width
+        lost = epsilon**2 * most * (1.0 - h * h)
+        x = max(s * h / lost - 0.5, 1e-3)
+        level = 4.0 * s * h * x + 2.0 * s * (1.0 + h) - lost * (0.5 + 2.0 * x + 2.0 * x * x)
+        told |= {"hysteresis": h, "jump.lean": 2.0 * epsilon * x}
+    level *= 1.0 - 1e-6
+    if level <= 0.0:
+        return V, told
+    angle = loop.contents(loop.form(V), Fraction(level))["angle"]
+    told |= {"level": level, "angle": angle, "rate": sqrt(2.0 * level / most) * (1.0 - 1e-7)}
+    everywhere = sqrt(2.0 * max(level - 4.0 * s, 0.0) / most) - epsilon
+    return V, told | ({"start.angle": ANY_ANGLE, "start.rate": everywhere * (1.0 - 1e-6)} if everywhere > 0.0 else {})

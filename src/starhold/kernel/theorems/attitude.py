@@ -71,9 +71,10 @@ def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
     yield "V is least on target", Squares(loop.lyapunov, z, len(z), known, [loop.sphere], energy)
 
 
-def kinetic(loop: AttitudeLoop) -> list[Poly]:
-    """Return v.Jv for an inertia that is not known."""
-    return [dot(loop.leaning, apply(loop.J, loop.leaning))] if loop.any_inertia else []
+def kinetic(loop: AttitudeLoop, more: Fraction | int = 0) -> list[Poly]:
+    """Return v.Jv for an inertia that is not known, where v leans by so much more."""
+    v = [x + more * q for x, q in zip(loop.leaning, loop.q[1:], strict=True)]
+    return [dot(v, apply(loop.J, v))] if loop.any_inertia else []
 
 
 def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
@@ -109,6 +110,12 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         width, assumed = numbers["hysteresis"], "sign-at-once"
         yield "width", Exceeds(min(width, 1 - width))
         jump, inside = V - V.at({f"q{k}": -x for k, x in enumerate(q)}), [] if level is None else [level - V]
+        if loop.near:
+            # So much of the level leaves nothing of J but a form that is positive, and q.Jq.
+            more = numbers["jump.lean"]
+            demand(level is not None and more > 0, "a jump needs a level and a positive lean")
+            jump = jump - 2 * loop.lean / more * inside[0]
+            inside = [*kinetic(loop, more), *loop.heaviest(q[1:])]
         yield "a jump lowers V", Squares(jump, [poly(1), *q, *w], 1, [-width - q[0], *inside], [loop.sphere])
         said.append(f"comes to rest on target, with the quaternion's sign chosen anew at q0 < -{above(width)}")
     elif loop.claim.taken.get(SHORTEST):
@@ -136,7 +143,7 @@ def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:
     held = yield from contents(loop, loop.lyapunov)
     limited = yield from within_limits(loop)
     if loop.near:
-        said = [f"with every J_ik off by up to {below(loop.claim.numbers['tolerance'])} sqrt(J_ii J_kk)", *said]
+        said = [f"with every J_ik off by up to {below(loop.claim.numbers['tolerance'])} sqrt(J_ii J_kk),", *said]
     handed = loop.claim.taken.get(HANDED)
     told = "level" not in loop.claim.numbers or "start.rate" in loop.claim.numbers
     demand(not handed or told, "what is handed over is not bounded")
@@ -168,7 +175,8 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part:
         said.append(f"on target every rate up to {below(rate)} rad/s")
     if "start.rate" in numbers:
         angle, rate = numbers["start.angle"], numbers["start.rate"]
-        starts = [*near(angle), rate * rate - dot(w, w)]
+        starts = [*near(angle), rate * rate - dot(w, w), *loop.heaviest(loop.leaning)]
+        starts += [dot(q[1:], apply(loop.J, q[1:]))] * loop.near
         yield "states", Squares(inside, [one, *q, *w], 0, starts, [loop.sphere])
         said.append(f"every state turned by up to {below(angle)} rad at up to {below(rate)} rad/s")
     return said
