@@ -48,7 +48,6 @@ def by_hand(law, gains, claims, **changes):
         "assumed_away": [],
         "bounded_away": [],
         "wheels": None,
-        "switch": None,
         **changes,
     }
     outcome = "undecided" if [claim["kind"] for claim in claims] == ["sampling"] else "proved"

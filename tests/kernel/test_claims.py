@@ -20,6 +20,8 @@ from tests.tiers import leading
 KINDS = {
     "converges": "convergence",
     "converges from both quaternions": "convergence",
+    "converges strictly": "convergence",
+    "converges near the inertia": "inertia",
     "converges whatever the inertia": "inertia",
     "converges from both quaternions whatever the inertia": "inertia",
     "converges without a preferred axis": "region",

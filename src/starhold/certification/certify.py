@@ -13,9 +13,8 @@ from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
 from starhold.certification.disturbance import disturbance
-from starhold.certification.evidence.attitude import SAMPLED, SLIDING
+from starhold.certification.evidence.attitude import NEARBY, SAMPLED, SLIDING
 from starhold.certification.evidence.isotropic import ISOTROPIC
-from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import needed, torque_limit
 from starhold.certification.motion import Motion
 from starhold.certification.openness import bounded_torque, named
@@ -61,9 +60,9 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
             claims = _claims(subject, wanted)
     except UnreadableError as reason:
         # Nothing is known of such a law, whatever else was asked for.
-        claims = [_undecided("convergence", everywhere, subject, str(reason))]
+        claims = [undecided("convergence", everywhere, subject, str(reason))]
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
-        claims = [_undecided("convergence", everywhere, subject, f"{APART}: {reason}")]
+        claims = [undecided("convergence", everywhere, subject, f"{APART}: {reason}")]
     about = described(subject, [claim.kind for claim in claims])
     return Certificate(name or loop.law.name, about, named(claims, loop))
 
@@ -73,29 +72,34 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
     sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
     if loop.remembers and loop.law.lyapunov is not None:
         everywhere = {"rate_everywhere": None, "everything": True}
-        claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
+        claims.append(undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
-        proved, failed = proved_claims(subject, wanted.slew_angle, wanted.rate)
+        proved, failed = proved_claims(subject, wanted.slew_angle, wanted.rate, wanted.inertia_tolerance)
         if loop.law.lyapunov is not None:
-            claims.extend(_by_lyapunov(subject, wanted, proved))
+            claims.extend(_by_lyapunov(subject, wanted, proved, failed))
         else:
             if loop.law.hook("single_root") is not None:
-                claims.append(proved.get("region") or _undecided("region", {}, subject, failed[ISOTROPIC]))
+                claims.append(proved.get("region") or undecided("region", {}, subject, failed[ISOTROPIC]))
             if loop.law.hook("surface") is not None and loop.wheels is None:
                 torque = {"torque": [above(m + subject.disturbance) for m in subject.modelled]}
-                claims.append(proved.get("sliding") or _undecided("sliding", torque, subject, failed[SLIDING]))
+                claims.append(proved.get("sliding") or undecided("sliding", torque, subject, failed[SLIDING]))
             claims.extend(_unshown(subject, wanted))
-        sampled = proved.get("sampling") or sampling(Motion(subject))
-        if sampled is not None and sampled.proof is None and sampled.outcome != "undecided":
-            numbers = {"period": loop.period, "longest": None, "every_shorter": False}
-            reason = Obligation("form", EXACT, "undecided", {"reason": failed[SAMPLED]})
-            sampled = replace(sampled, numbers=numbers, obligations=(reason,))
-        claims.extend([] if sampled is None else [sampled])
+        claims.extend(between_samples(subject, proved, failed))
         claims = needed(claims, Motion(subject)) if loop.law.lyapunov is not None else claims
     return claims
 
 
-def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) -> list[Claim]:
+def between_samples(subject: Subject, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:
+    """The claim about torque held between samples, proved or not, of a law that is linear near rest."""
+    sampled = proved.get("sampling") or sampling(Motion(subject))
+    if sampled is not None and sampled.proof is None and sampled.outcome != "undecided":
+        numbers = {"period": subject.loop.period, "longest": None, "every_shorter": False}
+        reason = Obligation("form", EXACT, "undecided", {"reason": failed[SAMPLED]})
+        sampled = replace(sampled, numbers=numbers, obligations=(reason,))
+    return [] if sampled is None else [sampled]
+
+
+def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:
     rate = "best" if wanted.rate is None else None if wanted.rate == float("inf") else wanted.rate
     main, basin = proved.get("convergence"), None
     pushed = subject.disturbance != 0 or subject.modelled_norm != 0
@@ -103,7 +107,7 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) 
     limit, box = proved.get("wheels" if wheeled else "torque-limit"), proved.get("inertia")
     if main is not None and main.outcome == "proved" and rate != "best" and not main.numbers["everything"]:
         main = None
-    if main is None or main.outcome != "proved" or limit is None or box is None or pushed:
+    if main is None or main.outcome != "proved" or limit is None or pushed:
         derived, found, own = converge(subject, rate)
         # What refutes one V refutes no other.
         main = derived if main is None or derived.outcome == "proved" != main.outcome else main
@@ -111,7 +115,8 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) 
         basin = own or found
     if basin is not None:
         limit = limit or (saturation if wheeled else torque_limit)(basin, wanted.slew_angle)
-        box = box or inertia_box(basin, wanted.inertia_tolerance)
+    if box is None and wanted.inertia_tolerance is not None:
+        box = undecided("inertia", {"tolerance": wanted.inertia_tolerance}, subject, failed[NEARBY])
     more = (
         (limit, wanted.slew_angle or (wheeled and wanted.momentum is not None)),
         (None if basin is None else disturbance(basin), wanted.disturbance),
@@ -134,14 +139,16 @@ def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
         asked.append(("torque-limit", {"slew_angle": turn, "kind": subject.loop.limit, "limit": limit}))
     if tolerance is not None:
         asked.append(("inertia", {"tolerance": tolerance}))
-    return [_undecided(kind, numbers, subject, "the law declares no V to show it with") for kind, numbers in asked]
+    return [undecided(kind, numbers, subject, "the law declares no V to show it with") for kind, numbers in asked]
 
 
-def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
+def undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
+    """A claim of which it is not known whether it holds, with the reason."""
     limits = {"torque-limit": (), "wheels": FREE}
     assumptions = assumed(subject, limits=limits[kind]) if kind in limits else assumed(subject)
     if kind == "sliding":
         assumptions = assumed(subject, outside=("bounded-outside-torque",))
     if kind == "inertia":
-        assumptions = told(subject, numbers["tolerance"])
+        body, _, *others = assumed(subject, outside=("no torque from outside", "target at rest"))
+        assumptions = (body, "inertia within the tolerance", *others)
     return Claim(kind, numbers, {}, assumptions, (Obligation("form", EXACT, "undecided", {"reason": reason}),))

@@ -23,7 +23,6 @@ from starhold.checker.exact import (
     plus,
     rational,
     root_above,
-    times,
     transpose,
     within_circle,
 )
@@ -69,11 +68,11 @@ def _names(claim: Numbers) -> list[str]:
     return [obligation["name"] for obligation in claim["obligations"]]
 
 
-def _told(region: Region[Any], numbers: Numbers, rate: str = "rate", any_inertia: bool = False) -> Obligation:
+def _told(region: Region[Any], numbers: Numbers, rate: str = "rate") -> Obligation:
     everything = numbers.get("everything", False)
 
     def contents() -> str:
-        return region.contents(numbers["slew_angle"], numbers[rate], numbers["rate_everywhere"], everything, any_inertia)
+        return region.contents(numbers["slew_angle"], numbers[rate], numbers["rate_everywhere"], everything)
 
     return "numbers", "", contents
 
@@ -93,40 +92,6 @@ def convergence(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """Every motion from {V <= start} comes to rest on target."""
     region = claimed(subject, claim)
     return [*_converges(region, claim), _told(region, claim["numbers"])]
-
-
-def hand_over(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
-    """Motions from {V <= start} come to rest on target, and the set holds all states with which the mode before may end."""
-    region, numbers = claimed(subject, claim), claim["numbers"]
-    rate, angle, part = (optional(x) for x in (numbers["rate"], numbers["angle"], claim["witness"]["attitude_level"]))
-
-    def inside() -> str:
-        everything, switch = numbers["everything"], subject.switch
-        if switch is None:
-            raise CheckError("there is no switch")
-        for name, most, level in zip(("rate", "angle"), (rate, angle), switch, strict=True):
-            demand(most is None or (level is not None and most >= level), f"the switch lets the {name} be larger")
-        demand(everything == (region.level is None) == (region.start is None), "only without a level it is everything")
-        if everything:
-            return "every state is in it"
-        start, even = region.start, is_even(region.loop)
-        if rate is None or part is None or start is None:
-            raise CheckError("the rate is not bounded")
-        demand(rate >= 0 and 0 < part <= start, "the rate is negative, or there is no room for the attitude")
-        for P in region.frame.tops:
-            left = plus(identity(3, 2 * (start - part)), times(rate**2, P), -1)
-            demand(definite(left, strictly=False), "with such a rate V may be larger")
-        shorter = subject.sign_policy == "shortest" and not even
-        if angle is None:
-            demand((2 if shorter else 1) * part >= region.highest, "at some attitude V may be larger")
-        else:
-            # Which of its quaternions tells an attitude matters but for these.
-            demand(even or shorter, "an attitude may be told by the longer of its quaternions")
-            below = _region(region.loop, numbers["level"], claim["witness"]["attitude_level"], claim["witness"])
-            demand(angle >= 0 and below.holds_turn(angle), "at such an angle V may be larger")
-        return "its largest V is at most that of the set"
-
-    return [*_converges(region, claim), ("holds what is handed over", BALLS, inside)]
 
 
 def torque_limit(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
@@ -176,25 +141,6 @@ def wheels_limits(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
 
     proofs: list[Obligation] = [("torque", BALLS, torque), ("momentum", SIGN, momentum)]
     return [*_converges(region, claim, bounded=True), *proofs, _told(region, numbers)]
-
-
-def inertia(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
-    """Convergence for every inertia of a box, or for every inertia."""
-    numbers, witness = claim["numbers"], claim["witness"]
-    tolerance, stiffness = optional(numbers["tolerance"]), optional(witness["stiffness"])
-    demand(tolerance is None or 0 < tolerance <= 1, "the tolerance is not between 0 and 1")
-    loop = ExactLoop(subject, stiffness, shifted=True, tolerance=tolerance)
-    region = _region(loop, witness["level"], numbers["start"], witness)
-    demand(stiffness is not None or isinstance(region, EvenRegion), "there is no stiffness")
-    demand((tolerance is None) == (region.epsilon == 0), "a cross term is for a tolerance, and only for one")
-    return [
-        ("form", EXACT, region.form),
-        ("positive", SIGN, region.positive),
-        ("descent", SIGN, region.descent),
-        region.settles(),
-        region.cover(_names(claim), SIGN),
-        _told(region, numbers, any_inertia=tolerance is None),
-    ]
 
 
 def disturbance(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
@@ -295,11 +241,11 @@ def _instead(old: str, *new: str) -> tuple[str, ...]:
 
 CLAIMS: dict[str, Kind] = {
     "convergence": Kind(_BASE, convergence),
-    "hand-over": Kind(_BASE, hand_over),
+    "hand-over": Kind(_BASE, by_the_kernel),
     "torque-limit": Kind(_instead(UNLIMITED), torque_limit, wheels=False),
     "wheels": Kind(_instead(UNLIMITED, "frictionless-wheels", "bounded-momentum"), wheels_limits, wheels=True),
     # What a law cancels of a torque that depends on the inertia is not what another inertia feels.
-    "inertia": Kind((_BASE[0], _BOX, *_BASE[2:6], "no-outside-torque", "target-at-rest"), inertia, _BOX),
+    "inertia": Kind((_BASE[0], _BOX, *_BASE[2:6], "no-outside-torque", "target-at-rest"), by_the_kernel, _BOX),
     "disturbance": Kind(_instead(_BASE[6], "unknown-outside-torque"), disturbance),
     "sampling": Kind(
         (*_BASE[:4], "linear-motion", _BASE[5], "no-outside-torque"),

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from starhold.checker.exact import demand
-from starhold.laws.modes import ENDS
 
 Test: TypeAlias = Callable[[Any], bool]
 
@@ -122,7 +121,6 @@ HOWS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("form", "target"), _EXACT),
     "descent": _SIGN + _BALLS,
     "only equilibrium": ("LaSalle",),
-    "holds what is handed over": _BALLS,
     "torque": _BALLS,
     "strict": _SIGN + _BALLS,
     "other equilibrium repels": _SIGN + _ROOTS,
@@ -149,16 +147,6 @@ _HISTORY: dict[str, Test] = {
     "attitudes": _list(_list(_number, 4)),
     "rates": _list(_VECTOR),
 }
-_TARGET: dict[str, Test] = {
-    "target": _text,
-    "attitude": _or_none(_list(_number, 4)),
-    "history": _or_none(_within(_HISTORY)),
-}
-_SWITCH: dict[str, Test] = {
-    "levels": lambda x: _object(x) and set(x) <= set(ENDS) and all(map(_number, x.values())),
-    "before": _within(_TARGET),
-    "after": _within(_TARGET),
-}
 SUBJECT: dict[str, Test] = {
     "law": _text,
     "gains": lambda x: _object(x) and all(map(_gain, x.values())),
@@ -180,7 +168,6 @@ SUBJECT: dict[str, Test] = {
     "assumed_away": _list(_text),
     "bounded_away": _list(_text),
     "wheels": _or_none(_within(_WHEELS)),
-    "switch": _or_none(_within(_SWITCH)),
 }
 UNKNOWN_BODY: dict[str, Test] = {"body": _text, "law": _text}
 """The subject where nothing is known of the body."""
@@ -205,7 +192,7 @@ _CONTENTS: dict[str, Test] = {
 }
 NUMBERS: dict[str, dict[str, Test]] = {
     "convergence": {"level": _MAYBE, **_CONTENTS},
-    "hand-over": {**dict.fromkeys(("level", "start", "rate", "angle"), _MAYBE), "everything": _flag},
+    "hand-over": dict.fromkeys(("rate", "angle"), _MAYBE),
     "torque-limit": {"level": _MAYBE, **_CONTENTS, "limit": _number, "kind": _one("axis", "norm")},
     "wheels": {
         "level": _MAYBE,
@@ -213,7 +200,7 @@ NUMBERS: dict[str, dict[str, Test]] = {
         "momentum": _number,
         **dict.fromkeys(("motors", "wheel_momentum"), _list(_number)),
     },
-    "inertia": {"tolerance": _MAYBE, **_CONTENTS},
+    "inertia": {"tolerance": _number},
     "disturbance": {
         **dict.fromkeys(("torque", "start", "level", "slew_angle", "rate_start", "angle", "rate"), _number),
         "rate_everywhere": _MAYBE,
@@ -237,10 +224,10 @@ STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, 
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
     "convergence": {**_PROOF, "rate_bound": _MAYBE},
-    "hand-over": {**_PROOF, **dict.fromkeys(("rate_bound", "attitude_level"), _MAYBE)},
+    "hand-over": {},
     "torque-limit": {**_PROOF, **dict.fromkeys(("rate_bound", "shift", "weight"), _MAYBE)},
     "wheels": {**_PROOF, "rate_bound": _MAYBE},
-    "inertia": {**_PROOF, "level": _MAYBE},
+    "inertia": {},
     "disturbance": {
         **_PROOF,
         "rate_bound": _MAYBE,

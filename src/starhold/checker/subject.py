@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from flint import arb, fmpq
+from flint import arb
 
 from starhold.algebra.polynomial import Monomial, Polynomial, constants
 from starhold.algebra.vector import cross, dot, scale, subtract
@@ -37,9 +37,6 @@ from starhold.laws.catalogue import Law, catalogue
 from starhold.parts.craft import EARTH, Craft, check_inertia, compact
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 
-ROUNDING = fmpq(1, 2**46)
-"""Share by which a law's comparison of a rate or an angle with a level is off at most."""
-
 
 def named(letter: str, first: int = 1) -> tuple[str, ...]:
     """The three variables of a vector, or the four of a quaternion."""
@@ -54,8 +51,7 @@ def variables(names: Sequence[str]) -> Any:
 @dataclass(frozen=True)
 class LoopSubject:
     """The subject of a certificate, its numbers exact; `memory` is what the law starts with, `whole` the inertia with that
-    of rotors about their axes, `perigee` the orbit's where the gravity gradient is felt, `switch` the rate and the angle up
-    to which another mode hands over (None: any)."""
+    of rotors about their axes, `perigee` the orbit's where the gravity gradient is felt."""
 
     law: Law
     gains: Any
@@ -76,7 +72,6 @@ class LoopSubject:
     period: Any
     wheels: SubjectWheels | None
     perigee: Any | None
-    switch: tuple[Any | None, Any | None] | None
 
 
 def read_subject(given: Mapping[str, Any]) -> LoopSubject:
@@ -125,30 +120,8 @@ def read_subject(given: Mapping[str, Any]) -> LoopSubject:
         period=rational(given["control_period"]),
         wheels=wheels,
         perigee=perigee,
-        switch=None if given["switch"] is None else _handed_over(given),
         **exact,
     )
-
-
-def _handed_over(given: Mapping[str, Any]) -> tuple[Any | None, Any | None]:
-    """Bounds of the rate and the angle, relative to the target, with which the mode before ends by the tests of its switch,
-    as rounding may pass them; None for no bound."""
-    switch = given["switch"]
-    before, after = switch["before"], switch["after"]
-    # Of a target that claims leave out nothing is known.
-    known = after["target"] not in given["assumed_away"]
-    demand(not known or all(after[key] == given[key] for key in ("target", "history")), "the switch is to another target")
-    inertial = [target["target"] == "inertial" for target in (before, after)]
-    demand(inertial == [target["attitude"] is not None for target in (before, after)], "an attitude is for a target at rest")
-    levels = {test: rational(level) for test, level in switch["levels"].items()}
-    demand(all(level > 0 for level in levels.values()), "a level of the switch is not positive")
-    same = known and before == after
-    relative = same or all(inertial)
-    rates = [*([levels.get("rate_below")] if relative else ()), *([levels.get("body_rate_below")] if inertial[1] else ())]
-    # Sines do not tell angles near half a turn apart.
-    angle = levels.get("angle_below") if same else None
-    angle = None if angle is None or angle > 3 else angle * (1 + ROUNDING)
-    return min((rate * (1 + ROUNDING) for rate in rates if rate is not None), default=None), angle
 
 
 def gradient(whole: Rows) -> Any:

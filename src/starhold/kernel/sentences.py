@@ -11,6 +11,7 @@ from fractions import Fraction
 ASSUMPTIONS = {
     "rigid-body": "the body is rigid",
     "inertia-as-given": "its inertia is exactly as given",
+    "inertia-near": "its inertia is near the one given",
     "exact-measurement": "measurements are exact",
     "ideal-actuators": "actuators give at once what the law asks",
     "continuous-torque": "the torque is applied continuously",

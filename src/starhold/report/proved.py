@@ -36,7 +36,6 @@ SYMBOLS = {
     "reach": ("|x|, at most", ""),
     "epsilon": ("ε in V + ε q·Jω", ""),
     "rho": ("share of V that the added term stays within", ""),
-    "attitude_level": ("part of V left to the attitude at the hand-over", ""),
     "rate_bound": ("rate up to which V is shown to fall", "rad/s"),
     "tau": ("τ: a torque M does work of at most τ |Wᵀω + εq|² + M²/(4τ)", ""),
     "beta": ("β: share of V + ε q·Jω that is left of the fall", "1/s"),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from math import acos, asin, inf, isfinite, pi, sqrt
+from math import acos, asin, inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,10 @@ from starhold.certification.evidence.finding import NotFoundError, complete, obl
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved, squares
 from starhold.certification.subject import Subject, above
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, demand
+from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
-from starhold.kernel.rules import Solves, Squares
+from starhold.kernel.rules import Obligation, Solves, Squares
 from starhold.laws import program
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -37,9 +37,12 @@ ASKED = program.ASKED["rigid-body"]
 TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
 """The other quaternion of the target, and half turns."""
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
+NEARBY = "converges near the inertia"
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 WRITTEN: dict[str, float | None] = {"stiffness": None, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
 """The numbers of a V that is the law's own."""
+ANY_ANGLE = 7
+"""An angle (rad) that no turn exceeds."""
 LEANS = 4e-3
 """The share of the law's own V that a mixed term takes."""
 FASTER = 1.0 + 1e-2
@@ -301,9 +304,7 @@ class Loop:
     def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
         """Return what has to be shown of V'."""
         claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
-        found = obligations(claim, self.by_digest)[0].get("V is non-increasing")
-        demand(isinstance(found, Squares), "a law that switches has no V that falls strictly")
-        return found  # pyright: ignore[reportReturnType]
+        return fall(obligations(claim, self.by_digest)[0])
 
     def crossed(self, s: float, epsilon: float) -> str:
         """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw."""
@@ -443,7 +444,15 @@ class Loop:
         lean = 0.5 * LEANS * any({"q", "w"} == {name[0] for name in m} for m in form.terms)
         energy = (sqrt(lean * lean * s + float(level) - 2.0 * s) - lean * sqrt(s)) ** 2
         fastest = sqrt(2.0 * energy / float(np.linalg.eigvalsh(P)[-1])) * less
-        return {"angle": angle, "rate": rate * less, "start.angle": float(np.nextafter(2.0 * pi, 7.0)), "start.rate": fastest}
+        return {"angle": angle, "rate": rate * less, "start.angle": ANY_ANGLE, "start.rate": fastest}
+
+
+def fall(wanted: Mapping[str, Obligation]) -> Squares:
+    """Return what has to be shown of V'. RefusedError for a law that has cases."""
+    found = wanted.get("V is non-increasing")
+    if not isinstance(found, Squares):
+        raise RefusedError("the law switches")
+    return found
 
 
 def curvature(form: Poly, x: str) -> NDArray[np.float64]:

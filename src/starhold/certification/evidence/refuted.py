@@ -47,8 +47,14 @@ def find_refuted(loop: Loop, turn: float | None = None, rate: float | None = Non
             _ = against_limit(loop, loop.lyapunov(), turn) or against_limit(loop, ends[0]["programs"]["lyapunov"], turn)
     if hasattr(flown.law.module, "surface") and SLIDING not in shown and flown.wheels is None:
         against_surface(loop)
-    if SAMPLED not in shown and any(abs(complex(*z)) > 1.0 for z in loop.eigenvalues):
-        loop.try_to_show(loop.claim(UNSETTLED, [], None, period=flown.period), {})
+    against_sampling(loop)
+
+
+def against_sampling(loop: Loop) -> None:
+    """Find that the loop is unstable with the torque held between samples."""
+    shown = any(claim["theorem"] == SAMPLED for claim in loop.claims)
+    if not shown and any(abs(complex(*z)) > 1.0 for z in loop.eigenvalues):
+        loop.try_to_show(loop.claim(UNSETTLED, [], None, period=loop.loop.period), {})
 
 
 def state(t: Sequence[float] | Floats, w: Sequence[float] | Floats = (0.0, 0.0, 0.0)) -> dict[str, float]:
