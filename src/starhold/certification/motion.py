@@ -15,7 +15,7 @@ from flint import fmpq
 
 from starhold.algebra.polynomial import Condition, Polynomial, constants, jointly, pieces, reciprocal
 from starhold.algebra.quaternion import derivative, vector_part
-from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
+from starhold.algebra.vector import add, apply, cross, dot, subtract
 from starhold.certification.matrices import Rows
 from starhold.certification.subject import Subject, direction, exact_craft
 from starhold.laws.interface import Measurement
@@ -24,7 +24,6 @@ from starhold.parts.craft import Craft
 
 ATTITUDE, RATE = ("q0", "q1", "q2", "q3"), ("w1", "w2", "w3")
 AXES = ATTITUDE[1:]
-ENTRIES = (("j11", "j12", "j13"), ("j12", "j22", "j23"), ("j13", "j23", "j33"))
 Truths = tuple[tuple[Condition, bool], ...]
 
 
@@ -35,36 +34,16 @@ class ShapeError(ArithmeticError):
 @dataclass(frozen=True)
 class Motion:
     """The closed loop of a subject. `stiffness`: V is the kinetic energy and 2 stiffness (1 - q0), in place of the law's
-    own; `unknown_inertia`: the plant's inertia is made of the variables `ENTRIES` while the law keeps the nominal one,
-    derivatives are multiplied by its determinant, and the target is at rest."""
+    own."""
 
     subject: Subject
     stiffness: Any | None = None
-    unknown_inertia: bool = False
 
     @cached_property
-    def nominal(self) -> Craft:
-        """The craft the law knows."""
+    def craft(self) -> Craft:
+        """The craft that moves, which the law knows."""
         craft = self.subject.loop.craft
         return exact_craft(craft.inertia, craft.torque_limit, craft.gravity)
-
-    @cached_property
-    def factor(self) -> Polynomial:
-        """The factor of derivatives: 1, or the determinant of the unknown inertia."""
-        if not self.unknown_inertia:
-            return Polynomial.constant(1)
-        j = _entries()
-        return dot(j[0], cross(j[1], j[2]))  # pyright: ignore
-
-    @cached_property
-    def plant(self) -> Craft:
-        """The craft that moves; its inverse inertia is multiplied by `factor`."""
-        if not self.unknown_inertia:
-            return self.nominal
-        j = _entries()
-        # The adjugate of a symmetric matrix is the inverse without the division.
-        adjugate = (cross(j[1], j[2]), cross(j[2], j[0]), cross(j[0], j[1]))
-        return Craft(j, adjugate, self.nominal.torque_limit, self.nominal.gravity)  # pyright: ignore
 
     @cached_property
     def gains(self) -> Any:
@@ -75,7 +54,7 @@ class Motion:
     def measurement(self) -> Measurement:
         """The law's measurement in variables."""
         zero: Any = (Polynomial.constant(0),) * 3
-        still = not self.subject.moving or self.unknown_inertia
+        still = not self.subject.moving
         rate, known = direction("w"), direction("e")
         turning = zero if still else direction("r")
         spinning = zero if still else direction("a")
@@ -83,7 +62,7 @@ class Motion:
         period: Any = Polynomial.constant(self.subject.loop.period)
         absolute, stored = add(rate, turning), zero
         if self.subject.loop.wheels is not None:
-            stored = subtract(direction("h"), apply(self.plant.inertia, absolute))
+            stored = subtract(direction("h"), apply(self.craft.inertia, absolute))
         return Measurement(
             direction("q", 0, 4),
             rate,
@@ -103,16 +82,16 @@ class Motion:
         memory = self.subject.law.remember(self.subject.loop.gains, self.subject.loop.craft, self.subject.loop.period)
         q: Any = vector_part(self.measurement.attitude)
         with reciprocal(1 + dot(q, q), "z"):
-            return self.subject.law.command(self.measurement, self.gains, self.nominal, memory)[0]
+            return self.subject.law.command(self.measurement, self.gains, self.craft, memory)[0]
 
     @cached_property
     def acceleration(self) -> Any:
-        """The derivative of the rate relative to the target, times `factor`."""
+        """The derivative of the rate relative to the target."""
         outside = add(self.torque, add(self.measurement.external_torque, direction("m")))
         # Of the wheels' action on the body the torque is what is asked of them.
         outside = subtract(outside, cross(self.measurement.body_rate, self.measurement.wheel_momentum))
-        absolute = angular_acceleration(self.measurement.body_rate, outside, self.plant)
-        return subtract(absolute, scale(self.factor, self.measurement.target_acceleration))  # type: ignore
+        absolute = angular_acceleration(self.measurement.body_rate, outside, self.craft)
+        return subtract(absolute, self.measurement.target_acceleration)  # type: ignore
 
     @cached_property
     def turning(self) -> Any:
@@ -120,10 +99,10 @@ class Motion:
         return derivative(self.measurement.attitude, self.measurement.rate)
 
     def along(self, function: Polynomial) -> Any:
-        """The derivative of a polynomial of the state along the motion, times `factor`."""
+        """The derivative of a polynomial of the state along the motion."""
         total: Any = Polynomial.constant(0)
         for name, rate in zip(ATTITUDE, self.turning, strict=True):
-            total = total + self.factor * function.slope(name) * rate
+            total = total + function.slope(name) * rate
         for name, rate in zip(RATE, self.acceleration, strict=True):
             slope = function.slope(name)
             if slope.terms:
@@ -134,15 +113,15 @@ class Motion:
     def lyapunov(self) -> Polynomial | None:
         """V for the plant that moves; None where the law has none of its own and no other is asked for."""
         if self.stiffness is not None:
-            energy: Any = kinetic_energy(self.measurement.rate, self.plant)
+            energy: Any = kinetic_energy(self.measurement.rate, self.craft)
             return energy + 2 * self.stiffness * (1 - Polynomial.variable("q0"))
         function = self.subject.law.lyapunov
-        return None if function is None else function(self.measurement, self.gains, self.plant)
+        return None if function is None else function(self.measurement, self.gains, self.craft)
 
     @cached_property
     def cross_term(self) -> Polynomial:
         """q.J w, which makes a strict Lyapunov function of V."""
-        return dot(vector_part(self.measurement.attitude), apply(self.plant.inertia, self.measurement.rate))  # type: ignore
+        return dot(vector_part(self.measurement.attitude), apply(self.craft.inertia, self.measurement.rate))  # type: ignore
 
     def linear(self, sign: int = 1) -> tuple[Rows, Rows]:
         """K_rate and K_attitude of the law near attitude (sign, 0, 0, 0) at rest, u = -K_rate w - K_attitude q."""
@@ -152,10 +131,6 @@ class Motion:
         rate = [[-component.slope(name).at(still) for name in RATE] for component in found]
         attitude = [[-component.slope(name).at(still) for name in ATTITUDE[1:]] for component in found]
         return rate, attitude
-
-
-def _entries() -> Any:
-    return tuple(tuple(Polynomial.variable(name) for name in row) for row in ENTRIES)
 
 
 def near_rest(truths: Truths) -> bool:

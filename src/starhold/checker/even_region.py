@@ -77,11 +77,7 @@ class EvenRegion(Region[EvenFrame]):
         demand(self.start == self.level, "without a cross term start and level are the same")
         loop, P = self.loop, self.frame.P
         torque = loop.resting()[1]
-        if loop.shifted:
-            # P is a multiple of an inertia that may be any, and takes it out.
-            pulls = times(P[0][0] / loop.inertia[0][0], [[part] for part in torque.values()])
-        else:
-            pulls = matmul(P, [[part] for part in loop.accelerations(torque)])
+        pulls = matmul(P, [[part] for part in loop.accelerations(torque)])
         N: Any = tuple(map(tuple, self.frame.N))
         q0, *vector = variables(ATTITUDE)
         spring: Any = apply(N, tuple(vector))  # pyright: ignore

@@ -297,15 +297,6 @@ def replaced(polynomial: Polynomial, values: Mapping[str, Any]) -> Polynomial:
     return Polynomial(found)
 
 
-def sorted_by(polynomial: Polynomial, inner: Callable[[str], bool]) -> dict[Monomial, Polynomial]:
-    """Coefficients that are polynomials in the inner variables, by their monomials in the others."""
-    found: dict[Monomial, dict[Monomial, Any]] = {}
-    for monomial, c in polynomial.terms.items():
-        outer = tuple(name for name in monomial if not inner(name))
-        found.setdefault(outer, {})[tuple(name for name in monomial if inner(name))] = c
-    return {outer: Polynomial(terms) for outer, terms in found.items()}
-
-
 def intervals(truths: Truths, axes: Sequence[Polynomial]) -> list[Interval] | None:
     """Closed intervals that conditions keep the axes in, None where they contradict one another; a CheckError where a
     condition speaks of anything but one axis."""

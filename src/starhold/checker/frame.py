@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 from flint import fmpq
@@ -14,7 +13,6 @@ from starhold.algebra.quaternion import vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.checker.exact import (
     ZERO,
-    CheckError,
     Rows,
     demand,
     dual,
@@ -24,18 +22,16 @@ from starhold.checker.exact import (
     root_above,
     times,
 )
-from starhold.checker.loop import ATTITUDE, RATE, TURN, ExactLoop, W, by_kind, letters, without
+from starhold.checker.loop import ATTITUDE, RATE, TURN, ExactLoop, by_kind, letters, without
 from starhold.checker.subject import mixed, named, quadratic, variables
 
 
 @dataclass(frozen=True)
 class CommonFrame:
     """V = w.Pw/2 + (a function of the attitude), V' = -w.Dw + (at most kappa |w|3) + w.Wm + ...; felt: the share of the
-    modelled torque that acts as m does; tops: P is nowhere larger than the largest of these, for any inertia the loop may
-    have."""
+    modelled torque that acts as m does."""
 
     P: Rows
-    tops: list[Rows]
     D: Rows
     kappa: Any
     W: Rows
@@ -100,12 +96,12 @@ def even_frame(loop: ExactLoop) -> EvenFrame:
 def _common(loop: ExactLoop, kinds: Mapping[str, Polynomial], *mixing: str) -> tuple[CommonFrame, dict[Monomial, Any]]:
     """The parts that any V has, from its terms by kind, and the terms of V' around the equilibrium; `mixing`: kinds that
     may be among them."""
-    P, tops = _kinetic(loop, kinds.get("ww", Polynomial({})))
+    P = times(2, quadratic(kinds.get("ww", Polynomial({})).terms, RATE))
     slope = loop.slope(loop.resting()[1]).only(lambda m: not set(letters(m)) & set("ra"))
     found = by_kind(slope)
     strange = set(found) - {"ww", "www", "mw", "ew", *mixing}
     demand(not strange, f"V' has the terms {', '.join(sorted(strange))}")
-    terms = loop.plain(slope)
+    terms = slope.terms
     kappa = ZERO
     for monomial, c in terms.items():
         if letters(monomial) == "www":
@@ -114,59 +110,27 @@ def _common(loop: ExactLoop, kinds: Mapping[str, Polynomial], *mixing: str) -> t
                 share *= monomial.count(name) ** monomial.count(name)
             kappa += abs(c) * root_above(share)
     D = times(-1, quadratic(terms, RATE))
-    return CommonFrame(P, tops, D, kappa, mixed(terms, RATE, named("m")), _felt(found, "w")), terms
-
-
-def _kinetic(loop: ExactLoop, own: Polynomial) -> tuple[Rows, list[Rows]]:
-    """P, and what it is nowhere larger than the largest of."""
-    if not loop.shifted:
-        P = times(2, quadratic(own.terms, RATE))
-        return P, [P]
-    g = own.terms.get(("d11", "w1", "w1"), ZERO) * 2
-    kinetic: Any = dot(W, apply(loop.plant[0].inertia, W))
-    rest: Any = own - kinetic * (g / 2)
-    demand(not rest.terms, "P is not a multiple of the inertia")
-    # x.Jx is largest in a box where each entry deviates with the sign of x_i x_j.
-    signs = [(1, a, b) for a in (1, -1) for b in (1, -1)]
-    reaches = loop.reaches or identity(3, ZERO)
-    tops = [
-        [[g * (c + e[i] * e[j] * reaches[i][j]) for j, c in enumerate(row)] for i, row in enumerate(loop.inertia)]
-        for e in signs
-    ]
-    return times(g, loop.inertia), tops
+    return CommonFrame(P, D, kappa, mixed(terms, RATE, named("m")), _felt(found, "w")), terms
 
 
 def crossed(loop: ExactLoop) -> Crossed:
     """The parts of C = q.Jw, and of C' around the equilibrium; a CheckError where they have others."""
     measurement = loop.moving
-    C: Any = dot(vector_part(measurement.attitude), apply(dual(loop.plant[0].inertia), measurement.rate))
+    C: Any = dot(vector_part(measurement.attitude), apply(dual(loop.craft.inertia), measurement.rate))
     slope = replaced(C.slope, loop.resting()[1])
     demand(not any(set(letters(m)) & set("ra") for m in slope.terms), "C' depends on the target's motion")
     kinds = by_kind(slope)
     strange = set(kinds) - {"qq", "qw", "qww", "oww", "mq", "eq"}
     demand(not strange, f"C' has the terms {', '.join(sorted(strange))}")
-    terms = loop.plain(slope.only(lambda m: len(letters(m)) == 2))
+    terms = slope.only(lambda m: len(letters(m)) == 2).terms
     demand(mixed(terms, TURN, named("m")) == identity(3), "torque from outside acts on C in another way")
     felt = _felt(kinds, "q")
-    forms = loop.over(slope.only(lambda m: len(letters(m)) == 3))
+    forms = slope.only(lambda m: len(letters(m)) == 3).terms
     total = ZERO
     for name in ATTITUDE:
         # |(q0, q)| = 1, so that the sum of q_k w.F_k w is at most the root of the sum of squares.
-        total += _largest(loop, {without(m, name): share for m, share in forms.items() if name in m}) ** 2
+        total += radius_of(quadratic({without(m, name): c for m, c in forms.items() if name in m}, RATE)) ** 2
     return Crossed(times(-1, quadratic(terms, TURN)), times(-1, mixed(terms, TURN, RATE)), root_above(total), felt)
-
-
-def _largest(loop: ExactLoop, form: Mapping[Monomial, Polynomial]) -> Any:
-    """The largest eigenvalue in modulus of a quadratic form over the box, which is at a corner: it is convex."""
-    names = sorted({name for share in form.values() for name in share.variables()})
-    if names and loop.reaches is None:
-        raise CheckError("a form depends on the inertia, which may be any")
-    reaches = [] if loop.reaches is None else [loop.reaches[int(n[1]) - 1][int(n[2]) - 1] for n in names]
-    largest = ZERO
-    for corner in product(*[(-reach, reach) for reach in reaches]):
-        shift = dict(zip(names, corner, strict=True))
-        largest = max(largest, radius_of(quadratic({m: share.at(shift) for m, share in form.items()}, RATE)))
-    return largest
 
 
 def _felt(kinds: Mapping[str, Polynomial], state: str) -> Any:

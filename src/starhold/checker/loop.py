@@ -1,9 +1,9 @@
 """The closed loop a certificate speaks of, as its checker reads it: from the law's and the models' own equations, in exact
-polynomials, for the inertia that is given or for every one near it.
+polynomials.
 
 Variables: q0..q3 error attitude, w1..w3 rate relative to the target, r and a the target's rate and acceleration, e the
 torque the models know, m one that nobody knows, t what the actuators give, h the momentum of the whole, wheels included
-(body axes; of which J w_abs is the body's), d11..d33 how far the inertia is from the one given, z the reciprocal of
+(body axes; of which J w_abs is the body's), z the reciprocal of
 1 + |q|2, by which laws divide.
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 from starhold.algebra.polynomial import Monomial, Polynomial, constants, jointly, reciprocal
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.structure import leaves
-from starhold.algebra.vector import add, apply, cross, dot, scale, subtract
+from starhold.algebra.vector import add, apply, cross, dot, subtract
 from starhold.checker.exact import (
     ONE,
     ZERO,
@@ -32,9 +32,6 @@ from starhold.checker.exact import (
     intervals,
     inverse,
     replaced,
-    root_above,
-    sorted_by,
-    transpose,
 )
 from starhold.checker.subject import LoopSubject, named, variables
 from starhold.laws.interface import Measurement
@@ -44,50 +41,23 @@ from starhold.parts.craft import Craft
 TURN, RATE, ATTITUDE = named("q"), named("w"), named("q", 0)
 W = variables(RATE)
 QUOTIENT = "z"
-SHIFTS = (("d11", "d12", "d13"), ("d12", "d22", "d23"), ("d13", "d23", "d33"))
 
 
 class ExactLoop:
-    """The loop of a subject, for its inertia, for another plant of `inertia` that the law does not know, or, with `shifted`,
-    for every inertia at once. The last two have a target at rest. `tolerance`: how far entries of the inertia may be from
-    those given, of the roots of the moments; None in a shifted loop lets them be anything. `stiffness`: V is the kinetic
-    energy and 2 stiffness (1 - q0); None: the law's own. `quotient`: whether a claim takes a law that divides by 1 + |q|2,
-    the reciprocal of which is a variable then."""
+    """The loop of a subject. `stiffness`: V is the kinetic energy and 2 stiffness (1 - q0); None: the law's own. `quotient`:
+    whether a claim takes a law that divides by 1 + |q|2, the reciprocal of which is a variable then."""
 
-    def __init__(
-        self,
-        subject: LoopSubject,
-        stiffness: Any | None = None,
-        inertia: Rows | None = None,
-        shifted: bool = False,
-        tolerance: Any | None = None,
-        quotient: bool = False,
-    ) -> None:
-        self.subject, self.stiffness, self.shifted, self.quotient = subject, stiffness, shifted, quotient
-        self.inertia = subject.inertia if inertia is None else inertia
-        self.still = shifted or inertia is not None or not subject.moving
-        self.reaches: Rows | None = None
-        if tolerance is not None:
-            J = subject.inertia
-            self.reaches = [[tolerance * root_above(J[i][i] * J[j][j]) for j in range(3)] for i in range(3)]
+    def __init__(self, subject: LoopSubject, stiffness: Any | None = None, quotient: bool = False) -> None:
+        self.subject, self.stiffness, self.quotient = subject, stiffness, quotient
+        self.inertia, self.still = subject.inertia, not subject.moving
 
     @cached_property
-    def plant(self) -> tuple[Craft, Polynomial]:
-        """The craft that moves, with its inverse inertia times a factor, and that factor."""
-        if not self.shifted:
-            return self._craft(self.inertia, inverse(self.inertia)), Polynomial.constant(1)
-        J: Any = [
-            [c + Polynomial.variable(d) for c, d in zip(*rows, strict=True)]
-            for rows in zip(self.inertia, SHIFTS, strict=True)
-        ]
-        adjugate = [cross(tuple(J[1]), tuple(J[2])), cross(tuple(J[2]), tuple(J[0])), cross(tuple(J[0]), tuple(J[1]))]
-        return self._craft(J, transpose([list(row) for row in adjugate])), dot(tuple(J[0]), adjugate[0])  # pyright: ignore
-
-    def _craft(self, inertia: Rows, inverse: Rows) -> Craft:
+    def craft(self) -> Craft:
+        """The craft that moves, which the law knows."""
         limit: Any = self.subject.torque_limit
         return Craft(
-            constants(tuple(map(tuple, inertia))),
-            constants(tuple(map(tuple, inverse))),
+            constants(tuple(map(tuple, self.inertia))),
+            constants(tuple(map(tuple, inverse(self.inertia)))),
             variables(("limit",))[0] if limit is None else constants(limit),
             constants(self.subject.gravity),
         )
@@ -100,24 +70,22 @@ class ExactLoop:
         rate, relative = add(W, turning), subtract(spinning, cross(W, turning))
         stored = still
         if self.subject.wheels is not None:
-            stored = subtract(variables(named("h")), apply(self.plant[0].inertia, rate))
+            stored = subtract(variables(named("h")), apply(self.craft.inertia, rate))
         outside, position, period = variables(named("e")), variables(named("p")), Polynomial.variable("period")
         told: Any = (turning, relative, outside, position, period, stored, variables(named("b")))
         return Measurement(variables(ATTITUDE), W, rate, *told)
 
     @cached_property
     def moving(self) -> Measurement:
-        """The measurement with derivatives under a torque t, times the plant's factor; without that of the wheel momentum,
-        which V and surfaces have no terms for."""
-        craft, factor = self.plant
+        """The measurement with derivatives under a torque t; without that of the wheels' momentum, of which V has no terms."""
         measurement = self.measurement
         torque = add(variables(named("t")), add(measurement.external_torque, variables(named("m"))))
         turned_by = subtract(torque, cross(measurement.body_rate, measurement.wheel_momentum))
-        absolute = angular_acceleration(measurement.body_rate, turned_by, craft)
-        swing = subtract(absolute, scale(factor, measurement.target_acceleration))  # pyright: ignore
+        absolute = angular_acceleration(measurement.body_rate, turned_by, self.craft)
+        swing = subtract(absolute, measurement.target_acceleration)  # pyright: ignore
         spin = derivative(measurement.attitude, measurement.rate)
         told = dual(measurement)
-        attitude = tuple(Dual(q, factor * change) for q, change in zip(measurement.attitude, spin, strict=True))
+        attitude = tuple(Dual(q, change) for q, change in zip(measurement.attitude, spin, strict=True))
         rate = tuple(Dual(w, change) for w, change in zip(measurement.rate, swing, strict=True))
         return told._replace(attitude=attitude, rate=rate, body_rate=add(rate, told.target_rate))  # pyright: ignore
 
@@ -126,17 +94,16 @@ class ExactLoop:
         """The law's torque on each of its pieces."""
         subject = self.subject
         demand(not any(True for _ in leaves(subject.memory)), "the law keeps a memory")
-        craft = self._craft(subject.inertia, inverse(subject.inertia))
         q: Any = vector_part(self.measurement.attitude)
         with reciprocal(1 + dot(q, q), QUOTIENT):
-            found = jointly(subject.law.command(self.measurement, subject.gains, craft, subject.memory)[0])
+            found = jointly(subject.law.command(self.measurement, subject.gains, self.craft, subject.memory)[0])
         switches = {name for truths, _ in found for c, _ in truths for name in c.positive.variables()}
         read = {name for _, parts in found for p in parts for name in p.variables()} | switches
         demand(QUOTIENT not in switches, "the law switches on a quotient")
         demand(self.quotient or QUOTIENT not in read, "the law divides by 1 + |q|2, which such a claim does not take")
         read.discard(QUOTIENT)
         demand(
-            all(name[0] in "qwraemhd" for name in read),
+            all(name[0] in "qwraemh" for name in read),
             "the torque depends on more than attitude, rate, target, torque and stored momentum",
         )
         return [(truths, dict(zip(named("t"), parts, strict=True))) for truths, parts in found]
@@ -171,8 +138,8 @@ class ExactLoop:
 
     @cached_property
     def lyapunov(self) -> Dual:
-        """V, and its derivative under a torque t, times the plant's factor."""
-        measurement, craft = self.moving, dual(self.plant[0])
+        """V, and its derivative under a torque t."""
+        measurement, craft = self.moving, dual(self.craft)
         if self.stiffness is not None:
             return kinetic_energy(measurement.rate, craft) + 2 * dual(self.stiffness) * (1 - measurement.attitude[0])  # pyright: ignore
         function = self.subject.law.lyapunov
@@ -181,11 +148,11 @@ class ExactLoop:
         return function(measurement, dual(self.subject.gains), craft)
 
     def slope(self, torque: Mapping[str, Polynomial]) -> Polynomial:
-        """V' on a piece of the law, times the plant's factor; of a target's motion nothing may be left in it."""
+        """V' on a piece of the law; of a target's motion nothing may be left in it."""
         return replaced(self.lyapunov.slope, torque)
 
     def accelerations(self, torque: Mapping[str, Polynomial]) -> list[Polynomial]:
-        """The derivative of the rate on a piece of the law, times the plant's factor."""
+        """The derivative of the rate on a piece of the law."""
         return [replaced(w.slope, torque) for w in self.moving.rate]  # pyright: ignore
 
     @cached_property
@@ -193,27 +160,6 @@ class ExactLoop:
         """Whether the motion relative to the target depends on the momentum of wheels."""
         found = (w for _, torque in self.pieces for w in self.accelerations(torque))
         return any("h" in letters(m) for w in found for m in w.terms)
-
-    def over(self, polynomial: Polynomial) -> dict[Monomial, Polynomial]:
-        """The coefficients, over the plant's factor, of a polynomial's monomials in the state: constant, or linear in how
-        far the inertia is from the one given."""
-        factor = self.plant[1]
-        found: dict[Monomial, Polynomial] = {}
-        for monomial, inner in sorted_by(polynomial, lambda name: name[0] == "d").items():
-            whole = factor.terms[()]
-            share: Any = Polynomial({(): inner.terms.get((), ZERO) / whole})
-            rest = inner - share * factor
-            share = share + Polynomial({m: c / whole for m, c in rest.terms.items() if len(m) == 1})
-            demand(not (inner - share * factor).terms, f"{' '.join(monomial)} depends on the inertia in another way")
-            found[monomial] = share
-        return {monomial: share for monomial, share in found.items() if share.terms}
-
-    def plain(self, polynomial: Polynomial) -> dict[Monomial, Any]:
-        """The coefficients of `over` where none may depend on the inertia; else a CheckError."""
-        found = self.over(polynomial)
-        strange = [" ".join(monomial) for monomial, share in found.items() if share.value is None]
-        demand(not strange, f"the terms {', '.join(strange)} depend on the inertia")
-        return {monomial: share.value for monomial, share in found.items()}
 
     @cached_property
     def falls(self) -> bool:
@@ -230,7 +176,7 @@ class ExactLoop:
     def _falls(self, truths: Truths, torque: Mapping[str, Polynomial]) -> bool:
         found = intervals(truths, W)
         slope = self.slope(torque).only(lambda m: letters(m) not in ("ew", "mw"))
-        terms = self.plain(slope)
+        terms = slope.terms
         allowed = {(name,) * power for name in RATE for power in (1, 2)}
         return found is None or (
             set(terms) <= allowed

@@ -99,13 +99,8 @@ class OddRegion(Region[OddFrame]):
             return "start and level are the same"
         frame, J = self.frame, self.loop.inertia
         demand(0 < self.rho < 1, "rho is not between 0 and 1")
-        if self.loop.shifted:
-            # rho P = rho g J > 0 leaves rho s - epsilon2 J/(rho g) > 0 of the whole, the same J in V and C.
-            room = identity(3, (self.rho * frame.P[0][0] / J[0][0]) ** 2 * frame.s)
-            kept = all(definite(plus(room, top, -(self.epsilon**2))) for top in frame.tops)
-        else:
-            P, s = times(self.rho, frame.P), identity(3, self.rho * frame.s)
-            kept = definite(block(P, times(self.epsilon, transpose(J)), s))
+        P, s = times(self.rho, frame.P), identity(3, self.rho * frame.s)
+        kept = definite(block(P, times(self.epsilon, transpose(J)), s))
         demand(kept, "C exceeds its share of V")
         demand((self.start is None) == (self.level is None), "level and start do not belong together")
         if self.level is not None:

@@ -94,7 +94,7 @@ class Region(ABC, Generic[F]):
     @property
     def bound(self) -> Any | None:
         """A bound of |w| on the level set: as the witness says, else as the least eigenvalue of P tells."""
-        if self.given is not None or self.level is None or self.loop.shifted:
+        if self.given is not None or self.level is None:
             return self.given
         return root_above(2 * self.level / least(self.frame.P))
 
@@ -131,11 +131,9 @@ class Region(ABC, Generic[F]):
         demand(bounded or not piled, "the momentum of the wheels may grow without end")
         return "no term with the target's rate or acceleration"
 
-    def contents(
-        self, turn: Any, rate: Any | None, everywhere: Any | None, everything: bool, any_inertia: bool = False
-    ) -> str:
+    def contents(self, turn: Any, rate: Any | None, everywhere: Any | None, everything: bool) -> str:
         """Turn and rates that are said to be in {V <= start} are in it."""
-        tops, start = self.frame.tops, self.start
+        P, start = self.frame.P, self.start
         demand(everything == (self.level is None) == (start is None), "the level set is everything only without a level")
         turn, rate, everywhere = rational(turn), optional(rate), optional(everywhere)
         demand(0 <= turn <= up(self.around * (1 + arb(10) ** -15)), "the turn is not between 0 and the largest there is")
@@ -147,12 +145,9 @@ class Region(ABC, Generic[F]):
         demand(start > 0 and rate >= 0, "there is no start, or the rate is negative")
         high = start >= self.highest
         demand(high or self.holds_turn(turn), "the turn is not in it")
-        if any_inertia:
-            demand(rate == 0 and everywhere is None, "any inertia leaves no rate")
-        for P in tops:
-            demand(definite(plus(identity(3, 2 * start), times(rate**2, P), -1), strictly=False), "the rate is not in it")
-            if everywhere is not None:
-                left = plus(identity(3, 2 * (start - self.highest)), times(everywhere**2, P), -1)
-                held = high and everywhere >= 0 and definite(left, strictly=False)
-                demand(held, "the rate at every attitude is not in it")
+        demand(definite(plus(identity(3, 2 * start), times(rate**2, P), -1), strictly=False), "the rate is not in it")
+        if everywhere is not None:
+            left = plus(identity(3, 2 * (start - self.highest)), times(everywhere**2, P), -1)
+            held = high and everywhere >= 0 and definite(left, strictly=False)
+            demand(held, "the rate at every attitude is not in it")
         return "turn and rates are in {V <= start}"
