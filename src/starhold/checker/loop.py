@@ -77,7 +77,7 @@ class ExactLoop:
 
     @cached_property
     def moving(self) -> Measurement:
-        """The measurement with derivatives under a torque t; without that of the wheels' momentum, of which V has no terms."""
+        """The measurement with derivatives under a torque t, without that of the wheels' momentum, which is not in V."""
         measurement = self.measurement
         torque = add(variables(named("t")), add(measurement.external_torque, variables(named("m"))))
         turned_by = subtract(torque, cross(measurement.body_rate, measurement.wheel_momentum))
