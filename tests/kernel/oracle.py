@@ -246,13 +246,15 @@ class Oracle:
             axis = self.rng.normal(size=3)
             axis /= np.linalg.norm(axis)
             if "angle" in n:
-                q = np.concatenate([[math.cos(n["angle"] / 2)], math.sin(n["angle"] / 2) * axis])
-                if n["angle"] > 6 or self.lyapunov(q, zero) - V0 > level * (1 + 1e-9):
+                half = min(n["angle"] / 2, math.pi)
+                q = np.concatenate([[math.cos(half)], math.sin(half) * axis])
+                if self.lyapunov(q, zero) - V0 > level * (1 + 1e-9):
                     return False
             if "rate" in n and self.lyapunov(np.eye(4)[0], n["rate"] * axis) - V0 > level * (1 + 1e-9):
                 return False
             if "start.rate" in n:
-                q = np.concatenate([[math.cos(n["start.angle"] / 2)], math.sin(n["start.angle"] / 2) * axis])
+                half = min(n["start.angle"] / 2, math.pi)
+                q = np.concatenate([[math.cos(half)], math.sin(half) * axis])
                 if self.lyapunov(q, n["start.rate"] * self.direction()) - V0 > level * (1 + 1e-9):
                     return False
             if "fastest" in n:

@@ -3,9 +3,10 @@
 import pytest
 
 from starhold.algebra.quaternion import derivative, vector_part
-from starhold.algebra.scalar import sign
+from starhold.algebra.scalar import less, sign, where
 from starhold.algebra.vector import add, apply, cross, dot, gyroscopic_torque, scale, subtract
 from starhold.certification.evidence.attitude import ASKED, FULL, Q4, V3
+from starhold.kernel.numbers import RefusedError
 from starhold.kernel.programs import digest
 from starhold.parts.bodies.rigid_body import angular_acceleration, kinetic_energy
 from starhold.parts.craft import Craft
@@ -117,6 +118,20 @@ def sideways(m):
     return add(feedback()(m), (0.0, 2.0 * C * m.rate[1], 2.0 * C * m.rate[2]))
 
 
+def clipped(beyond):
+    """Damps with the same torque at all rates beyond 0.2 rad/s, or with so much more or less for each of them."""
+
+    def damping(x):
+        return where(less(0.2, x), 0.2 + beyond * (x - 0.2), where(less(x, -0.2), -0.2 + beyond * (x + 0.2), x))
+
+    return lambda m: add(scale(-K, vector_part(m.attitude)), scale(-C, tuple(map(damping, m.rate))))
+
+
+def halved(m):
+    """Damps half as much beyond 1 rad/s, all at once."""
+    return add(feedback()(m), tuple(where(less(1.0, x), 0.5 * C * x, 0.0) for x in m.rate))
+
+
 SAMPLED, REACHES, EVENLY = "stays stable between samples", "reaches its surface", "converges from both quaternions"
 NEAR = "converges near the inertia"
 ANY, ISOTROPIC = "converges whatever the inertia", "converges without a preferred axis"
@@ -162,6 +177,16 @@ def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis):
     assert failing(claim, programs) == {hypothesis}
     oracle = [Oracle({"programs": programs}, claim, seed).holds() for seed in range(3)]
     assert not all(oracle)
+
+
+def test_a_law_that_clips_falls_in_every_case():
+    for beyond, failed in ((0.0, set()), (0.5, set()), (-2.0, {"V is non-increasing"})):
+        claim, programs = case(clipped(beyond))
+        assert failing(claim, programs) == failed
+        oracle = [Oracle({"programs": programs}, claim, seed).holds() for seed in range(3)]
+        assert all(oracle) if not failed else not all(oracle)
+    with pytest.raises(RefusedError, match="the law's torque jumps"):
+        failing(*case(halved))
 
 
 @pytest.mark.parametrize("theorem", ["converges", ANY, NEAR, "converges strictly", EVENLY])
