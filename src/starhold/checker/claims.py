@@ -232,7 +232,7 @@ _BASE = (
     UNLIMITED,
     "known-outside-torque",
 )
-_BOX = "inertia-within-tolerance"
+_BOX = "inertia-near"
 
 
 def _instead(old: str, *new: str) -> tuple[str, ...]:

@@ -351,13 +351,12 @@ class Loop:
                 self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
                 return False
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
-        shared = wheels is not None and wheels.allocation == 0
-        motors = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)} if shared else {}
-        stored = (
-            {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)} if shared else {}
-        )
-        if motors or stored:
-            numbers |= motors | stored
+        shared = dict[str, float]()
+        if wheels is not None and wheels.allocation == 0:
+            shared = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)}
+            shared |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)}
+        if shared:
+            numbers |= shared
         elif isfinite(limit):
             numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
         else:
@@ -429,8 +428,8 @@ class Loop:
         return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
-        """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less, and
-        the rate up to which it holds every attitude."""
+        """Return the largest turn from rest and the largest rate on target that a set of this level holds, and the rate up to
+        which it holds every attitude, all a little less."""
         P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
