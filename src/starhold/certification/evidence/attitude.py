@@ -428,8 +428,8 @@ class Loop:
         return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
-        """Return the largest turn from rest and the largest rate on target that a set of this level holds, and the rate up to
-        which it holds every attitude, all a little less."""
+        """Return the largest turn from rest and the largest rate on target that a set of this level holds, and up to which
+        rate it holds every attitude, all a little less."""
         P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
@@ -439,7 +439,7 @@ class Loop:
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
         if not float(level) > 2.0 * s > 0.0:
             return {"angle": angle * less, "rate": rate * less}
-        # Above V at the other rest every turn is in the set. A mixed term is at most 2 lean sqrt(s T) of the kinetic energy T.
+        # Above V at the other rest every turn is in the set. Of the kinetic energy T a mixed term is at most 2 lean sqrt(s T).
         lean = 0.5 * LEANS * any({"q", "w"} == {name[0] for name in m} for m in form.terms)
         energy = (sqrt(lean * lean * s + float(level) - 2.0 * s) - lean * sqrt(s)) ** 2
         fastest = sqrt(2.0 * energy / float(np.linalg.eigvalsh(P)[-1])) * less
