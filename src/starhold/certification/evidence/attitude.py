@@ -439,7 +439,7 @@ class Loop:
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
         if not float(level) > 2.0 * s > 0.0:
             return {"angle": angle * less, "rate": rate * less}
-        # Above V at the other rest every turn is in the set. Of the kinetic energy T a mixed term is at most 2 lean sqrt(s T).
+        # Above V at the other rest every turn is in the set. A mixed term is at most 2 lean sqrt(s T), T being the energy.
         lean = 0.5 * LEANS * any({"q", "w"} == {name[0] for name in m} for m in form.terms)
         energy = (sqrt(lean * lean * s + float(level) - 2.0 * s) - lean * sqrt(s)) ** 2
         fastest = sqrt(2.0 * energy / float(np.linalg.eigvalsh(P)[-1])) * less
