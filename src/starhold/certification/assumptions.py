@@ -109,7 +109,7 @@ _IDEAL = Assumption("exact measurement and ideal actuators")
 ASSUMPTIONS = {
     "rigid-body": Assumption("rigid body"),
     "inertia-as-given": Assumption("inertia exactly as given"),
-    "inertia-within-tolerance": Assumption("inertia within the tolerance"),
+    "inertia-near": Assumption("inertia within the tolerance"),
     "exact-measurement": _IDEAL,
     "ideal-actuators": _IDEAL,
     "continuous-torque": Assumption("torque applied continuously"),

@@ -69,6 +69,12 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
             yield f"{name} is exceeded"
         if name in most and isfinite(most[name]) and side * x > side * Fraction(most[name]):
             yield f"{name} is lower"
+    if any(name.startswith(("motors", "stored")) for name in told):
+        yield from (
+            f"{name} is not told"
+            for name, x in most.items()
+            if "." in name and name[0] in "ms" and isfinite(x) and name not in told
+        )
 
 
 def _handed_over(claim: Mapping[str, Any], ends: Ends | None) -> Iterator[str]:

@@ -8,8 +8,6 @@ from typing import TypeAlias
 
 from starhold.certification.certificate import Certificate
 from starhold.certification.certify import between_samples, undecided
-from starhold.certification.limits import needed
-from starhold.certification.motion import Motion
 from starhold.certification.openness import READ, named
 from starhold.certification.proofs import taken_over
 from starhold.certification.subject import described, described_target, make_subject
@@ -37,7 +35,7 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     proved, failed = found
     beyond = undecided("hand-over", {"rate": rate, "angle": angle}, subject, "it reaches beyond the region of convergence")
     claims = [proved.get("hand-over", beyond), *between_samples(subject, proved, failed)]
-    return Certificate(name, described(subject), named(needed(claims, Motion(subject)), loop))
+    return Certificate(name, described(subject), named(claims, loop))
 
 
 def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> Ends:

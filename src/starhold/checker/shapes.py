@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
-
-from starhold.checker.exact import demand
+from typing import Any, Literal, TypeAlias
 
 Test: TypeAlias = Callable[[Any], bool]
+Verdict: TypeAlias = Literal["holds", "fails", "not claimed"]
+
+
+class CheckError(Exception):
+    """Why something in a certificate does not hold, or cannot be verified."""
+
+
+def demand(holds: bool, otherwise: str) -> None:
+    """Raise a CheckError unless something holds."""
+    if not holds:
+        raise CheckError(otherwise)
 
 
 def shaped(given: Any, shape: Mapping[str, Test], where: str) -> None:
@@ -116,21 +125,6 @@ OBLIGATION: dict[str, Test] = {
     "outcome": _OUTCOME,
     "evidence": lambda x: _object(x) and _plain(x),
 }
-_EXACT, _SIGN, _BALLS, _ROOTS = ("exact identity",), ("exact inequality",), ("ball arithmetic",), ("certified roots",)
-HOWS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("form", "target"), _EXACT),
-    "descent": _SIGN + _BALLS,
-    "only equilibrium": ("LaSalle",),
-    "torque": _BALLS,
-    "strict": _SIGN + _BALLS,
-    "other equilibrium repels": _SIGN + _ROOTS,
-    **dict.fromkeys(("stable at the period", "stable at the longest"), _ROOTS),
-    **dict.fromkeys(("positive", "single equilibrium in the set", "half turns repel", "jumps lower V"), _SIGN),
-    **dict.fromkeys(("momentum", "end"), _SIGN),
-    **dict.fromkeys(("start", "stable in between", "reach exceeds torque", "surface holds the target", "layer"), _SIGN),
-    "no switch of the quaternion sign": _SIGN,
-}
-"""How each obligation may be shown, whatever the claim."""
 _WHEELS: dict[str, Test] = {
     "axes": _list(_VECTOR),
     "torque_limit": _list(_MAYBE),
@@ -183,59 +177,3 @@ STATION: dict[str, Test] = {
     "assumed_away": _list(_text),
 }
 """The subject where a loop keeps a craft near a libration point."""
-_CONTENTS: dict[str, Test] = {
-    "start": _MAYBE,
-    "everything": _flag,
-    "slew_angle": _number,
-    "rate": _MAYBE,
-    "rate_everywhere": _MAYBE,
-}
-NUMBERS: dict[str, dict[str, Test]] = {
-    "convergence": {"level": _MAYBE, **_CONTENTS},
-    "hand-over": dict.fromkeys(("rate", "angle"), _MAYBE),
-    "torque-limit": {"level": _MAYBE, **_CONTENTS, "limit": _number, "kind": _one("axis", "norm")},
-    "wheels": {
-        "level": _MAYBE,
-        **_CONTENTS,
-        "momentum": _number,
-        **dict.fromkeys(("motors", "wheel_momentum"), _list(_number)),
-    },
-    "inertia": {"tolerance": _number},
-    "disturbance": {
-        **dict.fromkeys(("torque", "start", "level", "slew_angle", "rate_start", "angle", "rate"), _number),
-        "rate_everywhere": _MAYBE,
-    },
-    "sampling": {
-        **dict.fromkeys(("period", "radius", "longest"), _number),
-        "every_shorter": _flag,
-        "eigenvalues": _list(_list(_number, 2), 6),
-    },
-    "sliding": {
-        "torque": _VECTOR,
-        **dict.fromkeys(("margin", "surface", "angle", "rate", "slew_angle"), _number),
-        "everything": _flag,
-        "start": _MAYBE,
-        "rate_start": _MAYBE,
-    },
-    "region": dict.fromkeys(("level", "slew_angle", "rate"), _number),
-}
-STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, "spread": _number}
-"""A step of the proof where a torque from outside lets motions end."""
-_PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
-WITNESS: dict[str, dict[str, Test]] = {
-    "convergence": {**_PROOF, "rate_bound": _MAYBE},
-    "hand-over": {},
-    "torque-limit": {**_PROOF, **dict.fromkeys(("rate_bound", "shift", "weight"), _MAYBE)},
-    "wheels": {**_PROOF, "rate_bound": _MAYBE},
-    "inertia": {},
-    "disturbance": {
-        **_PROOF,
-        "rate_bound": _MAYBE,
-        "shift": _MAYBE,
-        **dict.fromkeys(("tau", "beta"), _number),
-        "steps": _list(_object),
-    },
-    "sampling": {},
-    "sliding": {},
-    "region": dict.fromkeys(("p", "c2", "g", "m"), _number),
-}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from starhold.checker.exact import CheckError, Verdict, demand
+from starhold.checker.shapes import CheckError, Verdict, demand
 from starhold.kernel.check import Proved
 from starhold.kernel.programs import digest
 from starhold.kernel.sentences import ASSUMPTIONS

@@ -351,13 +351,12 @@ class Loop:
                 self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
                 return False
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
-        shared = wheels is not None and wheels.allocation == 0
-        motors = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)} if shared else {}
-        stored = (
-            {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)} if shared else {}
-        )
-        if motors or stored:
-            numbers |= motors | stored
+        shared = dict[str, float]()
+        if wheels is not None and wheels.allocation == 0:
+            shared = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)}
+            shared |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)}
+        if shared:
+            numbers |= shared
         elif isfinite(limit):
             numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
         else:
@@ -429,8 +428,8 @@ class Loop:
         return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
-        """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less, and
-        the rate up to which it holds every attitude."""
+        """Return the largest turn from rest and the largest rate on target that a set of this level holds, and up to which
+        rate it holds every attitude, all a little less."""
         P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
@@ -440,7 +439,7 @@ class Loop:
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
         if not float(level) > 2.0 * s > 0.0:
             return {"angle": angle * less, "rate": rate * less}
-        # Above V at the other rest every turn is in the set. A mixed term is at most 2 lean sqrt(s T) of the kinetic energy T.
+        # Above V at the other rest every turn is in the set. A mixed term is at most 2 lean sqrt(s T), T being the energy.
         lean = 0.5 * LEANS * any({"q", "w"} == {name[0] for name in m} for m in form.terms)
         energy = (sqrt(lean * lean * s + float(level) - 2.0 * s) - lean * sqrt(s)) ** 2
         fastest = sqrt(2.0 * energy / float(np.linalg.eigvalsh(P)[-1])) * less

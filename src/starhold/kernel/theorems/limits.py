@@ -57,7 +57,9 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         stores = [own - p for own, p in zip(kept, apply(shares, loop.stored), strict=True)]
         for k, row in enumerate(shares):
             for name, most, own, rest in (("motor", motors[k], row, none), ("wheel", stored[k], NONE, stores[k])):
-                for sign in (1, -1) if most is not None else ():
+                if most is None:
+                    continue
+                for sign in (1, -1):
                     limited.append((f"{name} {sign * (k + 1):+d}", most, [sign * x for x in own], sign * rest))
         for text, unit, own in (("motors give", "N m", motors), ("wheels store", "N m s", stored)):
             if any(x is not None for x in own):
