@@ -76,9 +76,9 @@ def test_its_lines_of_python_run(folder, monkeypatch, capsys):
 def test_claims_say_of_its_parts_what_it_tells(folder):
     (certificate,) = sh.certify("own.toml")
     for claim in certificate.claims:
-        away = {name for name in claim.assumptions if name.startswith("without the ")}
-        assert "without the sensor drifting-tracker" in away
-        assert "without the effector panel" in away
+        away = {name for name in claim.assumptions if name.startswith("without:")}
+        assert "without:sensor drifting-tracker" in away
+        assert "without:effector panel" in away
         assert any("sunlight" in name for name in away) == (claim.kind != "disturbance")
     pushed = certificate.claim("disturbance")
     assert pushed.outcome == "proved"

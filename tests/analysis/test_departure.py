@@ -11,13 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.scalar import side
-from starhold.analysis.departure import CHANGES, LOST, MET, TURNED, departures, fed_back, start_inside
+from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_back, start_inside
+from starhold.certification.assumptions import ASSUMPTIONS, WITHOUT, assumption
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
+from starhold.certification.proofs import IN_THE_LOOP
 from starhold.certification.wording import HEADINGS, sentence
 from starhold.checker import check, check_file, passed
 from starhold.checker.check import ENDS
-from starhold.checker.claims import CLAIMS
+from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.report.proved import section
 from starhold.scenario.building import build
@@ -47,17 +49,12 @@ def flown(text):
     return built(parse(text, "here")), flight.certificates[0], flight, flight.departures[0]
 
 
-def test_every_assumption_of_a_claim_about_motions_is_looked_at():
-    told = {
-        assumed for kind in CLAIMS if kind != "sampling" for wheels in (False, True) for assumed in assumptions(kind, wheels)
-    }
-    assert told == set(MET)
-
-
-def assumptions(kind, wheels):
-    if CLAIMS[kind].wheels not in (None, wheels):
-        return []
-    return CLAIMS[kind].assumptions({"tolerance": 0.1}, wheels)
+def test_every_assumption_is_told_and_looked_at():
+    """The certifier names what the kernel names, but for what it composes so; and a torque that nobody models."""
+    assert set(ASSUMPTIONS) == (set(SENTENCES) - IN_THE_LOOP) | {"unknown-outside-torque"}
+    # A part that a claim leaves out is there for the whole flight.
+    told = assumption(f"{WITHOUT}sensor gyro")
+    assert (told.text, told.unmet(None)) == ("without the sensor gyro", [(True, "the loop has the sensor gyro")])
 
 
 def test_a_flight_that_keeps_to_the_assumptions_leaves_nothing():
@@ -98,7 +95,7 @@ def test_a_law_that_keeps_within_its_limit_assumes_no_unlimited_torque(tmp_path)
     assert np.abs(flight.recording["command"]).max() >= 0.01 * (1.0 - 1e-12)
     assert left == dict.fromkeys(("convergence", "torque-limit", "inertia"), ())
     for claim in certificate.claims:
-        assert "torque not limited" not in claim.assumptions
+        assert "unlimited-torque" not in claim.assumptions
         assert "unlimited" not in sentence(claim, certificate.subject)
     write([certificate], "mine", tmp_path / "certificate.json")
     assert passed(check_file(tmp_path / "certificate.json"))

@@ -75,6 +75,16 @@ def _certified(name, sign_policy, disturbance):
     return certify(loop, name, Wanted(disturbance=disturbance))
 
 
+def energy(P, s):
+    """V = w.Pw/2 + s (1 - q0) of states, without cancellation near the target."""
+
+    def height(states):
+        q, w = states[:4], states[4:7]
+        return 0.5 * np.einsum("ik,ij,jk->k", w, P, w) + 0.5 * s * ((1.0 - q[0]) ** 2 + np.sum(q[1:] ** 2, axis=0))
+
+    return height
+
+
 def rotors(law, gains, target=None, layout=pyramid, **changes):
     """A law on reaction wheels that hold some momentum at the start; in orbit, under the gravity gradient, if the target is
     there."""

@@ -5,18 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from starhold.algebra.quaternion import derivative
 from starhold.analysis.trial import draw, fly_claims
 from starhold.certification.certify import certify
-from starhold.certification.frame import take_apart
-from starhold.certification.matrices import floats, number
-from starhold.certification.motion import Motion
-from starhold.certification.potential import Spring
+from starhold.certification.matrices import number
 from starhold.certification.subject import make_subject
 from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
-from tests.certification.loops import FULL, PRINCIPAL, UNEVEN, certified, loop_of, random_craft, tensor, textbook
+from tests.certification.loops import FULL, certified, energy, loop_of, random_craft, tensor, textbook
 from tests.equations import two_body_gravity_gradient
 
 LOOPS = textbook()
@@ -42,50 +38,10 @@ def test_the_quaternion_sign_is_in_the_claim(name, sign_policy):
     assert main.outcome == "proved"
     names = [o.name for o in main.obligations]
     if sign_policy == "hysteresis":
-        assert names[-1] in ("a jump lowers V", "jumps lower V")
+        assert "a jump lowers V" in names
     else:
         # The switch at half a turn is outside the set, and all that is less than half a turn at rest is inside.
-        s = 2.0 * (main.witness["stiffness"] or take_s(LOOPS[name]) / 2.0)
-        assert main.numbers["start"] < s
         assert math.radians(179.5) < main.numbers["slew_angle"] < math.pi
-
-
-def take_s(loop):
-    return number(take_apart(Motion(make_subject(loop))).s)
-
-
-def test_gains_that_are_rounded_get_a_printed_rate_bound():
-    """Weights moved onto (2.24) meet it but for rounding; V's own rate bound then is astronomical, and still finite."""
-    law = lqr.design(PRINCIPAL, lqr.FormII(UNEVEN.q, UNEVEN.r, 1))
-    from starhold.certification.convergence import convergence
-
-    loop = loop_of("lqr", law, PRINCIPAL)
-    claim, _ = convergence(Motion(make_subject(loop)))
-    kappa = abs(exact_kappa(PRINCIPAL.inertia, law.k_attitude))
-    assert (kappa == 0.0) == claim.numbers["everything"]
-    if kappa:
-        damping = min(w / a for w, a in zip(law.k_rate, law.k_attitude, strict=True))
-        assert claim.witness["rate_bound"] == pytest.approx(damping / (float(kappa) / math.sqrt(27.0)), rel=1e-5)
-
-
-def test_rate_bound_of_unbalanced_weights_is_damping_over_kappa():
-    """Without the second function: V' <= -w.diag(Kw/Kq)w + |kappa||w1 w2 w3| gives |w| < min(Kw/Kq) sqrt(27)/|kappa|."""
-    from starhold.certification.convergence import convergence
-
-    gains = lqr.design(PRINCIPAL, UNEVEN)
-    claim, _ = convergence(Motion(make_subject(loop_of("lqr", gains, PRINCIPAL))))
-    kappa = lqr.kappa(np.array(PRINCIPAL.inertia), np.array(gains.k_attitude))
-    damping = min(w / a for w, a in zip(gains.k_rate, gains.k_attitude, strict=True))
-    assert claim.witness["rate_bound"] == pytest.approx(damping * math.sqrt(27.0) / abs(kappa), rel=1e-5)
-    inertia = np.array(PRINCIPAL.inertia) / gains.k_attitude
-    assert claim.numbers["level"] == pytest.approx(0.5 * inertia.min() * claim.witness["rate_bound"] ** 2, rel=1e-9)
-
-
-def exact_kappa(moments, y):
-    from fractions import Fraction
-
-    j, k = [Fraction(m) for m in moments], [Fraction(v) for v in y]
-    return (j[2] - j[1]) / k[0] + (j[0] - j[2]) / k[1] + (j[1] - j[0]) / k[2]
 
 
 def test_limit_by_design_holds_everywhere():
@@ -129,51 +85,21 @@ def test_modelled_torque_is_bounded_over_the_whole_orbit():
     assert 0.9 * number(subject.modelled_norm) <= largest <= number(subject.modelled_norm)
 
 
-@pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-II", "lqr-III", "matrix-pd-inertial"])
-@pytest.mark.parametrize("sign_policy", ["as_published", pytest.param("hysteresis", marks=pytest.mark.slow)])
-def test_disturbed_flights_end_within_the_ultimate_bound(name, sign_policy):
-    """A torque of the claimed size that always pushes away cannot leave the claimed ball, nor one that is constant."""
-    loop = loop_of(LOOPS[name].law.name, LOOPS[name].gains, LOOPS[name].craft, sign_policy=sign_policy)
-    certificate = certified(name, sign_policy, 1e-4)
-    claim = certificate.claim("disturbance")
-    assert claim.outcome == "proved"
-    n = claim.numbers
-    J = tensor(loop.craft.inertia)
-    random = np.random.default_rng(6)
-    frame = take_apart(Motion(make_subject(loop)))
-    states = draw(6, floats(frame.P), frame.potential, n["start"], random)
-    directions = random.normal(size=(3, 6))
-    directions /= np.linalg.norm(directions, axis=0)
-    away = np.array([True, False] * 3)
-
-    def command(q, w):
-        measurement = Measurement(tuple(q), tuple(w), tuple(w), (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, period)
-        return np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0])
-
-    # What only adds and multiplies takes all flights at once.
-    commands = command if name != "pd-0" else lambda q, w: np.transpose(list(map(command, q.T.tolist(), w.T.tolist())))
-    q, w, period, angle, rate = states[:4], states[4:7], 0.5, 0.0, 0.0
-    inverse = np.linalg.inv(J)
-    # The slowest loop halves its turn in half a minute.
-    for step in range(int(1200 / period)):
-        push = np.where(away, w / np.maximum(np.linalg.norm(w, axis=0), 1e-300), directions)
-        turning = J @ w
-        gyroscopic = w[[1, 2, 0]] * turning[[2, 0, 1]] - w[[2, 0, 1]] * turning[[1, 2, 0]]
-        w = w + period * inverse @ (commands(q, w) + n["torque"] * push - gyroscopic)
-        q = q + period * np.array(derivative(tuple(q), tuple(w)))
-        q = q / np.linalg.norm(q, axis=0)
-        if step * period > 900:
-            angle = max(angle, 2.0 * math.asin(min(1.0, np.linalg.norm(q[1:], axis=0).max())))
-            rate = max(rate, np.linalg.norm(w, axis=0).max())
-    assert 0.0 < angle <= n["angle"]
-    assert 0.0 < rate <= n["rate"]
+def by_differences(loop, turned):
+    """Minus the slopes of the torque by the rate, or by the attitude, at rest on target."""
+    columns = []
+    for axis in 1e-7 * np.eye(3):
+        rate, turn = (ZERO, axis) if turned else (axis, ZERO)
+        measurement = Measurement((1.0, *turn), tuple(rate), tuple(rate), *[ZERO] * 4, 0.1, ZERO)
+        columns.append(-np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0]) / 1e-7)
+    return np.array(columns).T
 
 
 @pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-III", "matrix-pd-inertial", "sliding-1"])
 def test_longest_period_is_where_the_sampled_loop_loses_stability(name):
     loop = LOOPS[name]
     claim = certified(name).claim("sampling")
-    rate, attitude = (floats(m) for m in Motion(make_subject(loop)).linear())
+    rate, attitude = (by_differences(loop, turned) for turned in (False, True))
     J = tensor(loop.craft.inertia)
 
     def radius(h):
@@ -219,7 +145,7 @@ def test_other_inertias_of_the_box_converge(name):
         tried += 1
         # The plant's inertia only; these laws use theirs for the gains, and form I for the gyroscopic torque too.
         flown = replace(loop, craft=body)
-        states = draw(64, J, Spring(0.04), 0.08, random)
+        states = draw(64, energy(J, 0.04), 0.08, random)
         ends = simulate_many(flown, states, 12_000).states
         assert np.abs(ends[1:4]).max() < 0.02
         assert np.abs(ends[4:7]).max() < 0.02

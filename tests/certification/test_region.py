@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import ZERO, add
 from starhold.analysis.departure import start_inside
-from starhold.analysis.trial import fly_claims
+from starhold.analysis.trial import draw, fly_claims
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.mixed import Shape
 from starhold.laws.interface import Measurement, NoMemory
@@ -72,7 +72,7 @@ def test_v_falls_at_random_states_of_the_set_and_at_the_worst(root, b, sign_poli
     claim = claim_of(loop)
     assert claim.outcome == "proved"
     shape, level = Shape(**claim.witness), claim.numbers["level"]
-    states = shape.draw(level, 1000, np.random.default_rng(7))
+    states = draw(1000, lambda states: shape.value(states[:4], states[4:7]), level, np.random.default_rng(7))
     value, slope = falling(loop, shape, states)
     assert value.max() <= level * (1.0 + 1e-9)
     assert value.min() > 0.0

@@ -1,36 +1,29 @@
 """A target that follows a history: what is claimed of its motion holds between the rows and the control steps too."""
 
-import json
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from flint import ctx, fmpq
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from starhold.algebra.polynomial import exact
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import ZERO, add, cross, subtract
 from starhold.analysis.trial import draw
 from starhold.certification.certify import certify
-from starhold.certification.matrices import floats, number
-from starhold.certification.matrices import rows as rows_of
-from starhold.certification.potential import Spring
+from starhold.certification.matrices import number
 from starhold.certification.spline import spline_bounds
 from starhold.certification.wording import sentence
-from starhold.checker import check_file, passed
-from starhold.checker.exact import CheckError
-from starhold.checker.spline import moves_within
+from starhold.checker import passed
 from starhold.errors import InputError
 from starhold.laws import pd, wheel
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import tensor
 from starhold.parts.targets.history import Knots, knots_of, tabulate
 from tests.certification.edits import checked
-from tests.certification.loops import FULL, free, loop_of
+from tests.certification.loops import FULL, energy, free, loop_of
 
 
 def history(seed, count, step, spread=0.4):
@@ -41,19 +34,6 @@ def history(seed, count, step, spread=0.4):
     for turn in random.normal(size=(count - 1, 3)):
         turns.append(turns[-1] * Rotation.from_rotvec(step * turn))
     return times, Rotation.concatenate(turns).as_quat(scalar_first=True)
-
-
-def told(knots):
-    return {"times": knots.times.tolist(), "attitudes": knots.attitudes.tolist(), "rates": knots.rates.tolist()}
-
-
-def holds(knots, rate, acceleration):
-    with ctx.workprec(192):
-        try:
-            moves_within(told(knots), rate, acceleration)
-        except CheckError:
-            return False
-    return True
 
 
 def peaks(times, attitudes):
@@ -75,11 +55,6 @@ def test_bounds_of_a_spline_hold_between_its_knots_and_are_close(seed, count, si
     found = peaks(times, attitudes)
     assert found[0] <= number(rate) <= found[0] * 1.03
     assert found[1] <= number(acceleration) <= found[1] * 1.05 + 2e-3 * found[0] ** 2
-    # The checker shows the same by its own means, and hardly less.
-    assert holds(knots, rate, acceleration)
-    assert not holds(knots, rate * fmpq(97, 100), acceleration)
-    less = fmpq(*(found[1] * 0.99).as_integer_ratio())
-    assert less <= fmpq(1, 10**12) or not holds(knots, rate, less)
 
 
 @settings(max_examples=5, deadline=None)
@@ -87,9 +62,9 @@ def test_bounds_of_a_spline_hold_between_its_knots_and_are_close(seed, count, si
 def test_signs_and_lengths_of_quaternions_do_not_matter(seed, factor):
     times, attitudes = history(seed, 4, 0.7)
     knots = knots_of(times, attitudes, times[-1])
-    rate, acceleration = spline_bounds(knots)
     other = knots._replace(attitudes=knots.attitudes * np.where(np.arange(4) % 2 == 0, 1.0, factor)[:, None])
-    assert holds(other, rate, acceleration)
+    pairs = zip(spline_bounds(other), spline_bounds(knots), strict=True)
+    assert all(number(a) == pytest.approx(number(b), rel=1e-6) for a, b in pairs)
 
 
 @pytest.mark.parametrize("count", [2, 5])
@@ -152,35 +127,6 @@ def test_rows_without_knots_are_knots_of_their_own(tmp_path):
     assert passed(checked(certificate, tmp_path))
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda s: s.update(target_rate=s["target_rate"] * 0.98),
-        lambda s: s.update(target_acceleration=s["target_acceleration"] * 0.95),
-        lambda s: s["history"]["attitudes"].__setitem__(2, s["history"]["attitudes"][6]),
-        lambda s: s["history"]["rates"].__setitem__(2, [x * 5.0 for x in s["history"]["rates"][2]]),
-        lambda s: s["history"].update(times=[t * 0.9 for t in s["history"]["times"]]),
-        lambda s: s["history"].update(times=s["history"]["times"][::-1]),
-        lambda s: s["history"].update(times=s["history"]["times"][:-1]),
-        lambda s: s["history"]["attitudes"].__setitem__(0, [0.0] * 4),
-        lambda s: s["history"].update(interpolant="straight lines"),
-        lambda s: s.update(history=None),
-        lambda s: s.update(target="inertial"),
-        lambda s: s.update(target="inertial", history=None),
-        lambda s: s["history"]["rates"].__setitem__(2, [1e200, 0.0, 0.0]),
-    ],
-)
-def test_the_checker_believes_no_bound(change, tmp_path):
-    times, attitudes = history(5, 8, 0.3)
-    rows = tabulate(times, attitudes, [0.0, 0.1])
-    loop = free(loop_of("pd", pd.Gains(0.09, 0.009), target=rows, knots=knots_of(times, attitudes, times[-1])))
-    assert passed(checked(certify(loop, "pd"), tmp_path))
-    content = json.loads((tmp_path / "certificate.json").read_text())
-    change(content["certificates"][0]["subject"])
-    (tmp_path / "changed.json").write_text(json.dumps(content))
-    assert not passed(check_file(tmp_path / "changed.json"))
-
-
 def test_knots_are_those_that_the_run_needs():
     times, attitudes = np.arange(-3.0, 20.0), np.tile([1.0, 0.0, 0.0, 0.0], (23, 1))
     attitudes[:, 1] = 0.01 * np.sin(times)
@@ -234,7 +180,7 @@ def test_no_state_of_the_set_needs_more_torque_than_told_anywhere_on_the_spline(
     claim = certify(loop, "pd").claim("torque-limit")
     assert claim.outcome == "proved"
     random, count = np.random.default_rng(1), 4000
-    states = draw(count, floats(rows_of(tensor(FULL.inertia))), Spring(exact(0.018)), claim.numbers["start"], random)
+    states = draw(count, energy(tensor(FULL.inertia), 0.018), claim.numbers["start"], random)
     spline, t = (
         RotationSpline(times, Rotation.from_quat(attitudes, scalar_first=True)),
         random.uniform(0.0, times[-1], count),

@@ -80,8 +80,8 @@ def test_the_full_problem_is_proved_with_its_feed_forward(made, gains):
     content = made(gains._replace(model=1), model="nonlinear")
     assert set(outcomes(content).values()) == {"proved"}
     told = content["certificates"][0]["claims"][0]["assumptions"]
-    assert told[0] == "motion exactly as modelled"
-    assert (told[-1] == "never at the centre of one of the two bodies") == (gains is REST)
+    assert told[0] == "whole-field"
+    assert (told[-1] == "off-the-bodies") == (gains is REST)
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import certify_law
 from starhold.studies.certificates import certify_scenario
+from tests import making
 from tests.certification.loops import FULL, free, loop_of, rotors
 from tests.making import ORBITAL, aimed, on_wheels
 
@@ -143,8 +144,8 @@ def test_momentum_that_piles_up_is_not_passed_over():
     pulled = rotors("wheel", EVEN, ORBITAL).without("target").with_parts(loop.target)
     pulled = replace(pulled, law=loop.law, gains=loop.gains)
     found = certify(pulled).claim("convergence")
-    assert "no torque from outside" in found.assumptions
-    assert "no torque from outside but what the law cancels" not in found.assumptions
+    assert "no-outside-torque" in found.assumptions
+    assert "known-outside-torque" not in found.assumptions
 
 
 def test_claims_that_are_not_built_say_so():
@@ -275,3 +276,20 @@ def test_every_law_with_a_function_on_wheels_is_sound(tmp_path):
             found = check_file(tmp_path / "c.json")
             assert passed(found), (name, [f for f in found if f.verdict == "fails"])
             fly_claims(loop, certificate, flights=128)
+
+
+def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
+    """A body that follows the orbit at rest on target has momentum; one with none is told of by nobody."""
+    loop = rotors("wheel", catalogue()["wheel"].examples()[0], target=ORBITAL)
+    loop = loop.with_parts(making.rotors(loop.wheels))
+    whole = certify(loop)
+    assert whole.claim("wheels").outcome == "proved"
+    asked = certify(loop, "", Wanted(momentum=0.0)).claim("wheels")
+    assert asked.outcome == "undecided"
+    assert "so little momentum" in asked.obligations[0].evidence["reason"]
+    # At rest on a target that is at rest a body has none.
+    still = rotors("wheel", catalogue()["wheel"].examples()[0])
+    still = still.with_parts(making.rotors(still.wheels))
+    write([certify(still, "", Wanted(momentum=0.0))], "made", tmp_path / "s.json")
+    assert passed(check_file(tmp_path / "s.json"))
+    assert certify(still, "", Wanted(momentum=0.0)).claim("wheels").outcome == "proved"

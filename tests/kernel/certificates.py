@@ -7,7 +7,7 @@ from functools import cache
 
 import starhold as sh
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.claims import find_claims
+from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations
 from starhold.certification.evidence.pointing import find_pointing
 from starhold.certification.subject import make_subject
@@ -18,7 +18,13 @@ CRAFT = {"inertia": [2.0, 3.0, 4.0], "torque_limit": "0.01 N m", "limit": "norm"
 QUIET = {"spacecraft": CRAFT, "simulation": {"duration": "1 min", "control_period": 0.1}}
 LQR = {"type": "lqr", "form": "II", "q": [0.01] * 3 + [0.004] * 3, "r": [50.0, 60.0, 70.0]}
 PD = {"type": "pd", "k_rate": 0.09, "k_attitude": 0.009}
-BY_HAND = {"strict": LQR, "norm": PD}
+BY_HAND = {
+    "strict": LQR,
+    "norm": PD,
+    "near": LQR | {"quaternion_sign": "shortest"},
+    "jumping": LQR | {"quaternion_sign": "hysteresis", "hysteresis_width": 0.1},
+    "clipped": PD | {"limit": "axis"},
+}
 
 LAWS = [
     ("three-laws", "lyapunov"), ("cubesat-slew", "lyapunov"), ("three-laws", "sliding"), ("cubesat-slew", "pd"),
@@ -59,15 +65,21 @@ def flying(name):
 
 @cache
 def found(scenario, law):
-    """What was found about a law of a built-in scenario, of one by hand, or of one with its torque held."""
+    """What was found about a law of a built-in scenario, of one by hand, of one with its torque held, or of one that takes
+    over."""
     if scenario == "flying":
         return flying(law)
     if scenario == "by hand":
-        given = sh.scenario(QUIET | {"name": law, "law": [BY_HAND[law]]})
+        limited = {"spacecraft": CRAFT | {"limit": "axis" if law == "clipped" else "norm"}}
+        given = sh.scenario(QUIET | limited | {"name": law, "law": [BY_HAND[law]]})
         loop = build(given, given.laws[0])
     else:
-        given = sh.load(scenario)
+        given = sh.load("cubesat-slew" if scenario == "taken over" else scenario)
         loop = build(given, given.pick(law))
+    if scenario == "taken over":
+        handed = find_taken_over(make_subject(loop), 0.01, 1.0)
+        assert handed is not None
+        return handed
     return find_claims(make_subject(loop))
 
 

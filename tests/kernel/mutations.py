@@ -5,7 +5,7 @@ from fractions import Fraction
 from starhold.kernel.numbers import rational
 from starhold.kernel.programs import OPERATIONS
 
-WORDS = ["outside torque", "moving target", "wheels", "shortest sign", "hysteresis"]
+WORDS = ["outside torque", "moving target", "wheels", "shortest sign", "hysteresis", "handed over"]
 
 
 def of_program(r, content, claim):
@@ -68,7 +68,8 @@ def of_words(r, content, claim):
         claim["taken"] = [w for w in claim["taken"] if w != word] if word in claim["taken"] else [*claim["taken"], word]
     elif way == "theorem":
         claim["theorem"] = r.choice(
-            ["converges", "converges strictly", "converges whatever the inertia", "converges from both quaternions",
+            ["converges", "converges strictly", "converges near the inertia", "converges whatever the inertia",
+             "converges from both quaternions",
              "converges without a preferred axis", "stays stable between samples",
              "reaches its surface", "points"])  # fmt: skip
     else:

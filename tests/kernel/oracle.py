@@ -58,7 +58,19 @@ class Oracle:
             self.J = half @ half.T + np.eye(3)
         else:
             self.J = np.array([[self.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in range(3)] for i in range(3)])
+        if "near" in claim["theorem"]:
+            self.J = self.near(self.J)
         self.words = claim["taken"]
+
+    def near(self, J):
+        """An inertia no entry of which is off by more than is told."""
+        reach = self.numbers["tolerance"] * np.sqrt(np.outer(np.diagonal(J), np.diagonal(J)))
+        for _ in range(1000):
+            half = np.triu(self.rng.choice([-1.0, 1.0]) * self.rng.uniform(0.5, 1.0, size=(3, 3)))
+            found = J + reach * (half + np.triu(half, 1).T)
+            if np.linalg.eigvalsh(found)[0] > 0.0:
+                return found
+        return J
 
     def bounded(self, name, word, default=1.0):
         if word not in self.words:
@@ -220,7 +232,8 @@ class Oracle:
             return 0 < width < 1 and all(lower)
         if "shortest sign" in self.words or (even and level is not None):
             halves = [turned(self.rng) * [0, 1, 1, 1] for _ in range(100)]
-            return all(self.lyapunov(q / np.linalg.norm(q), zero) - V0 > level for q in halves)
+            halves, lean = [q / np.linalg.norm(q) for q in halves], self.numbers.get("lean", 0.0)
+            return all(self.lyapunov(q, -lean * q[1:]) - V0 > level for q in halves)
         if even:
             return True
         if level is not None and self.lyapunov(other, zero) - V0 > level:
@@ -233,13 +246,15 @@ class Oracle:
             axis = self.rng.normal(size=3)
             axis /= np.linalg.norm(axis)
             if "angle" in n:
-                q = np.concatenate([[math.cos(n["angle"] / 2)], math.sin(n["angle"] / 2) * axis])
-                if n["angle"] > 6 or self.lyapunov(q, zero) - V0 > level * (1 + 1e-9):
+                half = min(n["angle"] / 2, math.pi)
+                q = np.concatenate([[math.cos(half)], math.sin(half) * axis])
+                if self.lyapunov(q, zero) - V0 > level * (1 + 1e-9):
                     return False
             if "rate" in n and self.lyapunov(np.eye(4)[0], n["rate"] * axis) - V0 > level * (1 + 1e-9):
                 return False
             if "start.rate" in n:
-                q = np.concatenate([[math.cos(n["start.angle"] / 2)], math.sin(n["start.angle"] / 2) * axis])
+                half = min(n["start.angle"] / 2, math.pi)
+                q = np.concatenate([[math.cos(half)], math.sin(half) * axis])
                 if self.lyapunov(q, n["start.rate"] * self.direction()) - V0 > level * (1 + 1e-9):
                     return False
             if "fastest" in n:

@@ -100,4 +100,4 @@ def test_every_part_that_no_program_holds_is_named(scenario, law):
     for claim in certify(loop.with_parts(*others), law).claims:
         for fitted in others:
             enters = claim.kind == "disturbance" and fitted.part.hook("bound") is not None
-            assert (f"without the {fitted.part.role} {fitted.called}" in claim.assumptions) != enters, fitted.called
+            assert (f"without:{fitted.part.role} {fitted.called}" in claim.assumptions) != enters, fitted.called

@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from tests.tiers import leading
 KINDS = {
     "converges": "convergence",
     "converges from both quaternions": "convergence",
+    "converges strictly": "convergence",
+    "converges near the inertia": "inertia",
     "converges whatever the inertia": "inertia",
     "converges from both quaternions whatever the inertia": "inertia",
     "converges without a preferred axis": "region",
@@ -70,11 +73,23 @@ def test_every_claim_of_today_is_proved_by_the_kernel_alone(scenario, law, bundl
     assert WORK - Account.left < WORK / 3
 
 
+def test_where_motions_of_laws_that_clip_or_jump_end_is_found():
+    """As far as the certifier proved it that had no kernel."""
+    ends, limited, *_ = contents("by hand", "clipped")["claims"]
+    assert "level" not in ends["numbers"]
+    assert limited["numbers"] == {"limit": str(Fraction(0.01))}
+    (shortest, *_), (jumping, *_) = (contents("by hand", law)["claims"] for law in ("near", "jumping"))
+    assert number(shortest["numbers"]["level"]) > 0.98 * 2.0
+    assert number(jumping["numbers"]["start.rate"]) > 0.98 * 59.1967
+    (torque,) = (c for c in contents("by hand", "near")["claims"] if "limit.norm" in c["numbers"])
+    assert number(torque["numbers"]["level"]) > 0.98 * 0.41815
+
+
 def test_strict_functions_and_limits_of_the_norm_are_found():
     assert contents("by hand", "strict")["claims"][0]["theorem"] == "converges strictly"
     (limited,) = (c for c in contents("by hand", "norm")["claims"] if "limit.norm" in c["numbers"])
     assert 0.98 * 0.006 < number(limited["numbers"]["level"]) < 0.0063
-    for law in ("strict", "norm"):
+    for law in ("strict", "norm", "near", "jumping", "clipped"):
         content = contents("by hand", law)
         assert len(check(text(content))) == len(content["claims"])
         assert all(Oracle(content, claim).holds() for claim in content["claims"])

@@ -129,4 +129,4 @@ def test_an_effector_flies_from_a_scenario_and_claims_leave_it_out(name):
     assert float(np.abs(run[recorded]).max()) > 1e-6
     (certificate,) = sh.certify(parse(text, "own"))
     assert certificate.claims
-    assert all("without the effector wing" in claim.assumptions for claim in certificate.claims)
+    assert all("without:effector wing" in claim.assumptions for claim in certificate.claims)

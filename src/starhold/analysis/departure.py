@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, subtract
 from starhold.analysis.metrics import ALMOST, on_limit
-from starhold.certification.certificate import WHEELS
-from starhold.certification.mixed import Shape
-from starhold.certification.openness import WITHOUT
+from starhold.certification.assumptions import LINEAR, assumption
+from starhold.certification.evidence.attitude import Loop
+from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import kinetic_energy
 from starhold.parts.craft import tensor
-from starhold.parts.effectors.wheels import BAND, Wheels
 from starhold.parts.quaternion_sign import SIGN_POLICIES
+from starhold.trace.straight_line import evaluated
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate, Claim
@@ -32,8 +32,6 @@ Array: TypeAlias = NDArray[np.float64]
 CHANGES = "what flies, or what the law knows of it, changes"
 LOST = "the simulation loses the motion"
 """Which no proof speaks of: it is too fast for the integration, or farther away than a scenario follows it."""
-
-
 TURNED = "the torque is held while the body, or stored momentum, turns it by {:.2g} rad"
 
 
@@ -45,10 +43,10 @@ class Departure(NamedTuple):
 
 
 class Span:
-    """A span is a recorded run between two control steps, and the loop that flies it."""
+    """A span is a recorded run between two control steps, and the loop that flies it; unit: of its times (s)."""
 
-    def __init__(self, loop: ClosedLoop, run: Recording, first: int, last: int | None) -> None:
-        every = run.attrs["record_every"]
+    def __init__(self, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None, unit: float = 1.0) -> None:
+        every, self.unit = run.attrs["record_every"], unit
         part = slice(-(-first // every), None if last is None else -(-last // every))
         self.loop, self.arrays = loop, {name: values[part] for name, values in run.arrays.items()}
         self.changes = None if last is None else last * loop.period
@@ -59,7 +57,7 @@ class Span:
     @property
     def begun(self) -> float:
         """Return the time of the first sample (s)."""
-        return float(self["time"][0])
+        return float(self["time"][0]) * self.unit
 
     @cached_property
     def shown(self) -> Measurement:
@@ -71,14 +69,23 @@ class Span:
         turning = subtract(rate, error_rate)
         return Measurement(attitude, error_rate, rate, turning, ZERO, ZERO, ZERO, self.loop.period, stored)
 
-    def first(self, held: Any, how: str) -> list[Departure]:
-        """Return a departure at the first sample at which something holds (n,)."""
-        places = np.flatnonzero(held)
-        return [Departure(float(self["time"][places[0]]), how)] if len(places) else []
+    def on_limit(self, command: Array) -> Any:
+        """Tell at which samples a command, or a part of it (n, components), is on the limit at which it saturates."""
+        return on_limit(command, self.loop.saturation_limit(), self.loop.limit)
 
-    def always(self, how: str, holds: bool = True) -> list[Departure]:
-        """Return a departure from the start on."""
-        return [Departure(self.begun, how)] if holds else []
+    def reaches(self, values: Array, limits: Array) -> Any:
+        """Tell which values have reached their limits."""
+        return values >= limits * ALMOST
+
+    def first(self, held: Any, how: str) -> list[Departure]:
+        """Return a departure at the first sample at which something holds (n,); one truth is about the first sample."""
+        places = np.flatnonzero(held)
+        return [Departure(float(self["time"][places[0]]) * self.unit, how)] if len(places) else []
+
+    def unmet(self, claim: Claim) -> list[Departure]:
+        """Return a departure for everything that a claim assumes and the flight does not meet."""
+        told = (found for name in claim.assumptions if (found := assumption(name).unmet) is not None)
+        return [one for unmet in told for held, how in unmet(self) for one in self.first(held, how)]
 
 
 def departures(
@@ -102,7 +109,7 @@ def departures(
     held = {"refuted": "with which not even the linear loop is stable", "proved": ""}
     sampled = certificate.claim("sampling")
     why = held.get("" if sampled is None else sampled.outcome, "with which it is not shown to be stable")
-    common += span.always(f"the torque is held for {loop.period:g} s, {why}", bool(why))
+    common += span.first(bool(why), f"the torque is held for {loop.period:g} s, {why}")
     # What is proved of held torque is proved of the linear loop at rest, without stored momentum.
     most = _turn_that_counts(loop, sampled)
     common += span.first(_turned(span) >= most, TURNED.format(most))
@@ -110,8 +117,8 @@ def departures(
         common.append(Departure(run.attrs["diverged_at"], LOST))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in _left(certificate):
-        own = [one for assumed in claim.assumptions for one in _met(assumed, span)]
-        found[claim.kind] = tuple(sorted({*common, *own, *_set(claim, span)}))
+        programs = proved_by(certificate, claim, loop)
+        found[claim.kind] = tuple(sorted({*common, *span.unmet(claim), *_set(claim, programs, span)}))
     return found
 
 
@@ -133,113 +140,28 @@ def _turn_that_counts(loop: ClosedLoop, sampled: Claim | None) -> float:
 
 
 def _left(certificate: Certificate) -> list[Claim]:
-    """Return the claims that a flight can leave: those about motions that are proved."""
-    return [claim for claim in certificate.claims if claim.outcome == "proved" and claim.kind != "sampling"]
-
-
-# --- assumptions ------------------------------------------------------------------------------------------------------
-
-
-def _kept(span: Span) -> list[Departure]:
-    return []
-
-
-def _unlimited(span: Span) -> list[Departure]:
-    bound = on_limit(span["command"], span.loop.craft.torque_limit, span.loop.limit)
-    return span.first(bound, "the torque reaches its limit")
-
-
-def _wheels_unlimited(span: Span) -> list[Departure]:
-    wheels = cast(Wheels, span.loop.wheels)
-    working = np.array(wheels.torque_limit) > 0.0
-    torque, momentum = np.abs(span["wheel_torque"]), np.abs(span["wheel_momentum"])
-    strong = (torque >= np.array(wheels.torque_limit) * ALMOST)[:, working].any(axis=1)
-    full = (momentum > np.array(wheels.momentum_limit) * (1.0 - BAND))[:, working].any(axis=1)
-    reached = [*span.first(strong, "a motor reaches its limit"), *span.first(full, "a wheel is full")]
-    return [*_friction(span), *_unlimited(span), *reached]
-
-
-def _friction(span: Span) -> list[Departure]:
-    wheels = cast(Wheels, span.loop.wheels)
-    return span.always("the wheels have friction", any((*wheels.viscous, *wheels.coulomb)))
-
-
-def _absent(assumption: str, span: Span) -> list[Departure]:
-    return span.always(f"{HAS}{assumption.removeprefix(WITHOUT)}")
-
-
-def _cancelled(span: Span) -> list[Departure]:
-    gravity = span.loop.has("gravity-gradient") and not cancels(span.loop)
-    return span.always("the law does not cancel the gravity gradient", gravity)
-
-
-def _alone(span: Span) -> list[Departure]:
-    return span.always("the gravity gradient acts", span.loop.has("gravity-gradient"))
-
-
-def _still(span: Span) -> list[Departure]:
-    return span.always("the target turns", span.loop.target.part.name != "inertial")
-
-
-def _met(assumption: str, span: Span) -> list[Departure]:
-    return _absent(assumption, span) if assumption.startswith(WITHOUT) else MET[assumption](span)
-
-
-HAS = "the loop has the "
-"""Begins the words for a part that a claim leaves out, role and name."""
-MET: Mapping[str, Callable[[Span], list[Departure]]] = {
-    "rigid body": _kept,
-    "inertia exactly as given": _kept,
-    "inertia within the tolerance": _kept,
-    "torque applied continuously": _kept,
-    # What keeps measurement and actuators from being so is a part, which is left out by name.
-    "exact measurement and ideal actuators": _kept,
-    "torque not limited": _unlimited,
-    WHEELS: _wheels_unlimited,
-    "wheels without friction": _friction,
-    # The claim's own number stands in no assumption; `_set` looks at it.
-    "total momentum at most as told": _kept,
-    "no torque from outside but what the law cancels": _cancelled,
-    "no torque from outside": _alone,
-    "torque from outside bounded in norm": _kept,
-    "torque from outside bounded on each axis": _kept,
-    "target at rest": _still,
-}
-"""For each assumption of a claim about motions how a flight departs from it. Those that are `_kept` a simulation meets, but
-for what `departures` says of held torque and of changes."""
-
-
-def cancels(loop: ClosedLoop) -> bool:
-    """Tell whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
-    loop = loop.without("sensor", "estimator")
-    measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
-    memory = loop.law.remember(loop.gains, loop.craft, loop.period)
-    more = 0.01 * loop.craft.torque_limit if math.isfinite(loop.craft.torque_limit) else 1.0
-    # From rest on target, where clipped and switching laws are farthest from their limits.
-    measurement = measurement._replace(attitude=(1.0, 0.0, 0.0, 0.0), rate=ZERO)
-    torques = [
-        np.array(loop.law.command(measurement._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
-        for x in (0.0, more)
-    ]
-    return bool(np.allclose(torques[0] - torques[1], more, rtol=1e-6))
+    """Return the claims that a flight can leave: those that are proved, and not of the linear motion alone."""
+    return [claim for claim in certificate.claims if claim.outcome == "proved" and LINEAR not in claim.assumptions]
 
 
 # --- sets -------------------------------------------------------------------------------------------------------------
 
 
-def _set(claim: Claim, span: Span) -> list[Departure]:
+def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
     """Tell whether a flight starts outside of the claim's set, and when it leaves that."""
     found: list[Departure] = []
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
         found += span.first(total > momentum * (1.0 + 1e-9), "the total momentum is more than told")
-    start, level = _levels(claim)
-    value = None if start is None or level is None else value_of(claim, span.loop, span.shown)
+    # V is at most `start` at the start, and `level` from then on; None for no bound.
+    start = claim.numbers.get("start")
+    level = claim.numbers.get("level", start)
+    value = None if start is None or level is None else value_of(programs, span.loop, span.shown)
     if value is None:
         return found
     if value[0] > start:
-        return [*found, *span.always("it is outside the set")]
+        return [*found, *span.first(True, "it is outside the set")]
     # The integration lets V of a motion along the border rise by its own error.
     return [*found, *span.first(value > cast(float, level) * (1.0 + 1e-6), "it leaves the set")]
 
@@ -253,8 +175,9 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     shown = shown_at(loop, loop.start)
     momentum = momentum_of(loop, shown)
     for claim in _left(certificate):
-        if claim.kind == "region" or (loop.law.lyapunov is not None and "start" in claim.numbers):
-            level, value = _levels(claim)[0], value_of(claim, loop, shown)
+        value = value_of(proved_by(certificate, claim, loop), loop, shown)
+        if value is not None and "start" in claim.numbers:
+            level = claim.numbers["start"]
             inside = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
             found[claim.kind] = bool(inside)
     return found
@@ -269,27 +192,36 @@ def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
     return shown._replace(attitude=attitude)
 
 
-def value_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
-    """Return the claim's V at measurements; None where the law has none. Polynomials take whole columns at once."""
-    function, stiffness = loop.law.lyapunov, claim.witness.get("stiffness")
-    if claim.kind == "region":
-        return Shape(**claim.witness).value(shown.attitude, shown.rate)
-    if claim.kind == "sliding":
-        return kinetic_energy(loop.law.module.surface(shown, loop.gains), loop.craft)
-    if stiffness is not None:
-        return kinetic_energy(shown.rate, loop.craft) + 2.0 * stiffness * (1.0 - shown.attitude[0])
-    return None if function is None else function(shown, loop.gains, loop.craft)
+def proved_by(certificate: Certificate, claim: Claim, loop: ClosedLoop) -> Mapping[str, Any]:
+    """Return the programs that a claim is proved by, by their roles."""
+    found = certificate.programs(claim)
+    if not found and "stiffness" in claim.witness:
+        # A claim without a proof tells its V by a number.
+        own = Loop(make_subject(loop))
+        V = own.lyapunov(claim.witness["stiffness"])
+        return {"lyapunov": own.by_digest[V]}
+    return found
+
+
+def value_of(programs: Mapping[str, Any], loop: ClosedLoop, shown: Measurement) -> Any:
+    """Return V at measurements, whose numbers may be columns, less V at rest on target; s.Js/2 where a surface s is reached.
+    None without either."""
+    if "surface" in programs:
+        s: Any = tuple(evaluated(programs["surface"], measurement=shown, gains=loop.gains))
+        return kinetic_energy(s, loop.craft)
+    if "lyapunov" not in programs:
+        return None
+    J: Any = tuple(map(tuple, tensor(loop.craft.inertia).tolist()))
+    craft, rest = loop.craft._replace(inertia=J), shown._replace(attitude=(1.0, *ZERO), rate=ZERO)
+    (value,), (least,) = (
+        evaluated(programs["lyapunov"], measurement=x, gains=loop.gains, craft=craft) for x in (shown, rest)
+    )
+    return value - least
 
 
 def momentum_of(loop: ClosedLoop, shown: Measurement) -> Any:
     """Return the norm of the angular momentum of body and wheels (N m s)."""
     return np.linalg.norm(add(apply(loop.craft.inertia, shown.body_rate), shown.wheel_momentum), axis=0)
-
-
-def _levels(claim: Claim) -> tuple[float | None, float | None]:
-    """Return the most that V is at the start, and from then on; None for no bound."""
-    start = claim.numbers.get("start", claim.numbers.get("level"))
-    return start, claim.numbers.get("level", start)
 
 
 def fed_back(loop: ClosedLoop, error: Array) -> Array:

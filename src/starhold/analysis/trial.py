@@ -5,31 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.polynomial import exact
-from starhold.algebra.quaternion import vector_part
+from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.structure import unflatten
-from starhold.algebra.vector import ZERO, apply, dot
-from starhold.analysis.departure import shown_at, value_of
+from starhold.algebra.vector import ZERO
+from starhold.analysis.departure import proved_by, shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.frame import take_apart
-from starhold.certification.matrices import floats, number
-from starhold.certification.mixed import Shape
-from starhold.certification.motion import Motion
-from starhold.certification.potential import Potential, Spring
-from starhold.certification.sampling import stable_period
-from starhold.certification.sliding import take_surface
-from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.bodies.rigid_body import ROWS
+from starhold.parts.bodies.rigid_body import ROWS, angular_acceleration
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.wheels import Wheels
 from starhold.simulation.lanes import Batch, simulate_many
+from starhold.trace.straight_line import evaluated
 
 FLIGHTS = 10_000
 LEGS = (1, 250, 250, 500)
@@ -39,7 +31,12 @@ SLACK = 1e-6
 TURN = 0.05
 """Radians that a body, or its momentum in body axes, turns in a step at most."""
 
-Array = NDArray[np.float64]
+NEAR, FAR = 1e-7, 10.0
+"""Turns (q) and rates (rad/s) near rest, where laws are linear, and beyond any boundary layer."""
+
+Array: TypeAlias = NDArray[np.float64]
+Height: TypeAlias = Callable[[Array], Array]
+"""V of states, which are columns."""
 
 
 class BrokenClaimError(Exception):
@@ -58,47 +55,39 @@ class Trial:
 
 
 def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHTS, seed: int = 1) -> Trial | None:
-    """Fly the largest set in which the torque is claimed to stay within its limit, else that of convergence, or towards a
-    sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises BrokenClaimError."""
-    sliding = certificate.claim("sliding")
-    if sliding is not None and sliding.outcome == "proved":
-        return _fly_to_surface(loop, certificate, sliding, flights, seed)
-    attracting = certificate.claim("region")
-    if attracting is not None and attracting.outcome == "proved":
-        return _fly_region(loop, certificate, attracting, flights, seed)
-    claims = [certificate.claim(kind) for kind in ("wheels", "torque-limit", "convergence")]
-    claim = next((c for c in claims if c is not None and c.outcome == "proved"), None)
-    if claim is None or _beyond_floats(loop, certificate):
+    """Fly the largest set in which a limit is claimed to be kept, else the first one from which motions are claimed to end
+    somewhere, or towards a sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises
+    BrokenClaimError."""
+    found = [(c, proved_by(certificate, c, loop)) for c in certificate.claims if c.outcome == "proved"]
+    # A V with a mixed term is known of proofs alone.
+    found = [(c, p) for c, p in found if p.keys() & {"lyapunov", "surface"} and (c.proof or not c.witness["epsilon"])]
+    claim, programs = next((one for one in found if _limited(one[0])), next(iter(found), (None, None)))
+    if claim is None or programs is None:
         return None
-    free = _undisturbed(loop, certificate, bounded=claim.kind == "wheels")
-    # The claim's own V, which need not be the law's.
-    stiffness = claim.witness["stiffness"]
-    frame = take_apart(Motion(make_subject(free), None if stiffness is None else exact(stiffness)))
-    level = claim.numbers["start"]
-    # Where every rate is allowed, up to what a body spun as fast as three half turns' worth of V has.
-    level = min(4.0 * number(frame.potential.top), math.inf if level is None else level)
+    if "surface" in programs:
+        return _fly_to_surface(loop, certificate, claim, flights, seed)
+    if _beyond_floats(loop, certificate):
+        return None
+    free, level = _undisturbed(loop, certificate, "motors" in claim.numbers), claim.numbers["start"]
     random = np.random.default_rng(seed)
-    states = draw(flights, floats(frame.P), frame.potential, level, random)
-    free, states = _paced(free, certificate, states, random)
-    value, floor = _value(free, claim), 1e-15 * number(frame.potential.top)
+    height = _height(free, programs)
+    top = float(height(_at_rest(HALF_TURNS)).max())
+    # Where every rate is allowed, up to what a body spun as fast as three half turns' worth of V has.
+    level = min(4.0 * top, math.inf if level is None else level)
+    free, states = _paced(free, certificate, draw(flights, height, level, random), random)
     highest, torque = 0.0, 0.0
-    for batch, share in _falling(free, certificate, claim, states, value, floor):
+    for batch, share in _falling(free, certificate, claim, states, _value(free, programs), 1e-15 * top):
         highest = max(highest, share)
-        if claim.kind != "convergence":
+        if _limited(claim):
             torque = max(torque, _need(batch.states, loop, claim))
-    share = None if claim.kind == "convergence" else torque
-    if share is not None and share > 1.0 + 1e-12:
-        raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {share:.3g} of a limit")
-    return Trial(flights, level, highest, share)
+    if torque > 1.0 + 1e-12:
+        raise BrokenClaimError(f"{certificate.name}: a flight from the certified set needs {torque:.3g} of a limit")
+    return Trial(flights, level, highest, torque if _limited(claim) else None)
 
 
-def _fly_region(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
-    free, shape, level = _undisturbed(loop, certificate), Shape(**claim.witness), claim.numbers["level"]
-    states = shape.draw(level, flights, np.random.default_rng(seed))
-    free, states = _paced(free, certificate, states, np.random.default_rng(seed + 1))
-    value = _value(free, claim)
-    shares = [share for _, share in _falling(free, certificate, claim, states, value, 1e-15 * shape.p)]
-    return Trial(flights, level, max(shares), None)
+def _limited(claim: Claim) -> bool:
+    """Tell whether a claim is about limits."""
+    return not claim.numbers.keys().isdisjoint(("motors", "limit"))
 
 
 def _falling(
@@ -106,7 +95,7 @@ def _falling(
     certificate: Certificate,
     claim: Claim,
     states: Array,
-    value: Callable[[Array], Array],
+    value: Height,
     floor: float,
 ) -> Generator[tuple[Batch, float]]:
     """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one rises by
@@ -130,35 +119,31 @@ def _falling(
 
 def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
     """Fly from random states with s.Js/2 <= level, long enough to reach the surface without torque from outside."""
-    J = tensor(loop.craft.inertia)
+    J, programs = tensor(loop.craft.inertia), proved_by(certificate, claim, loop)
     least, greatest = (float(x) for x in np.linalg.eigvalsh(J)[[0, -1]])
     free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
-    found = take_surface(Motion(make_subject(free)))
-    reach, layer = np.array([number(g) for g in found.reach]), number(found.layer)
-    free = replace(free, period=_sliding_period(free.period, floats(found.K), reach, least, greatest))
+
+    def s_of(states: Array) -> Array:
+        return np.array(evaluated(programs["surface"], measurement=_told(states), gains=loop.gains))
+
+    K = s_of(_at_rest(np.vstack([np.zeros(3), np.eye(3)])))
+    reach, layer = _switching(free, K)
+    free = replace(free, period=_sliding_period(free.period, K, reach, least, greatest))
     # |s| falls by at least reach/J a second.
     level = 0.5 * least * (0.5 * sum(LEGS) * free.period * float(reach.min()) / greatest) ** 2
     level = min(level, math.inf if claim.numbers["start"] is None else claim.numbers["start"])
-    states = draw(flights, J, Spring(1), 2.0 + level, np.random.default_rng(seed))
-    if not claim.numbers["everything"]:
-        states[ROWS.attitude] *= np.where(states[0] < 0.0, -1.0, 1.0)
-
-    def s_of(states: Array) -> Array:
-        return np.array(loop.law.module.surface(_shown(free, states), loop.gains))
-
-    # Drawn as rates, s is taken as what was drawn: w = s - Kq.
-    wanted = np.sqrt(level / (2.0 + level)) * states[ROWS.rate]
-    states[ROWS.rate] = 0.0
-    states[ROWS.rate] = wanted - s_of(states)
-    s, highest, before = wanted, 0.0, np.einsum("ik,ij,jk->k", wanted, J, wanted) / 2.0
+    height = _height(free, programs)
+    states = draw(
+        flights, height, level, np.random.default_rng(seed), 2.0 * math.pi if claim.numbers["everything"] else math.pi
+    )
+    s, highest, before = s_of(states), 0.0, height(states)
     # Held torque lets s.Js/2 rise where reach.|s| is at most half a period times reach.J^-1 reach, and by a step from there.
     size = float(np.linalg.norm(reach))
     step = free.period * size / least * (1.0 + 0.5 * size / float(reach.min()))
     chatter = math.sqrt(greatest / least) * (math.sqrt(3.0) * layer + step)
     for steps in LEGS:
         batch = simulate_many(free, states, steps)
-        states, s = batch.states, s_of(batch.states)
-        after = np.einsum("ik,ij,jk->k", s, J, s) / 2.0
+        states, s, after = batch.states, s_of(batch.states), height(batch.states)
         rising = (after > before * (1.0 + SLACK)) & (np.linalg.norm(s, axis=0) > chatter)
         if (batch.lost_at >= 0.0).any() or rising.any():
             raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(rising)), "leaves the surface"))
@@ -166,6 +151,21 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     if (np.linalg.norm(s, axis=0) > chatter).any():
         raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(before)), "has not reached the surface"))
     return Trial(flights, level, highest, None)
+
+
+def _switching(loop: ClosedLoop, K: Array) -> tuple[Array, float]:
+    """Return the switching torque about each axis, -J s' far from the surface, and the thickness of the boundary layer, in
+    which it is proportional to s."""
+    far, near = (-_momentum_rate(loop, K, [rate] * 3) for rate in (FAR, NEAR))
+    return far, float(np.where(near < 0.5 * far, NEAR * far / near, 0.0).max())
+
+
+def _momentum_rate(loop: ClosedLoop, K: Array, rate: list[float]) -> Array:
+    """Return J s' on target at a rate."""
+    w: Any = tuple(rate)
+    turning = vector_part(derivative((1.0, *ZERO), w))
+    turned = angular_acceleration(w, cast(Any, tuple(_torque(loop, ZERO, w))), loop.craft)
+    return tensor(loop.craft.inertia) @ (np.array(turned) + K @ np.array(turning))
 
 
 def _sliding_period(longest: float, K: Array, reach: Array, least: float, greatest: float) -> float:
@@ -180,30 +180,107 @@ def _sliding_period(longest: float, K: Array, reach: Array, least: float, greate
         period *= 0.5
 
 
-def draw(count: int, P: Array, potential: Potential, level: float, random: np.random.Generator) -> Array:
-    """Return states (16, count) of {V <= level}, half of them on its surface."""
-    share = random.uniform(size=count) ** 0.5
-    axes = random.normal(size=(count, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    t = share * np.minimum(level, potential.tops(axes))
-    q0 = potential.cosine(t, axes)
-    left = np.maximum(level - t, 0.0) * np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count))
-    turned = np.linalg.inv(np.linalg.cholesky(P)).T
-    directions = random.normal(size=(count, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    rates = np.sqrt(2.0 * left)[:, None] * (directions @ turned.T)
-    states = np.zeros((ROWS.torque.stop, count))
-    states[0], states[1:4] = q0, (potential.length(t, axes)[:, None] * axes).T
-    states[ROWS.attitude] /= np.linalg.norm(states[ROWS.attitude], axis=0)
-    states[ROWS.rate] = rates.T
+def draw(count: int, height: Height, level: float, random: np.random.Generator, most: float = 2.0 * math.pi) -> Array:
+    """Return states (16, count) of {V <= level} that are turned by at most so much, half of them on its surface. V is of
+    second degree in the rate, with squares that do not depend on the attitude."""
+    P, unit = _squares(height)
+    axes, directions = random.normal(size=(2, 3, count))
+    axes /= np.linalg.norm(axes, axis=0)
+    directions /= np.linalg.norm(directions, axis=0)
+    turns = random.uniform(0.0, most, size=count)
+    while True:
+        states = _at_rest(np.vstack([np.cos(0.5 * turns), np.sin(0.5 * turns) * axes]))
+        slope = np.array([(height(_spun(states, e)) - height(_spun(states, -e))) / 2.0 for e in np.diag(unit)])
+        middle = -np.linalg.solve(P, slope / unit[:, None])
+        lowest = height(states) - np.einsum("ik,ij,jk->k", middle, P, middle) / 2.0
+        beyond = lowest > level
+        if not beyond.any():
+            break
+        # V is nearly a square of small turns.
+        closer = 0.99 * np.sqrt(level / np.where(beyond, lowest, level)) * random.uniform(size=count) ** 0.25
+        turns = np.where(beyond, closer * turns, turns)
+    inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count))
+    reached = np.sqrt(2.0 * inside * np.maximum(level - lowest, 0.0))
+    states[ROWS.rate] = middle + reached * (np.linalg.inv(np.linalg.cholesky(P)).T @ directions)
     return states
+
+
+def _squares(height: Height) -> tuple[Array, Array]:
+    """Return P of w.Pw/2 in V, and rates about each axis at which V is about as large as it is at rest after half a turn."""
+    rest, one = _at_rest(np.array([[1.0], [0.0], [0.0], [0.0]])), np.eye(3)
+    top = float(np.abs(height(_at_rest(HALF_TURNS))).max())
+    squares = np.array([2.0 * float(height(_spun(rest, e))[0]) for e in one])
+    pairs = [[2.0 * float(height(_spun(rest, e + f))[0]) for e in one] for f in one]
+    P = 0.5 * (np.array(pairs) - squares[:, None] - squares[None, :])
+    return P, np.sqrt(2.0 * top / squares)
+
+
+def _at_rest(attitude: Array) -> Array:
+    """Return states at rest of quaternions (4, n)."""
+    states = np.zeros((ROWS.torque.stop, attitude.shape[1]))
+    states[ROWS.attitude] = attitude
+    return states
+
+
+def _spun(states: Array, rate: Array) -> Array:
+    """Return states with another rate."""
+    found = states.copy()
+    found[ROWS.rate] = rate[:, None]
+    return found
+
+
+HALF_TURNS = np.array([(-1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)]).T
+"""The target's other quaternion, and half turns from it."""
+
+
+def _height(loop: ClosedLoop, programs: Any) -> Height:
+    """Return V of states as they are, whatever the sign that the law is fed."""
+    return lambda states: value_of(programs, loop, _told(states))
+
+
+def _told(states: Array) -> Measurement:
+    """Return measurements at states about a target at rest."""
+    attitude, rate = (cast(Any, tuple(states[rows])) for rows in (ROWS.attitude, ROWS.rate))
+    return Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
+
+
+def stable_period(loop: ClosedLoop) -> float | None:
+    """Return a period (s) near the longest that floats find stable, the loop's own if that is; None for a law that is not
+    linear near rest, and where there is none."""
+    slopes = [_slopes(loop, step) for step in (NEAR, 0.5 * NEAR)]
+    if not np.allclose(*slopes, rtol=1e-3, atol=1e-9 * float(np.abs(slopes[0]).max())):
+        return None
+    pull = np.linalg.solve(tensor(loop.craft.inertia), slopes[0])
+    one, none = np.eye(3), np.zeros((3, 3))
+
+    def stable(h: float) -> bool:
+        step = np.block([[one, none], [0.5 * h * one, one]]) + np.vstack([h * pull, 0.25 * h * h * pull])
+        return float(np.abs(np.linalg.eigvals(step)).max()) < 1.0
+
+    return next((h for h in (loop.period * 0.5**count for count in range(100)) if stable(h)), None)
+
+
+def _slopes(loop: ClosedLoop, step: float) -> Array:
+    """Return the derivative (3, 6) of the torque by rate and turn at rest, from differences of this size."""
+    steps = [tuple(map(float, step * e)) for e in np.eye(3)]
+    pairs = [(ZERO, x) for x in steps] + [(x, ZERO) for x in steps]
+    negative = [tuple(tuple(-x for x in part) for part in pair) for pair in pairs]
+    found = [_torque(loop, *a) - _torque(loop, *cast(Any, b)) for a, b in zip(pairs, negative, strict=True)]
+    return np.array(found).T / (2.0 * step)
+
+
+def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
+    """Return the law's torque after a small turn (q) and at a rate, without wheels."""
+    told = Measurement((1.0, *turn), rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
+    memory = loop.law.remember(loop.gains, loop.known, loop.period)
+    return np.array(loop.law.command(told, loop.gains, loop.known, memory)[0])
 
 
 def _beyond_floats(loop: ClosedLoop, certificate: Certificate) -> bool:
     """Tell whether the loop is linear around rest, but floats find no period of control that it is stable with."""
     sampled = certificate.claim("sampling")
     unknown = sampled is not None and sampled.numbers["longest"] is None
-    return unknown and stable_period(Motion(make_subject(loop))) is None
+    return unknown and stable_period(loop) is None
 
 
 def _undisturbed(loop: ClosedLoop, certificate: Certificate, bounded: bool = False) -> ClosedLoop:
@@ -213,7 +290,7 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate, bounded: bool = Fal
     longest = None if sampled is None else sampled.numbers["longest"]
     if longest is None:
         # The loop's own period may be one that the linear loop is unstable with.
-        longest = stable_period(Motion(make_subject(loop)))
+        longest = stable_period(loop)
     period = loop.period if longest is None else min(loop.period, longest / 400.0)
     wheels = loop.find("wheels")
     return replace(
@@ -259,27 +336,15 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
     return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[ROWS.rate])
 
 
-def _value(loop: ClosedLoop, claim: Claim) -> Callable[[Array], Array]:
-    """Return the claim's V + epsilon q.Jw of the states in the columns of an array."""
-    epsilon = claim.witness.get("epsilon", 0.0)
-
-    def value(states: Array) -> Array:
-        shown = _shown(loop, states)
-        mixed = dot(vector_part(shown.attitude), apply(loop.craft.inertia, shown.rate))
-        return value_of(claim, loop, shown) + epsilon * mixed
-
-    return value
-
-
-def _shown(loop: ClosedLoop, states: Array) -> Measurement:
-    """Return the measurements that the law is shown at the states in the columns of an array."""
-    return shown_at(loop, unflatten(list(states[: ROWS.torque.stop]), loop.start))
+def _value(loop: ClosedLoop, programs: Any) -> Height:
+    """Return V of the states as the law is shown them."""
+    return lambda states: value_of(programs, loop, shown_at(loop, unflatten(list(states[: ROWS.torque.stop]), loop.start)))
 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
     """Return the largest torque, or of wheels torque and momentum, as a share of what is claimed."""
     torque = states[ROWS.torque]
-    if claim.kind == "wheels":
+    if "motors" in claim.numbers:
         wheels = cast(Wheels, loop.wheels)
         needs = (
             (np.array(wheels.least) @ torque, claim.numbers["motors"]),

@@ -27,9 +27,6 @@ Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
 EXACT_SIGN = "exact inequality"
 SQUARES, LYAPUNOV = "sum of squares", "Lyapunov's inequality"
-UNLIMITED = "torque not limited"
-WHEELS = "neither torque nor wheels limited, wheels without friction"
-"""Claims about loops with wheels assume this in place of torque that is not limited."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +47,11 @@ class Proof:
 
     claim: dict[str, Any]
     programs: dict[str, Any]
+
+    @property
+    def roles(self) -> dict[str, Any]:
+        """Return the programs by their roles."""
+        return {role: self.programs[name] for role, name in self.claim["programs"].items()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,6 +122,15 @@ class Certificate:
     def law(self) -> str:
         """Return the digest of the law's program that the proofs are about; empty where there are none."""
         return next((proof.claim["programs"]["law"] for proof in self.proofs if "law" in proof.claim["programs"]), "")
+
+    def programs(self, claim: Claim) -> dict[str, Any]:
+        """Return the programs that the proof of a claim is about, by their roles; none of a claim without a proof."""
+        proof = claim.proof
+        if proof is None and self.proof is not None and claim.outcome != "undecided":
+            # The proof that is told for all claims has those that are decided, in their order.
+            place = [one for one in self.claims if one.outcome != "undecided"].index(claim)
+            proof = Proof(self.proof["claims"][place], self.proof["programs"])
+        return {} if proof is None else proof.roles
 
     def claim(self, kind: str) -> Claim | None:
         """The claim of a kind, where one is made."""

@@ -9,20 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from starhold.algebra.polynomial import UnreadableError
+from starhold.algebra.polynomial import Polynomial, UnreadableError, constants, reciprocal
+from starhold.algebra.vector import dot
+from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, WHEELS
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
-from starhold.certification.convergence import assumed, converge
-from starhold.certification.disturbance import disturbance
-from starhold.certification.evidence.attitude import SAMPLED, SLIDING
+from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.isotropic import ISOTROPIC
-from starhold.certification.inertia import inertia_box, told
-from starhold.certification.limits import needed, torque_limit
-from starhold.certification.motion import Motion
 from starhold.certification.openness import bounded_torque, named
 from starhold.certification.proofs import proved_claims
-from starhold.certification.sampling import APART, sampling
-from starhold.certification.saturation import FREE, saturation
-from starhold.certification.subject import Subject, above, described, make_subject
+from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
+from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
@@ -44,6 +40,18 @@ class Wanted:
 
 
 BEST = Wanted()
+APART = "inertia, gains and period are too far apart in size"
+ASSUMPTIONS = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
+"""What all claims assume of which nothing is proved."""
+INSTEAD = {
+    "sliding": ("continuous-torque", UNLIMITED, "bounded-outside-torque"),
+    "torque-limit": ("continuous-torque", "known-outside-torque"),
+    "wheels": ("continuous-torque", FRICTIONLESS, "bounded-momentum", "known-outside-torque"),
+    "inertia": ("continuous-torque", UNLIMITED, "no-outside-torque", "target-at-rest"),
+    "sampling": (LINEAR, UNLIMITED, "no-outside-torque"),
+}
+"""What claims of a kind assume besides."""
+EVERYWHERE = {"rate_everywhere": None, "everything": True}
 
 
 def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certificate:
@@ -54,16 +62,15 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     # Torques that the loop's own parts add with a bound are disturbances that nobody models.
     wanted = replace(wanted, disturbance=wanted.disturbance + bounded_torque(loop))
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
-    everywhere = {"rate_everywhere": None, "everything": True}
     try:
         # What overflows in a guess is caught where the guess is verified.
         with np.errstate(all="ignore"):
             claims = _claims(subject, wanted)
     except UnreadableError as reason:
         # Nothing is known of such a law, whatever else was asked for.
-        claims = [_undecided("convergence", everywhere, subject, str(reason))]
+        claims = [undecided("convergence", EVERYWHERE, subject, str(reason))]
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
-        claims = [_undecided("convergence", everywhere, subject, f"{APART}: {reason}")]
+        claims = [undecided("convergence", EVERYWHERE, subject, f"{APART}: {reason}")]
     about = described(subject, [claim.kind for claim in claims])
     return Certificate(name or loop.law.name, about, named(claims, loop))
 
@@ -72,76 +79,90 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
     loop, claims = subject.loop, list[Claim]()
     sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
     if loop.remembers and loop.law.lyapunov is not None:
-        everywhere = {"rate_everywhere": None, "everything": True}
-        claims.append(_undecided("convergence", everywhere, subject, "the law keeps a memory from call to call"))
+        claims.append(undecided("convergence", EVERYWHERE, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
-        proved, failed = proved_claims(subject, wanted.slew_angle, wanted.rate)
+        proved, failed = proved_claims(subject, wanted.slew_angle, wanted.rate, wanted.inertia_tolerance)
         if loop.law.lyapunov is not None:
-            claims.extend(_by_lyapunov(subject, wanted, proved))
+            claims.extend(_by_lyapunov(subject, wanted, proved, failed))
         else:
             if loop.law.hook("single_root") is not None:
-                claims.append(proved.get("region") or _undecided("region", {}, subject, failed[ISOTROPIC]))
+                claims.append(proved.get("region") or undecided("region", {}, subject, failed[ISOTROPIC]))
             if loop.law.hook("surface") is not None and loop.wheels is None:
                 torque = {"torque": [above(m + subject.disturbance) for m in subject.modelled]}
-                claims.append(proved.get("sliding") or _undecided("sliding", torque, subject, failed[SLIDING]))
-            claims.extend(_unshown(subject, wanted))
-        sampled = proved.get("sampling") or sampling(Motion(subject))
-        if sampled is not None and sampled.proof is None and sampled.outcome != "undecided":
-            numbers = {"period": loop.period, "longest": None, "every_shorter": False}
-            reason = Obligation("form", EXACT, "undecided", {"reason": failed[SAMPLED]})
-            sampled = replace(sampled, numbers=numbers, obligations=(reason,))
-        claims.extend([] if sampled is None else [sampled])
-        claims = needed(claims, Motion(subject)) if loop.law.lyapunov is not None else claims
+                claims.append(proved.get("sliding") or undecided("sliding", torque, subject, failed[SLIDING]))
+            claims.extend(_unshown(subject, wanted, proved, "the law declares no V to show it with"))
+        claims.extend(between_samples(subject, proved, failed))
     return claims
 
 
-def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) -> list[Claim]:
-    rate = "best" if wanted.rate is None else None if wanted.rate == float("inf") else wanted.rate
-    main, basin = proved.get("convergence"), None
-    pushed = subject.disturbance != 0 or subject.modelled_norm != 0
-    wheeled = subject.loop.wheels is not None
-    limit, box = proved.get("wheels" if wheeled else "torque-limit"), proved.get("inertia")
-    if main is not None and main.outcome == "proved" and rate != "best" and not main.numbers["everything"]:
-        main = None
-    if main is None or main.outcome != "proved" or limit is None or box is None or pushed:
-        derived, found, own = converge(subject, rate)
-        # What refutes one V refutes no other.
-        main = derived if main is None or derived.outcome == "proved" != main.outcome else main
-        # The law's own V, where it serves, gives the larger sets.
-        basin = own or found
-    if basin is not None:
-        limit = limit or (saturation if wheeled else torque_limit)(basin, wanted.slew_angle)
-        box = box or inertia_box(basin, wanted.inertia_tolerance)
-    more = (
-        (limit, wanted.slew_angle or (wheeled and wanted.momentum is not None)),
-        (None if basin is None else disturbance(basin), wanted.disturbance),
-        (box, wanted.inertia_tolerance),
-    )
-    # What nobody asked for is claimed only where it is proved.
-    return [main, *(c for c, asked in more if c is not None and (asked or c.outcome == "proved"))]
+def between_samples(subject: Subject, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:
+    """The claim about torque held between samples, proved or not."""
+    if "sampling" not in proved:
+        read(subject.loop)
+    numbers = {"period": subject.loop.period, "longest": None, "every_shorter": False}
+    return [proved.get("sampling") or undecided("sampling", numbers, subject, failed.get(SAMPLED, "no proof was found"))]
 
 
-def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
-    """Claims that are asked of a law without a V of its own."""
-    rate, turn, tolerance = wanted.rate, wanted.slew_angle, wanted.inertia_tolerance
-    asked: list[tuple[str, dict[str, Any]]] = []
-    if rate is not None:
-        asked.append(("convergence", {"rate_everywhere": None if isinf(rate) else rate, "everything": isinf(rate)}))
-    limit = subject.loop.craft.torque_limit
-    if turn is not None and subject.loop.wheels is not None:
-        asked.append(("wheels", {"slew_angle": turn}))
-    elif turn is not None and subject.loop.limit != "none" and isfinite(limit):
-        asked.append(("torque-limit", {"slew_angle": turn, "kind": subject.loop.limit, "limit": limit}))
+def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:
+    main, rate = proved.get("convergence"), wanted.rate
+    reason = next((failed[name] for name in (STRICTLY, CONVERGES) if name in failed), "no proof was found")
+    if main is not None and main.outcome == "proved" and rate is not None and not main.numbers["everything"]:
+        reached = main.numbers["rate_everywhere"]
+        if reached is None or reached < rate:
+            shown = "on a set that does not hold every attitude" if reached is None else f"up to {reached:g} rad/s"
+            main, reason = None, f"it is proved {shown} only"
+    if main is None:
+        read(subject.loop)
+        everything = rate is None or isinf(rate)
+        told = {"rate_everywhere": None if everything else rate, "everything": everything}
+        main = undecided("convergence", told, subject, reason)
+    limits = next((text for name, text in failed.items() if name.endswith("limits")), reason)
+    others = [proved[kind] for kind in ("wheels", "torque-limit", "inertia") if kind in proved]
+    return [main, *others, *_unshown(subject, wanted, proved, limits, failed.get(NEARBY, reason))]
+
+
+def _unshown(
+    subject: Subject, wanted: Wanted, proved: Mapping[str, Claim], reason: str, uncertain: str | None = None
+) -> list[Claim]:
+    """Claims that are asked for and not proved."""
+    rate, turn, tolerance, loop = wanted.rate, wanted.slew_angle, wanted.inertia_tolerance, subject.loop
+    asked: list[tuple[str, dict[str, Any], str]] = []
+    if rate is not None and loop.law.lyapunov is None:
+        told = {"rate_everywhere": None if isinf(rate) else rate, "everything": isinf(rate)}
+        asked.append(("convergence", told, reason))
+    limit, wheels = loop.craft.torque_limit, loop.wheels
+    if wheels is not None:
+        if turn is not None or (wanted.momentum is not None and loop.law.lyapunov is not None):
+            asked.append(("wheels", {} if turn is None else {"slew_angle": turn}, reason))
+    elif turn is not None and loop.limit != "none" and isfinite(limit):
+        asked.append(("torque-limit", {"slew_angle": turn, "kind": loop.limit, "limit": limit}, reason))
     if tolerance is not None:
-        asked.append(("inertia", {"tolerance": tolerance}))
-    return [_undecided(kind, numbers, subject, "the law declares no V to show it with") for kind, numbers in asked]
+        asked.append(("inertia", {"tolerance": tolerance}, uncertain or reason))
+    if wanted.disturbance and loop.law.lyapunov is not None:
+        asked.append(("disturbance", {"torque": wanted.disturbance}, "nothing bounds where the motion ends"))
+    return [undecided(kind, told, subject, why) for kind, told, why in asked if kind not in proved]
 
 
-def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
-    limits = {"torque-limit": (), "wheels": FREE}
-    assumptions = assumed(subject, limits=limits[kind]) if kind in limits else assumed(subject)
-    if kind == "sliding":
-        assumptions = assumed(subject, outside=("torque from outside bounded on each axis",))
+def undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
+    """A claim of which it is not known whether it holds, with the reason."""
+    besides = INSTEAD.get(kind, ("continuous-torque", UNLIMITED, "known-outside-torque"))
+    assumptions = [*ASSUMPTIONS, *besides] + ["no-wheels"] * (kind == "sampling" and subject.loop.wheels is not None)
+    if subject.loop.wheels is not None:
+        assumptions = [WHEELS if name == UNLIMITED else name for name in assumptions]
     if kind == "inertia":
-        assumptions = told(subject, numbers["tolerance"])
-    return Claim(kind, numbers, {}, assumptions, (Obligation("form", EXACT, "undecided", {"reason": reason}),))
+        assumptions[1] = "inertia-near"
+    return Claim(kind, numbers, {}, tuple(assumptions), (Obligation("form", EXACT, "undecided", {"reason": reason}),))
+
+
+def read(loop: ClosedLoop) -> None:
+    """Read the law with polynomials in place of numbers. UnreadableError, with the operation and its line, where they cannot
+    follow it."""
+    memory, craft = loop.law.remember(loop.gains, loop.known, loop.period), loop.known
+    w, v, r, a, e, p, h, b = map(direction, "wvraephb")
+    period: Any = Polynomial.constant(loop.period)
+    measurement = Measurement(direction("q", 0, 4), w, v, r, a, e, p, period, h, b)
+    q: Any = direction("q")
+    with reciprocal(1 + dot(q, q), "z"):
+        loop.law.command(
+            measurement, constants(loop.gains), exact_craft(craft.inertia, craft.torque_limit, craft.gravity), memory
+        )

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
-from starhold.certification.evidence.attitude import CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
+from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
+from starhold.certification.hand_over import Ends
 from starhold.certification.subject import make_subject
-from starhold.kernel.loops import HYSTERESIS, SHORTEST, WHEELS
+from starhold.kernel.loops import HANDED, HYSTERESIS, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import BAND
 
 
-def differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
-    """Return how a claim, which the kernel has checked, is about another loop than this one; nothing where it is not."""
+def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = None) -> list[str]:
+    """Return how a claim, which the kernel has checked, is about another loop than this one, or about less than another mode
+    hands over, up to its ends; nothing where it is not."""
     own = Loop(make_subject(loop))
-    return [*_programs(claim, own), *_numbers(claim, own), *_words(claim, own)]
+    return [*_programs(claim, own), *_numbers(claim, own), *_words(claim, own), *_handed_over(claim, ends)]
 
 
 def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
@@ -67,6 +69,28 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
             yield f"{name} is exceeded"
         if name in most and isfinite(most[name]) and side * x > side * Fraction(most[name]):
             yield f"{name} is lower"
+    if any(name.startswith(("motors", "stored")) for name in told):
+        yield from (
+            f"{name} is not told"
+            for name, x in most.items()
+            if "." in name and name[0] in "ms" and isfinite(x) and name not in told
+        )
+
+
+def _handed_over(claim: Mapping[str, Any], ends: Ends | None) -> Iterator[str]:
+    if HANDED not in claim["taken"]:
+        return
+    if ends is None:
+        yield "no mode hands over to it"
+        return
+    rate, angle = ends
+    # Which of its quaternions tells an attitude matters but for these.
+    either = SHORTEST in claim["taken"] or "both" in claim["theorem"]
+    least = {"rate": inf if rate is None else rate, "angle": angle if angle is not None and either else ANY_ANGLE}
+    for name, most in least.items():
+        told = claim["numbers"].get(f"start.{name}")
+        if told is not None and rational(told) < most:
+            yield f"the mode before may end with a larger {name}"
 
 
 def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:

@@ -4,24 +4,18 @@ switch, lies in the set from which this one brings the body to rest on target.""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import pi
-from typing import Any
+from typing import TypeAlias
 
-import numpy as np
-from flint import arb
-
-from starhold.algebra.polynomial import UnreadableError, exact
-from starhold.certification.certificate import BALLS, Certificate, Claim
-from starhold.certification.convergence import Basin, Obligations, assumed, converge, reached
-from starhold.certification.limits import needed
-from starhold.certification.matrices import greatest, number
+from starhold.certification.certificate import Certificate
+from starhold.certification.certify import between_samples, undecided
 from starhold.certification.openness import READ, named
-from starhold.certification.sampling import sampling
-from starhold.certification.subject import above, below, described, described_target, make_subject, upper
-from starhold.laws.modes import ENDS
+from starhold.certification.proofs import taken_over
+from starhold.certification.subject import described, described_target, make_subject
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
+Ends: TypeAlias = tuple[float | None, float | None]
+"""Rate (rad/s) and angle (rad) up to which a switch hands over; None for no bound."""
 ROUNDING = 2.0**-45
 """Share by which a rate or an angle that a law computes is off at most, for angles up to `WIDEST`."""
 WIDEST = 3.0
@@ -34,73 +28,28 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     and nothing bounds the rate."""
     if loop.remembers or loop.law.lyapunov is None or not (loop.wheels is None or gives_allocated_torque(loop.wheels)):
         return None
-    subject = make_subject(loop)
-    target, last = described_target(loop), described_target(before)
-    rate, angle = _ends(levels, last, target)
-    try:
-        with np.errstate(all="ignore"):
-            basins = [basin for basin in converge(subject)[1:] if basin is not None]
-    except (UnreadableError, OverflowError, ZeroDivisionError, np.linalg.LinAlgError):
+    subject, (rate, angle) = make_subject(loop), ends(levels, before, loop)
+    found = taken_over(subject, rate, angle)
+    if found is None:
         return None
-    if not basins:
-        return None
-    rate = None if rate is None else above(exact(rate * (1.0 + ROUNDING)))
-    told = angle is not None and angle <= WIDEST and (basins[0].frame.potential.even or loop.sign_policy == "shortest")
-    angle = above(exact(angle * (1.0 + ROUNDING))) if told and angle is not None else None
-    if rate is None and all(basin.start is not None for basin in basins):
-        return None
-    share, basin = max(((_share(basin, rate, angle), basin) for basin in basins), key=lambda found: found[0] is not None)
-    sampled = sampling(basin.motion)
-    claims = needed([_claim(basin, rate, angle, share)], basin.motion) + ([] if sampled is None else [sampled])
-    switch = {"levels": {test: levels[test] for test in ENDS if test in levels}, "before": last, "after": target}
-    return Certificate(name, {**described(subject), "switch": switch}, named(claims, loop))
+    proved, failed = found
+    beyond = undecided("hand-over", {"rate": rate, "angle": angle}, subject, "it reaches beyond the region of convergence")
+    claims = [proved.get("hand-over", beyond), *between_samples(subject, proved, failed)]
+    return Certificate(name, described(subject), named(claims, loop))
 
 
-def _ends(levels: Mapping[str, float], before: Any, after: Any) -> tuple[float | None, float | None]:
-    """Rate and angle, relative to the target of the next mode, up to which the tests of a switch hold; None for no bound."""
+def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> Ends:
+    """Rate and angle, relative to the target of the next mode, up to which the tests of a switch hold, as rounding may pass
+    them; None for no bound."""
+    last, target = described_target(before), described_target(after)
     # Of other targets the description does not hold all.
-    same = before == after and after["target"] in READ["target"]
-    still = after["target"] == "inertial"
-    rates = [levels.get("rate_below")] if same or (still and before["target"] == "inertial") else []
+    same = last == target and target["target"] in READ["target"]
+    still = target["target"] == "inertial"
+    rates = [levels.get("rate_below")] if same or (still and last["target"] == "inertial") else []
     rates += [levels.get("body_rate_below")] if still else []
-    bounds = [rate for rate in rates if rate is not None]
-    return min(bounds, default=None), levels.get("angle_below") if same else None
-
-
-def _claim(basin: Basin, rate: float | None, angle: float | None, share: float | None) -> Claim:
-    before, witness = reached(basin, basin.stay)
-    found, start = Obligations(before), basin.start
-    reason = {"reason": "it reaches beyond the region of convergence"}
-    found.add(INSIDE, BALLS, True if share is not None else None, {} if share is not None else reason)
-    numbers = {
-        "level": None if basin.stay is None else number(basin.stay),
-        "start": None if start is None else number(start),
-        "everything": start is None,
-        "rate": rate,
-        "angle": angle,
-    }
-    witness["attitude_level"] = None if start is None else share
-    return Claim("hand-over", numbers, witness, assumed(basin.motion.subject), tuple(found))
-
-
-INSIDE = "holds what is handed over"
-
-
-def _share(basin: Basin, rate: float | None, angle: float | None) -> float | None:
-    """A part of the level that the attitude may take up, the rest being enough for the rate; None where there is none."""
-    start, potential = basin.start, basin.frame.potential
-    if start is None:
-        return 0.0
-    if rate is None:
-        return None
-    left = below(start - greatest(basin.frame.P) * exact(rate) ** 2 / 2)
-    return left if left > 0.0 and exact(left) >= _highest(basin, angle, potential) else None
-
-
-def _highest(basin: Basin, angle: float | None, potential: Any) -> Any:
-    """A bound of the attitude's part of V up to an angle."""
-    shorter = basin.motion.subject.loop.sign_policy == "shortest"
-    if angle is None or angle >= pi:
-        return potential.top / 2 if shorter and not potential.even else potential.top
-    sine = (arb(angle) / (2 if potential.even else 4)).sin()
-    return potential.top * upper(sine * sine)
+    rate = min((rate for rate in rates if rate is not None), default=None)
+    angle = levels.get("angle_below") if same else None
+    return (
+        None if rate is None else rate * (1.0 + ROUNDING),
+        None if angle is None or angle > WIDEST else angle * (1.0 + ROUNDING),
+    )

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.vector import dot
-from starhold.parts.bodies.rigid_body import ROWS
 
 
 class Shape(NamedTuple):
@@ -35,21 +34,6 @@ class Shape(NamedTuple):
     def room(self, bound: float, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """{V <= bound} at u is a ball of rates: its radius squared, below zero where it is empty."""
         return 2.0 * (bound - self.p * u - self.c2 * u * u) + (self.g + self.m * u) ** 2 * u * (2.0 - u)
-
-    def draw(self, level: float, count: int, random: np.random.Generator) -> NDArray[np.float64]:
-        """States (16, count) of {V <= level}, half of them on its surface. Not part of any proof."""
-        axes, directions = random.normal(size=(2, 3, count))
-        axes /= np.linalg.norm(axes, axis=0)
-        directions /= np.linalg.norm(directions, axis=0)
-        u = random.uniform(0.0, 2.0, size=count)
-        # Where no rate is small enough, less of the turn.
-        while ((room := self.room(level, u)) < 0.0).any():
-            u = np.where(room < 0.0, 0.9 * u, u)
-        inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count) ** (1.0 / 3.0))
-        states = np.zeros((ROWS.torque.stop, count))
-        states[0], states[1:4] = 1.0 - u, np.sqrt(u * (2.0 - u)) * axes
-        states[ROWS.rate] = -((self.g + self.m * u) * states[1:4] + inside * np.sqrt(room) * directions)
-        return states
 
     def volume(self, bound: float) -> float:
         """The volume of {V <= bound} among attitudes and rates, up to a factor."""

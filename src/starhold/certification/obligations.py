@@ -59,7 +59,6 @@ OBLIGATIONS = {
     "equilibria too, but unstable, so that only a set of measure zero ends there",
     "jumps lower V": "every switch of the hysteresis lowers V",
     "convergence": "the set lies in the region of convergence",
-    "holds what is handed over": "every state in which the mode before may end is in the set",
     "torque": "the torque is within the limit on the whole set",
     "momentum": "no wheel stores more than it can on the whole set",
     "end": "outside a small ball V falls in spite of the torque",

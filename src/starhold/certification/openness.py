@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from starhold.certification.assumptions import WITHOUT
 from starhold.certification.certificate import Claim
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.orbit import body_of, lowest
@@ -18,8 +19,6 @@ READ = {
 """The parts that theorems take in, by role; what a claim takes of their torques and motions its other assumptions say."""
 BOUNDED = ("disturbance",)
 """Kinds of claims that take in torques from outside by their bounds."""
-WITHOUT = "without the "
-"""Begins the assumption that a part is not there."""
 
 
 def bounded_torque(loop: ClosedLoop) -> float:

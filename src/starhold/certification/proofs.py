@@ -10,19 +10,18 @@ from typing import Any
 
 from flint import fmpq
 
+from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.certificate import (
     EXACT,
     EXACT_SIGN,
     LYAPUNOV,
     SQUARES,
-    UNLIMITED,
-    WHEELS,
     Claim,
     Obligation,
     Proof,
 )
-from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.claims import find_claims
+from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
+from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import certificate, obligations
 from starhold.certification.evidence.refuted import (
     AWAY,
@@ -46,43 +45,39 @@ HOW = {
     **dict.fromkeys(("Contracts", "Persists"), LYAPUNOV),
 }
 """How each rule of the kernel shows what it shows."""
-ASSUMPTIONS = {
-    "rigid-body": "rigid body",
-    "inertia-as-given": "inertia exactly as given",
-    "exact-measurement": "exact measurement and ideal actuators",
-    "ideal-actuators": "exact measurement and ideal actuators",
-    "continuous-torque": "torque applied continuously",
-    "unlimited-torque": UNLIMITED,
-    "unlimited-wheels": WHEELS,
-    "no-outside-torque": "no torque from outside",
-    "known-outside-torque": "no torque from outside but what the law cancels",
-    "bounded-outside-torque": "torque from outside bounded on each axis",
-    "frictionless-wheels": "wheels without friction",
-    "bounded-momentum": "total momentum at most as told",
-    "linear-motion": "linear motion near rest on a target at rest",
-}
-"""What the kernel's identifiers are called."""
-OF_A_LOOP = {"target-at-rest": "target at rest", "no-wheels": "no stored momentum"}
-"""What a claim assumes only of a loop whose target moves, or that has wheels."""
 IN_THE_LOOP = {"known-target", "bounded-target", "quaternion-as-fed", "sign-at-once"}
 """What every loop meets as it is composed: its law is told how the target moves, and how the quaternion's sign is chosen."""
 
 
 def proved_claims(
-    subject: Subject, turn: float | None = None, rate: float | None = None
+    subject: Subject, turn: float | None = None, rate: float | None = None, tolerance: float | None = None
 ) -> tuple[dict[str, Claim], dict[str, str]]:
     """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: what is proved,
     and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within limits
-    is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any)."""
-    found = find_claims(subject, turn)
+    is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any); tolerance: of
+    the inertia, the largest unless told."""
+    found = find_claims(subject, turn, tolerance)
     find_refuted(found, turn, rate)
-    if not found.claims:
-        return {}, found.failed
-    content = certificate(found.programs, found.claims)
-    claims = [made(proved, given, found) for proved, given in zip(check(json.dumps(content)), found.claims, strict=True)]
+    claims = checked(found)
     # What is refuted is what was asked for, where less may be proved.
     against = [claim for claim in claims if claim.outcome == "refuted"]
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
+
+
+def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tuple[dict[str, Claim], dict[str, str]] | None:
+    """Return the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) end on
+    target, where it is proved, and the one about torque held between samples, by their kinds, and why others were not found;
+    None where it is not known from where motions end, or where that is not everywhere and nothing bounds the rate."""
+    found = find_taken_over(subject, rate, angle)
+    return None if found is None else ({claim.kind: claim for claim in checked(found)}, found.failed)
+
+
+def checked(found: Loop) -> list[Claim]:
+    """Return claims that were found, as the kernel tells of them."""
+    if not found.claims:
+        return []
+    content = certificate(found.programs, found.claims)
+    return [made(proved, given, found) for proved, given in zip(check(json.dumps(content)), found.claims, strict=True)]
 
 
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
@@ -108,16 +103,14 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
 
 
 def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
-    """Return what a claim assumes, once each."""
-    own = {"target-at-rest": loop.known.moving, "no-wheels": loop.loop.wheels is not None}
-    named = [
-        ASSUMPTIONS[name] if name in ASSUMPTIONS else OF_A_LOOP[name]
-        for name in identifiers
-        if name not in IN_THE_LOOP and own.get(name, True)
-    ]
-    if loop.loop.wheels is not None and UNLIMITED in named:
-        named = [WHEELS if name == UNLIMITED else name for name in named if name != "wheels without friction"]
-    return tuple(dict.fromkeys(named))
+    """Return what a claim assumes beyond what its loop meets as it is composed."""
+    wheeled = loop.loop.wheels is not None
+    own = {"target-at-rest": loop.known.moving, "no-wheels": wheeled} | dict.fromkeys(IN_THE_LOOP, False)
+    named = [name for name in identifiers if own.get(name, True)]
+    if wheeled and UNLIMITED in named:
+        # Without friction, too.
+        named = [WHEELS if name == UNLIMITED else name for name in named if name != FRICTIONLESS]
+    return tuple(named)
 
 
 def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
@@ -133,7 +126,10 @@ def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         }
     # Of an inertia that is not known no rate is told.
     level, angle, rate = (below(_exact(numbers[n])) if n in numbers else None for n in ("level", "angle", "rate"))
-    return {"level": level, "start": level, "everything": False, "slew_angle": angle, "rate": rate, "rate_everywhere": None}
+    whole = numbers.get("start.angle") == ANY_ANGLE
+    everywhere = below(_exact(numbers["start.rate"])) if whole else None
+    begun = {"slew_angle": angle, "rate": rate, "rate_everywhere": everywhere}
+    return {"level": level, "start": level, "everything": False, **begun}
 
 
 def _limit(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
@@ -143,14 +139,25 @@ def _limit(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     each = {
-        name: [above(_exact(numbers[f"{key}.{k}"])) for k in range(len(loop.loop.rotors))]
+        name: [above(_exact(numbers[at])) if (at := f"{key}.{k}") in numbers else None for k in range(len(loop.loop.rotors))]
         for name, key in (("motors", "motors"), ("wheel_momentum", "stored"))
     }
     return _set(numbers, loop) | {"momentum": float(numbers["momentum"])} | each
 
 
 def _inertia(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
-    return {"tolerance": None} | {name: x for name, x in _set(numbers, loop).items() if name != "level"}
+    tolerance = {"tolerance": below(_exact(numbers["tolerance"])) if "tolerance" in numbers else None}
+    return tolerance | {name: x for name, x in _set(numbers, loop).items() if name != "level"}
+
+
+def _handed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+    begun = _set(numbers, loop)
+    angle = numbers.get("start.angle", Fraction(ANY_ANGLE))
+    bounds = {
+        "rate": below(_exact(numbers["start.rate"])) if "start.rate" in numbers else None,
+        "angle": below(_exact(angle)) if angle < ANY_ANGLE else None,
+    }
+    return {name: begun[name] for name in ("level", "start", "everything")} | bounds
 
 
 def _sampled(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
@@ -180,6 +187,7 @@ def _exact(x: Fraction) -> Any:
 
 _NUMBERS = {
     "convergence": _set,
+    "hand-over": _handed,
     "region": _set,
     "torque-limit": _limit,
     "wheels": _wheels,

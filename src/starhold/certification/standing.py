@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import dataclass
 
-from starhold.certification.certificate import UNLIMITED, WHEELS, Claim
+from starhold.certification.assumptions import UNLIMITED, WHEELS
+from starhold.certification.certificate import Claim
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from starhold.certification.evidence.station import UNSHOWN, Station, full_probl
 from starhold.certification.openness import assumed_away, named
 from starhold.certification.subject import described_gains
 from starhold.kernel.check import check
-from starhold.kernel.sentences import ASSUMPTIONS
 from starhold.laws.point_programs import claim_of
 from starhold.loop.closed_loop import ClosedLoop
 
@@ -85,9 +84,7 @@ def _undecided(loop: ClosedLoop, kind: str, obligation: str, why: str, told: Any
     names += ["off-the-bodies"] if kind == "equilibrium" and full_problem(loop) else []
     how = EXACT if obligation == "form" else BALLS
     reason = {"reason": _mismatch(loop) or why}
-    return Claim(
-        kind, told or {}, {}, tuple(ASSUMPTIONS[n] for n in names), (Obligation(obligation, how, "undecided", reason),)
-    )
+    return Claim(kind, told or {}, {}, tuple(names), (Obligation(obligation, how, "undecided", reason),))
 
 
 def _mismatch(loop: ClosedLoop) -> str:

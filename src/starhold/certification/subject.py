@@ -110,7 +110,6 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
         "assumed_away": assumed_away(loop),
         "bounded_away": bounded_away(loop),
         "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
-        "switch": None,
     }
 
 

@@ -9,8 +9,8 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import Any, cast
 
-from starhold.certification.certificate import FILE, WHEELS, Certificate, Claim, Obligation
-from starhold.certification.openness import WITHOUT
+from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS, WITHOUT
+from starhold.certification.certificate import FILE, Certificate, Claim, Obligation
 from starhold.laws.catalogue import file_of, known_law
 
 HEADINGS = {
@@ -60,7 +60,7 @@ def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
 
 def _unlimited(claim: Claim, subject: Mapping[str, Any]) -> str:
     """The parts and limits that a claim takes away from the loop; empty where it has none."""
-    absent = [text.removeprefix(WITHOUT) for text in claim.assumptions if text.startswith(WITHOUT)]
+    absent = [name.removeprefix(WITHOUT) for name in claim.assumptions if name.startswith(WITHOUT)]
     # What a loop has and a claim leaves out decides what the claim is worth.
     return (f"without {enumerated(absent)}, " if absent else "") + _unbounded(claim, subject)
 
@@ -79,14 +79,14 @@ def listed(words: Sequence[str]) -> str:
 
 
 def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:
-    if claim.kind == "sampling":
+    if LINEAR in claim.assumptions:
         return ""
     if WHEELS in claim.assumptions:
         return "with wheels that have neither limits nor friction, "
     limited = subject.get("limit", "none") != "none"
-    if "torque not limited" in claim.assumptions and limited and subject.get("torque_limit") is not None:
+    if UNLIMITED in claim.assumptions and limited and subject.get("torque_limit") is not None:
         return "with unlimited torque, "
-    if "control not limited" in claim.assumptions and limited and subject.get("control_limit") is not None:
+    if UNLIMITED_CONTROL in claim.assumptions and limited and subject.get("control_limit") is not None:
         return "with unlimited control, "
     return ""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, cast
 
-from starhold.checker.exact import CheckError
+from starhold.checker.shapes import CheckError
 from starhold.errors import InputError
 
 BYTES, DEEPEST, DIGITS = 2**26, 32, 1_000

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from starhold.checker.exact import CheckError, Verdict, demand
+from starhold.checker.shapes import CheckError, Verdict, demand
 from starhold.kernel.check import Proved
 from starhold.kernel.programs import digest
 from starhold.kernel.sentences import ASSUMPTIONS
@@ -106,7 +106,7 @@ def station_findings(
 
 
 def _undecided(claim: Mapping[str, Any], absent: list[str]) -> Iterator[tuple[str, str, Verdict, str]]:
-    known = [*ASSUMPTIONS.values(), *absent]
+    known = [*ASSUMPTIONS, *absent]
     demand(all(text in known for text in claim["assumptions"]), "the assumptions are not those of such a claim")
     demand(all(text in claim["assumptions"] for text in absent), "the assumptions are not those of such a claim")
     demand(not claim["witness"] and len(claim["obligations"]) == 1, "what is undecided has one reason")

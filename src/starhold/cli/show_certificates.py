@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 from rich.table import Table
 
+from starhold.certification.assumptions import texts
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, eigenvalues, evidence, methods, sentence, unclaimed
@@ -94,18 +95,18 @@ def reasons(claim: Claim) -> list[str]:
 
 def assumptions(certificate: Certificate) -> str:
     """Every assumption once, with the claims that need it where not all do."""
-    kinds = {claim.kind: claim.assumptions for claim in certificate.claims}
-    texts: list[str] = []
+    kinds = {claim.kind: texts(claim.assumptions) for claim in certificate.claims}
+    found: list[str] = []
     for assumption in dict.fromkeys(a for assumed in kinds.values() for a in assumed):
         holders = [HEADINGS[kind] for kind, assumed in kinds.items() if assumption in assumed]
         others = [HEADINGS[kind] for kind, assumed in kinds.items() if assumption not in assumed]
         if not others:
-            texts.append(assumption)
+            found.append(assumption)
         elif len(others) < len(holders):
-            texts.append(f"{assumption} (not for: {', '.join(others)})")
+            found.append(f"{assumption} (not for: {', '.join(others)})")
         else:
-            texts.append(f"{assumption} (for: {', '.join(holders)})")
-    return "; ".join(texts)
+            found.append(f"{assumption} (for: {', '.join(holders)})")
+    return "; ".join(found)
 
 
 def print_compared(others: Sequence[str], scenario: str | None) -> None:

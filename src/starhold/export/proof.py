@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from starhold.certification.assumptions import texts
 from starhold.certification.certificate import FILE, Certificate
 from starhold.certification.wording import HEADINGS, evidence, recheck, sentence, unclaimed
 
@@ -37,7 +38,7 @@ def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
             whose = f"{certificate.name}: " if len(certificates) > 1 else ""
             text = f"{whose}{HEADINGS[claim.kind]}: {sentence(claim, certificate.subject)}"
             claims.append(f"{claim.outcome}: {text}")
-            assumed |= dict.fromkeys(claim.assumptions)
+            assumed |= dict.fromkeys(texts(claim.assumptions))
             if claim.outcome != "proved":
                 refutation = claim.refutation()
                 why = f" ({evidence(refutation)})" if refutation is not None else ""

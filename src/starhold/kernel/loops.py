@@ -13,11 +13,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
+from itertools import combinations
 from typing import TypeAlias
 
-from .numbers import Rows, demand, inverse
+from .numbers import Rows, demand, inverse, plus, scalar
 from .polynomials import Poly, apply, cross, dot, minus, poly, total, var, variables
-from .programs import Asking, Exactly, Piecewise, known, single
+from .programs import Asking, Case, Exactly, Piecewise, joined, known, single
 from .reading import Claim
 from .rules import Definite, Shown, vanish
 
@@ -26,6 +27,8 @@ OUTSIDE, MOVING, WHEELS = "outside torque", "moving target", "wheels"
 """A loop has these only where the claim takes it with them."""
 SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
 """How the sign of the quaternion that is fed back is chosen: otherwise it never changes."""
+HANDED = "handed over"
+"""The loop takes over from another one in any of the states that the claim says its set holds."""
 NONE = [Poly({})] * 3
 Matrix: TypeAlias = Sequence[Sequence[Poly | Fraction]]
 Wired: TypeAlias = Mapping[str, Poly]
@@ -76,19 +79,23 @@ class Loop:
 
 
 class AttitudeLoop(Loop):
-    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are.
-    `quotients`: programs may divide by the state, but not by quotients, and take no roots of it."""
+    """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are. `near`:
+    such a J near the given one, J0: no entry is off by more than `tolerance` sqrt(J0_ii J0_kk). `quotients`: programs may
+    divide by the state, but not by quotients, and take no roots of it."""
 
     driven = ("w1", "w2", "w3")
 
-    def __init__(self, claim: Claim, any_inertia: bool = False, quotients: bool = False) -> None:
+    def __init__(self, claim: Claim, any_inertia: bool = False, near: bool = False, quotients: bool = False) -> None:
         super().__init__(claim, Asking(nested=False) if quotients else Exactly())
-        self.any_inertia = any_inertia
+        self.any_inertia, self.near = any_inertia or near, near
         self.q, self.w = variables("q", 0), variables("w")
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
         self.e = variables("e") if self.outside else NONE
         self.r, self.a = (variables(letter) if self.moving else NONE for letter in "ra")
         self.J, self.J_inverse = self._inertia()
+        # dV/dw = J (w + lean q).
+        self.lean = claim.numbers["lean"] if near else Fraction(0)
+        self.leaning = [w + self.lean * q for w, q in zip(self.w, self.q[1:], strict=True)]
         self.rate = [w + r for w, r in zip(self.w, self.r, strict=True)]
         spin = apply(self.J, self.rate)
         self.H = variables("h") if self.wheels else spin
@@ -109,12 +116,32 @@ class AttitudeLoop(Loop):
         self.rates = {f"q{k}": rate for k, rate in enumerate(self.turning)}
 
     def _inertia(self) -> tuple[Matrix, Matrix]:
-        places = [[f"{min(i, k)}.{max(i, k)}" for k in AXES] for i in AXES]
         if self.any_inertia:
-            pair = ([[var(x + place.replace(".", "")) for place in row] for row in places] for x in "ji")
+            pair = ([[var(f"{x}{min(i, k)}{max(i, k)}") for k in AXES] for i in AXES] for x in "ji")
             return next(pair), next(pair)
-        J = [[self.claim.subject[f"body.inertia.{place}"] for place in row] for row in places]
-        return J, inverse(J)
+        return self.given, inverse(self.given)
+
+    @cached_property
+    def given(self) -> Rows:
+        """Return the inertia that the claim gives."""
+        return [[self.claim.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in AXES] for i in AXES]
+
+    @cached_property
+    def off(self) -> Fraction:
+        """Return a bound of |x.(J - J0) y| / (|x| |y|) for an inertia J near the given one, J0."""
+        return self.claim.numbers["tolerance"] * sum(self.given[i][i] for i in AXES)
+
+    def heaviest(self, x: Sequence[Poly]) -> list[Poly]:
+        """Return what is not negative for inertias near the given one, as x.Jx is no more than the most times |x|^2."""
+        return [self.claim.numbers["inertia.most"] * dot(x, x) - dot(x, apply(self.J, x))] if self.near else []
+
+    def shifted(self) -> list[Poly]:
+        """Return what is not negative for inertias near the given one, as |q0 w + w x q| <= |w|."""
+        if not self.near:
+            return []
+        w, own = self.w, self.q[1:]
+        turned = [self.q[0] * x + c for x, c in zip(w, cross(w, own), strict=True)]
+        return [self.off * dot(w, w) - dot(turned, minus(apply(self.J, w), apply(self.given, w)))]
 
     @property
     def divisors(self) -> dict[str, Poly]:
@@ -126,7 +153,7 @@ class AttitudeLoop(Loop):
         """Return what is assumed of a body of this loop."""
         return [
             "rigid-body", "exact-measurement", "ideal-actuators",
-            *([] if self.any_inertia else ["inertia-as-given"]),
+            *(["inertia-near"] if self.near else [] if self.any_inertia else ["inertia-as-given"]),
             "known-outside-torque" if self.outside else "no-outside-torque",
             "known-target" if self.moving else "target-at-rest",
             "frictionless-wheels" if self.wheels else "no-wheels",
@@ -136,6 +163,17 @@ class AttitudeLoop(Loop):
     def law(self) -> list[Piecewise]:
         """Return the torque that the law asks for, case by case."""
         return self.read("law", 3)
+
+    @cached_property
+    def sides(self) -> Piecewise:
+        """Return the cases of the law's three torques together, which are continuous."""
+        demand(all(a.agrees(b) for cases in self.law for a, b in combinations(cases, 2)), "the law's torque jumps")
+        return joined(self.law)
+
+    @cached_property
+    def quiet(self) -> Case:
+        """Return the case that holds around all rests."""
+        return around(self.sides, self.still)
 
     @cached_property
     def u(self) -> list[Poly]:
@@ -178,8 +216,11 @@ class AttitudeLoop(Loop):
         if self.any_inertia:
             columns = list(zip(*self.J_inverse, strict=True))
             inverses = [dot(self.J[i], columns[k]) - (i == k) for i in AXES for k in AXES]
-        else:
-            yield "inertia", Definite([[poly(x).number for x in row] for row in self.J])
+        if self.near or not self.any_inertia:
+            yield "inertia", Definite(self.given)
+        if self.near:
+            most = self.claim.numbers["inertia.most"] - self.off
+            yield "largest moment", Definite(plus(scalar(most), self.given, -1))
         pushed = variables("t")
         plant = wired_matrix("craft.inertia", self.J) | wired_matrix("craft.inverse_inertia", self.J_inverse)
         moved = self.single("body", 3, wired("rate", self.w), wired("torque", pushed), plant)
@@ -188,6 +229,14 @@ class AttitudeLoop(Loop):
         yield from vanish(
             "turning", minus(self.single("turning", 4, wired("q", self.q), wired("rate", self.w)), self.turning)
         )
+
+
+def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
+    """Return the one case that holds around rest, where none of its conditions is on its border."""
+    sides = [[(Poly(dict(p)).at(rest).number, truth) for p, truth in case.guards] for case in cases]
+    holds = [all(x != 0 and (x > 0) == truth for x, truth in own) for own in sides]
+    demand(holds.count(True) == 1, "the law switches at rest")
+    return cases[holds.index(True)]
 
 
 def slopes(parts: Sequence[Poly], letter: str, at: Mapping[str, Poly | Fraction | int]) -> Rows:

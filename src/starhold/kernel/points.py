@@ -6,29 +6,15 @@ Roots and quotients by the state are variables, the same wherever the same is as
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 from .loops import Loop, wired
 from .numbers import demand
 from .polynomials import Poly, dot, var, variables
-from .programs import Asking, Guards, joined
+from .programs import Asking, Case, Piecewise, joined
 from .reading import Claim
 
 STATE = ("x1", "x2", "x3", "v1", "v2", "v3")
-
-
-@dataclass(frozen=True)
-class Side:
-    """The control where guards hold."""
-
-    guards: Guards
-    u: list[Poly]
-
-    @property
-    def known(self) -> list[Poly]:
-        """Return what is not negative there."""
-        return [Poly(dict(condition)) * (1 if above else -1) for condition, above in sorted(self.guards)]
 
 
 class PointLoop(Loop):
@@ -47,15 +33,15 @@ class PointLoop(Loop):
         demand(not claim.taken.content, "the loop is taken with nothing")
 
     @cached_property
-    def sides(self) -> list[Side]:
+    def sides(self) -> Piecewise:
         """Return the cases of the law's three outputs together."""
-        return [Side(case.guards, case.value) for case in joined(self.read("law", 3))]
+        return joined(self.read("law", 3))
 
-    def acceleration(self, side: Side) -> list[Poly]:
+    def acceleration(self, side: Case) -> list[Poly]:
         """Return v'."""
-        return [a + u for a, u in zip(self.field, side.u, strict=True)]
+        return [a + u for a, u in zip(self.field, side.value, strict=True)]
 
-    def asked(self, side: Side) -> set[str]:
+    def asked(self, side: Case) -> set[str]:
         """Return the variables of the acceleration."""
         return {name for p in self.acceleration(side) for name in p.names}
 

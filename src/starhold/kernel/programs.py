@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from typing import Any, TypeAlias
 
 from .numbers import Account, demand, rational, read_list, read_table
@@ -87,6 +88,23 @@ class Case:
 
     guards: Guards
     value: Any
+
+    @property
+    def known(self) -> list[Poly]:
+        """Return what is not negative where the case holds, and on the border of that."""
+        return [Poly(dict(p)) * (1 if above else -1) for p, above in sorted(self.guards)]
+
+    def agrees(self, other: Case) -> bool:
+        """Tell whether values are the same where both cases hold, borders and all: a condition of the one excludes one of
+        the other, or leaves of both the border, on which the values do not differ."""
+        gap = self.value - other.value
+        if not gap.terms:
+            return True
+        for p, r in product(self.known, other.known):
+            factor, offset = multiple(r, p)
+            if factor < 0 and (offset < 0 or (offset == 0 and not (gap - multiple(gap, p)[0] * p).terms)):
+                return True
+        return False
 
 
 Piecewise: TypeAlias = list[Case]

@@ -11,6 +11,7 @@ from fractions import Fraction
 ASSUMPTIONS = {
     "rigid-body": "the body is rigid",
     "inertia-as-given": "its inertia is exactly as given",
+    "inertia-near": "its inertia is near the one given",
     "exact-measurement": "measurements are exact",
     "ideal-actuators": "actuators give at once what the law asks",
     "continuous-torque": "the torque is applied continuously",
@@ -25,7 +26,7 @@ ASSUMPTIONS = {
     "bounded-target": "the target turns, and its rate changes, no faster than told",
     "no-wheels": "no wheels turn",
     "frictionless-wheels": "wheels have no friction, and share the torque by least squares",
-    "unlimited-wheels": "wheels are not limited",
+    "unlimited-wheels": "wheels have no limits but those told",
     "bounded-momentum": "body and wheels have no more momentum together than told",
     "linear-motion": "the motion is linear, as it is near rest",
     "quaternion-as-fed": "the quaternion that is fed back never jumps",

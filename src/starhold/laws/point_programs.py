@@ -8,7 +8,6 @@ from typing import Any
 
 from starhold.algebra.vector import ZERO
 from starhold.kernel.check import Proved
-from starhold.kernel.sentences import ASSUMPTIONS
 from starhold.laws.catalogue import Law
 from starhold.laws.program import ASKED, law_program
 from starhold.parts.actuators.limits import LIMITS
@@ -86,6 +85,6 @@ def claim_of(proved: Proved, circle: bool) -> dict[str, Any]:
         "kind": "control-limit" if limit else kind,
         "outcome": outcome,
         "numbers": claimed,
-        "assumptions": [ASSUMPTIONS[name] for name in proved.statement.assumptions],
+        "assumptions": [*proved.statement.assumptions],
         "obligations": [dict(zip(("name", "how", "outcome", "evidence"), one, strict=True)) for one in shown],
     }

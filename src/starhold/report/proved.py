@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from starhold.certification.assumptions import texts
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, evidence, methods, recheck, sentence, unclaimed
@@ -35,7 +36,6 @@ SYMBOLS = {
     "reach": ("|x|, at most", ""),
     "epsilon": ("ε in V + ε q·Jω", ""),
     "rho": ("share of V that the added term stays within", ""),
-    "attitude_level": ("part of V left to the attitude at the hand-over", ""),
     "rate_bound": ("rate up to which V is shown to fall", "rad/s"),
     "tau": ("τ: a torque M does work of at most τ |Wᵀω + εq|² + M²/(4τ)", ""),
     "beta": ("β: share of V + ε q·Jω that is left of the fall", "1/s"),
@@ -101,7 +101,7 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> st
         f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(statement))}. "
         f"<small>By {escape(methods(claim))}.</small>{why}</span></summary>\n"
         f'<div class="wide"><table class="text"><tbody>{rows}</tbody></table></div>{_numbers(claim)}'
-        f"<p><b>Assuming</b> {escape('; '.join(claim.assumptions))}.</p></details>\n"
+        f"<p><b>Assuming</b> {escape('; '.join(texts(claim.assumptions)))}.</p></details>\n"
     )
 
 

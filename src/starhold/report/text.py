@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.analysis.departure import HAS
+from starhold.certification.assumptions import HAS
 from starhold.certification.wording import enumerated, listed
 
 if TYPE_CHECKING:

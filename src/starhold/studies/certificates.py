@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from starhold.errors import InputError
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from starhold.analysis.trial import Trial
     from starhold.certification.certificate import Certificate
+    from starhold.certification.hand_over import Ends
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import Scenario
 
@@ -30,7 +32,7 @@ class Tried(NamedTuple):
 def compare_programs(path: Path, scenario: Scenario) -> list[str]:
     """How the proofs of a file that was checked are about other loops than a scenario has; nothing where they are not."""
     from starhold.certification.comparison import differences, station_differences
-    from starhold.studies.bodies.rigid_body import certified_loops
+    from starhold.studies.bodies.rigid_body import certified_loops, handed_over
 
     content: Any = json.loads(path.read_text(encoding="utf-8"))
     if not content["claims"] or "certificates" not in content:
@@ -38,9 +40,11 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
             str(path), "", "no proofs about loops of a scenario", "a certificate that has some, or no --scenario"
         )
     loops: dict[str, ClosedLoop] = {}
+    ends: dict[str, Ends] = {}
     for entry in scenario.laws:
         loop = build(scenario, entry)
         loops |= certified_loops(scenario, entry, loop) if scenario.body == "rigid-body" else {entry.name: loop}
+        ends |= handed_over(entry, loop) if scenario.body == "rigid-body" else {}
     differing: list[str] = []
     for given in content["certificates"]:
         station = "proof" in given
@@ -54,7 +58,7 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
         if station != (loop.body.name == "libration-point"):
             differing.append(f"{given['name']}: the scenario is about another body")
             continue
-        compare = station_differences if station else differences
+        compare = station_differences if station else partial(differences, ends=ends.get(given["name"]))
         texts = [text for place in places for text in compare(content["claims"][place], loop)]
         differing += [f"{given['name']}: {text}" for text in dict.fromkeys(texts)]
     return differing

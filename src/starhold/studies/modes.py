@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from starhold.algebra.structure import leaves
-from starhold.laws.modes import Modes
 from starhold.loop.modes import loop_of_mode
 from starhold.studies.body import Issued
 from starhold.studies.flight import Begun
@@ -58,24 +57,45 @@ def named_modes(loop: ClosedLoop, name: str) -> dict[str, ClosedLoop]:
     return {f"{name}: {mode.name}": loop_of_mode(loop, place) for place, mode in enumerate(modes)}
 
 
+class HandOver(NamedTuple):
+    """A switch from a mode to another, counted from 0, with the loops of both and the levels of its tests (rad/s, rad)."""
+
+    name: str
+    places: tuple[int, int]
+    before: ClosedLoop
+    after: ClosedLoop
+    levels: dict[str, float]
+
+
+def hand_overs(loop: ClosedLoop, name: str) -> list[HandOver]:
+    """Return the switches of a law, with the names of their certificates."""
+    module: Any = loop.law.module
+    return [
+        HandOver(
+            f"{name}: {mode.name} to {module.modes[switch.to].name}",
+            (place, switch.to),
+            loop_of_mode(loop, place),
+            loop_of_mode(loop, switch.to),
+            dict(zip(switch.tests, levels, strict=True)),
+        )
+        for place, (mode, _, switches) in enumerate(module.parts(loop.gains))
+        for switch, (_, _, *levels) in switches
+    ]
+
+
 def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     """The certificates of the law of each mode, and of each switch whose next mode is known to converge."""
     from starhold.certification.certify import certify
     from starhold.certification.hand_over import hand_over
 
-    module: Any = loop.law.module
-    assert isinstance(module, Modes)
     issued: list[Issued] = []
     for place, (title, mode_loop) in enumerate(named_modes(loop, name).items()):
         issued.append(Issued(certify(mode_loop, title, wanted), mode_loop, mode=place + 1))
-    for place, (mode, _, switches) in enumerate(module.parts(loop.gains)):
-        for switch, (_, _, *levels) in switches:
-            mode_loop, title = loop_of_mode(loop, switch.to), f"{name}: {mode.name} to {module.modes[switch.to].name}"
-            certificate = hand_over(
-                mode_loop, loop_of_mode(loop, place), title, dict(zip(switch.tests, levels, strict=True))
-            )
-            if certificate is not None:
-                issued.append(Issued(certificate, mode_loop, mode=switch.to + 1, before=place + 1))
+    for one in hand_overs(loop, name):
+        certificate = hand_over(one.after, one.before, one.name, one.levels)
+        if certificate is not None:
+            before, after = one.places
+            issued.append(Issued(certificate, one.after, mode=after + 1, before=before + 1))
     return issued
 
 

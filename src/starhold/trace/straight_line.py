@@ -1,12 +1,17 @@
-"""Prints an equation as a straight-line program for the proof kernel: inputs by name, steps, places of outputs."""
+"""Prints an equation as a straight-line program for the proof kernel: inputs by name, steps, places of outputs; and reads
+such programs in floats."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import reduce
 from typing import Any
+
+import numpy as np
 
 from starhold.algebra.structure import leaves
 from starhold.errors import InputError
+from starhold.kernel.numbers import rational
 from starhold.trace.program import Load, Op, Store
 from starhold.trace.recording import Recorder
 
@@ -66,3 +71,26 @@ def straight_line(equation: Callable[..., Any], **given: Any) -> dict[str, Any]:
         else:
             raise InputError("law", "", "loops or calls", "an equation without them: the kernel reads straight lines")
     return {"inputs": [names[k] for k in used], "steps": steps, "outputs": outputs}
+
+
+READERS: dict[str, Callable[..., Any]] = {
+    "plus": np.add, "minus": np.subtract, "product": np.multiply, "divide": np.divide, "negative": np.negative,
+    "sqrt": np.sqrt, "less": np.less, "less_equal": np.less_equal, "select": np.where, "both": np.logical_and,
+    "either": np.logical_or, "opposite": np.logical_not,
+}  # fmt: skip
+"""The operations of the kernel in floats."""
+
+
+def evaluated(program: Mapping[str, Any], **given: Any) -> list[Any]:
+    """Return the outputs of a program, in floats, for arguments shaped like those that it was recorded with; their numbers
+    may be columns (n,)."""
+
+    def read(name: str) -> Any:
+        value, *path = name.split(".")
+        return reduce(lambda part, key: part[int(key)] if key.isdigit() else getattr(part, key), path, given[value])
+
+    values = [read(name) for name in program["inputs"]]
+    for operation, *operands in program["steps"]:
+        constant = operation == "constant"
+        values.append(float(rational(operands[0])) if constant else READERS[operation](*(values[k] for k in operands)))
+    return [values[k] for k in program["outputs"]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from math import acos, asin, inf, isfinite, sqrt
@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved
+from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved, squares
 from starhold.certification.subject import Subject, above
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import digest
-from starhold.kernel.rules import Solves, Squares
+from starhold.kernel.rules import Obligation, Solves, Squares
 from starhold.laws import program
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -37,13 +37,18 @@ ASKED = program.ASKED["rigid-body"]
 TURNS = [(-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
 """The other quaternion of the target, and half turns."""
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
+NEARBY = "converges near the inertia"
 SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 WRITTEN: dict[str, float | None] = {"stiffness": None, "epsilon": 0.0, "rho": 0.0, "rate_bound": None}
 """The numbers of a V that is the law's own."""
+ANY_ANGLE = 7
+"""An angle (rad) that no turn exceeds."""
 LEANS = 4e-3
 """The share of the law's own V that a mixed term takes."""
 FASTER = 1.0 + 1e-2
 """How much faster than the least bound a rate is told to be at most."""
+BISECTIONS = 6
+"""Of a level, between it and four times it."""
 NEAR = 1.1
 """How many times the least level those of other limits may be, to be looked at again."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
@@ -214,7 +219,9 @@ class Loop:
                 more = {name: x for name, x in more.items() if name != "rate"}
                 self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
                 return
-        if not signs:
+        if signs:
+            self.show_bounded([*(w for w in self.words if w != OUTSIDE), *signs], widths, turn)
+        else:
             self.show_strictly(turn)
 
     def show_any_inertia(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> None:
@@ -249,12 +256,55 @@ class Loop:
         # The law's own V falls where the body is not too fast, and has the larger sets within the limits.
         self.show_limits(STRICTLY, words, self.leaning(LEANS), {"fastest": 1}, turn)
 
+    def show_bounded(self, words: list[str], widths: dict[str, Any], turn: float | None) -> None:
+        """Find a set in which the law's own V falls, for the rate is bounded there, and a set within limits."""
+        for theorem, V in ((CONVERGES, self.lyapunov()), (STRICTLY, self.leaning(LEANS))):
+            level = self.highest_falling(theorem, words, V, widths)
+            if level is None:
+                continue
+            told = widths | self.slowly(V, level) | self.contents(self.form(V), level)
+            if self.try_to_show(self.claim(theorem, words, V, level=level, **told), self.scales(V, float(level))):
+                self.show_limits(theorem, words, V, widths | {"fastest": 1}, turn)
+                return
+
+    def highest_falling(self, theorem: str, words: list[str], V: str, widths: dict[str, Any]) -> Fraction | None:
+        """Return about the largest level up to which V falls, where the quaternion's sign changes too."""
+
+        def falls(level: float) -> bool:
+            told = widths | self.slowly(V, Fraction(level))
+            try:
+                wanted, _ = obligations(self.claim(theorem, words, V, level=level, **told), self.by_digest)
+            except RefusedError as reason:
+                self.failed[theorem] = str(reason)
+                return False
+            needed = [o for name, o in wanted.items() if name.startswith(("V is non-increasing", "a jump lowers"))]
+            return all(isinstance(o, Squares) and squares(o, self.scales(V, level)) is not None for o in needed)
+
+        cap = self.cap(theorem, words, V) * (1.0 - float(GIVEN_AWAY[0]) - LEANS**2 * (theorem == STRICTLY))
+        if isfinite(cap) and falls(cap):
+            return Fraction(cap)
+        tried = [min(cap, self.potential(V) * 4.0**k) for k in range(-5, 16)]
+        held = [falls(tried[0])]
+        while held[-1] and len(held) < len(tried):
+            held.append(falls(tried[len(held)]))
+        if not held[0]:
+            self.failed.setdefault(theorem, "V falls on no set that was tried")
+            return None
+        low, high = (tried[-1],) * 2 if held[-1] else tried[len(held) - 2 : len(held)]
+        for _ in range(BISECTIONS if high > low else 0):
+            middle = sqrt(low * high)
+            low, high = (middle, high) if falls(middle) else (low, middle)
+        return Fraction(low)
+
+    def slowly(self, V: str, level: Fraction) -> dict[str, Any]:
+        """Return the rate that is not exceeded on a set, a little more."""
+        slowest = float(np.linalg.eigvalsh(curvature(self.form(V), "w"))[0])
+        return {"fastest": sqrt(2.0 * float(level) / slowest) * FASTER}
+
     def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
         """Return what has to be shown of V'."""
         claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
-        found = obligations(claim, self.by_digest)[0]["V is non-increasing"]
-        assert isinstance(found, Squares)
-        return found
+        return fall(obligations(claim, self.by_digest)[0])
 
     def crossed(self, s: float, epsilon: float) -> str:
         """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw."""
@@ -301,13 +351,23 @@ class Loop:
                 self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
                 return False
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
-        if wheels is not None and wheels.allocation == 0 and isfinite(max(*wheels.torque_limit, *wheels.momentum_limit)):
-            for k, (torque, momentum) in enumerate(zip(wheels.torque_limit, wheels.momentum_limit, strict=True)):
-                numbers |= {f"motors.{k}": torque, f"stored.{k}": momentum * (1.0 - BAND)}
+        shared = dict[str, float]()
+        if wheels is not None and wheels.allocation == 0:
+            shared = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)}
+            shared |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)}
+        if shared:
+            numbers |= shared
         elif isfinite(limit):
             numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
         else:
             return False
+        if "fastest" not in numbers and SHORTEST not in words:
+            # A law that clips may keep its limits everywhere.
+            claim = self.claim(theorem, words, V, **numbers)
+            if "V is non-increasing" not in obligations(claim, self.by_digest)[0] and self.try_to_show(
+                claim, self.scales(V)
+            ):
+                return True
         claim = self.claim(theorem, words, V, level=1, **numbers)
         cap = self.cap(theorem, words, V)
         level = self.largest_level(claim, V, cap)
@@ -322,8 +382,7 @@ class Loop:
                 break
             told = numbers | held | ({} if turn is None else {"angle": turn})
             if "fastest" in numbers:
-                slowest = float(np.linalg.eigvalsh(curvature(form, "w"))[0])
-                told["fastest"] = sqrt(2.0 * float(lower) / slowest) * FASTER
+                told |= self.slowly(V, lower)
             if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
                 return True
         return False
@@ -353,6 +412,9 @@ class Loop:
             # What a lost wheel keeps is a number, at any level.
             if isinstance(o, Squares) and o.p.names and name.startswith(("torque", "norm", "motor", "wheel"))
         ]
+        if "V is non-increasing" not in wanted:
+            # What is clipped may hold at any level.
+            limits = [o for o in limits if squares(replace(o, known=o.known[:-1]), self.scales(V)) is None]
         level = cap
         for _ in range(3):
             scales = self.scales(V, level if isfinite(level) else None)
@@ -366,7 +428,8 @@ class Loop:
         return Fraction(level) if isfinite(level) else None
 
     def contents(self, form: Poly, level: Fraction) -> dict[str, Any]:
-        """Return the largest turn from rest and the largest rate on target that a set of this level holds, a little less."""
+        """Return the largest turn from rest and the largest rate on target that a set of this level holds, and up to which
+        rate it holds every attitude, all a little less."""
         P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
         if s > 0.0:
@@ -374,8 +437,21 @@ class Loop:
         else:
             angle = 2.0 * asin(min(sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
-        # Above V at the other rest every turn is in the set.
-        return {"angle": angle if float(level) > 2.0 * s > 0.0 else angle * less, "rate": rate * less}
+        if not float(level) > 2.0 * s > 0.0:
+            return {"angle": angle * less, "rate": rate * less}
+        # Above V at the other rest every turn is in the set. A mixed term is at most 2 lean sqrt(s T), T being the energy.
+        lean = 0.5 * LEANS * any({"q", "w"} == {name[0] for name in m} for m in form.terms)
+        energy = (sqrt(lean * lean * s + float(level) - 2.0 * s) - lean * sqrt(s)) ** 2
+        fastest = sqrt(2.0 * energy / float(np.linalg.eigvalsh(P)[-1])) * less
+        return {"angle": angle, "rate": rate * less, "start.angle": ANY_ANGLE, "start.rate": fastest}
+
+
+def fall(wanted: Mapping[str, Obligation]) -> Squares:
+    """Return what has to be shown of V'. RefusedError for a law that has cases."""
+    found = wanted.get("V is non-increasing")
+    if not isinstance(found, Squares):
+        raise RefusedError("the law switches")
+    return found
 
 
 def curvature(form: Poly, x: str) -> NDArray[np.float64]:

@@ -9,29 +9,68 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.certification.evidence.attitude import ASKED, SAMPLED, SLIDING, Loop, sign_words
+from starhold.certification.evidence.attitude import (
+    ANY_ANGLE,
+    ASKED,
+    CONVERGES,
+    EVENLY,
+    SAMPLED,
+    SLIDING,
+    STRICTLY,
+    Loop,
+    sign_words,
+)
 from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.inertia import find_near
 from starhold.certification.evidence.isotropic import find_isotropic
+from starhold.certification.evidence.refuted import against_sampling
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.subject import Subject
-from starhold.kernel.loops import MOVING, OUTSIDE
+from starhold.kernel.loops import HANDED, MOVING, OUTSIDE, SHORTEST
 from starhold.kernel.numbers import RefusedError, Rows, plus
 from starhold.kernel.rules import Contracts, Definite
 from starhold.parts.craft import tensor
 
+ENDING = (CONVERGES, EVENLY, STRICTLY)
+"""Theorems about where motions of the given body end."""
+LIMITS = {"limit", "limit.norm", "motors.0"}
 
-def find_claims(subject: Subject, turn: float | None = None) -> Loop:
-    """Find the claims that can be proved: where motions end, for every inertia, within limits, between samples. turn: what
-    the set within the limits is to hold (rad)."""
+
+def find_claims(subject: Subject, turn: float | None = None, tolerance: float | None = None) -> Loop:
+    """Find the claims that can be proved: where motions end, for other inertias, within limits, between samples. turn: what
+    the set within the limits is to hold (rad); tolerance: of the inertia, the largest unless told."""
     loop, flown = Loop(subject), subject.loop
     if not flown.remembers:
         if flown.law.lyapunov is not None:
             loop.show_end(turn)
+            if not any("whatever" in claim["theorem"] for claim in loop.claims):
+                find_near(loop, tolerance)
         if hasattr(flown.law.module, "single_root"):
             find_isotropic(loop)
         if hasattr(flown.law.module, "surface"):
             find_sliding(loop)
         find_sampled(loop)
+    return loop
+
+
+def find_taken_over(subject: Subject, rate: float | None, angle: float | None) -> Loop | None:
+    """Find the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) end on target,
+    and the one between samples; None where it is not known from where motions end, or no rate is told that this needs."""
+    loop = Loop(subject)
+    loop.show_end()
+    found = next((c for c in loop.claims if c["theorem"] in ENDING and not LIMITS & c["numbers"].keys()), None)
+    if found is None or (rate is None and "level" in found["numbers"]):
+        return None
+    told, taken = dict(found["numbers"]), [*found["taken"], HANDED]
+    if "level" in told and rate is not None:
+        # Which of its quaternions tells an attitude matters but for these.
+        either = found["theorem"] == EVENLY or SHORTEST in taken
+        told |= {"start.rate": rate, "start.angle": angle if angle is not None and either else float(ANY_ANGLE)}
+    loop.claims.clear()
+    V = found["programs"]["lyapunov"]
+    loop.try_to_show(loop.claim(found["theorem"], taken, V, **told), loop.scales(V))
+    find_sampled(loop)
+    against_sampling(loop)
     return loop
 
 

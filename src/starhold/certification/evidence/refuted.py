@@ -14,11 +14,10 @@ from starhold.certification.evidence.attitude import ASKED, CONVERGES, SAMPLED, 
 from starhold.certification.evidence.finding import read
 from starhold.certification.matrices import number
 from starhold.certification.subject import perigee
-from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.loops import AttitudeLoop, around
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.theorems.refuted import State, slope
-from starhold.kernel.theorems.sampling import near_rest
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 
@@ -48,8 +47,14 @@ def find_refuted(loop: Loop, turn: float | None = None, rate: float | None = Non
             _ = against_limit(loop, loop.lyapunov(), turn) or against_limit(loop, ends[0]["programs"]["lyapunov"], turn)
     if hasattr(flown.law.module, "surface") and SLIDING not in shown and flown.wheels is None:
         against_surface(loop)
-    if SAMPLED not in shown and any(abs(complex(*z)) > 1.0 for z in loop.eigenvalues):
-        loop.try_to_show(loop.claim(UNSETTLED, [], None, period=flown.period), {})
+    against_sampling(loop)
+
+
+def against_sampling(loop: Loop) -> None:
+    """Find that the loop is unstable with the torque held between samples."""
+    shown = any(claim["theorem"] == SAMPLED for claim in loop.claims)
+    if not shown and any(abs(complex(*z)) > 1.0 for z in loop.eigenvalues):
+        loop.try_to_show(loop.claim(UNSETTLED, [], None, period=loop.loop.period), {})
 
 
 def state(t: Sequence[float] | Floats, w: Sequence[float] | Floats = (0.0, 0.0, 0.0)) -> dict[str, float]:
@@ -72,7 +77,7 @@ def against_near(loop: Loop) -> bool:
     exact = wired(loop, V)
     try:
         theorems = [(NEGATIVE, -exact.lyapunov)]
-        u = [near_rest(cases, exact.on_target | exact.still) for cases in exact.law]
+        u = [around(cases, exact.on_target | exact.still).value for cases in exact.law]
         theorems.append((RISES_NEAR, slope(exact, u)))
     except RefusedError as reason:
         loop.failed[RISES_NEAR] = str(reason)

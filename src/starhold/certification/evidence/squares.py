@@ -7,7 +7,7 @@ are about one; rounded to short numbers, what is then amiss is put on the matrix
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from importlib import import_module
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from starhold.kernel.numbers import RefusedError
+from starhold.kernel.numbers import RefusedError, times, transpose
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
@@ -26,6 +26,9 @@ TOLERANCE = 1e-11
 LIMIT = 30.0
 """Seconds that the interior point may take."""
 DIGITS = (12, 14, 9, 16)
+SINGULAR, SHORT = 1e-6, 8
+"""The share of the largest eigenvalue below which a matrix is taken for singular, and the denominators of what it takes to
+zero."""
 DEFINITE = -1e-8
 """The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
 
@@ -33,25 +36,27 @@ DEFINITE = -1e-8
 @dataclass(frozen=True)
 class Problem:
     """p = sum of columns, each with its factor, the last of which are the entries of the upper triangle of the Gram matrix.
-    The first `signed` factors are not negative."""
+    The first `signed` factors are not negative, the first `strict` of them positive."""
 
     p: Poly
     columns: list[Poly]
     signed: int
     pairs: list[tuple[int, int]]
     z: Sequence[Poly]
+    strict: int = 0
 
 
 def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts; None where none was found. scales: about how large variables become."""
     p, known, fixed = settled(o)
     for count, ansatz in [(k, each) for k in counts(o) for each in ansatzes(o, p, known, k)]:
-        problem = posed(
-            p, known, [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts], o.z[:count]
-        )
+        others = [c * relation for relation, parts in zip(o.modulo, ansatz, strict=True) for c in parts]
+        z = o.z[:count] if o.least else free([p, *known, *others], o.z[:count])
+        problem = replace(posed(p, known, others, z), strict=len(o.strict))
         guess = solved(problem, scales)
-        for digits in DIGITS if guess is not None else ():
-            found = exactly(problem, guess, digits)  # pyright: ignore[reportArgumentType]
+        ways = [] if guess is None else [exactly] if o.least else [exactly, on_a_face]
+        for way, digits in [(way, digits) for way in ways for digits in DIGITS]:
+            found = way(problem, guess, digits)
             if found is None:
                 continue
             evidence = written(o, problem, found, fixed, ansatz)
@@ -82,7 +87,17 @@ def counts(o: Squares) -> list[int]:
     """Return how many of z a matrix may be about: up to where another kind of monomial begins."""
     kinds = ["".join(sorted(name[0] for name in max(z.terms))) for z in o.z]
     ends = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]]
-    return sorted({max(o.least, 1), *(k for k in ends if k > o.least > 0), len(o.z)})
+    names = {name for p in (o.p, *o.known) for name in p.names}
+    told = next((k for k, z in enumerate(o.z) if not z.names <= names), len(o.z))
+    return sorted({o.least or max(told, 1), *(k for k in ends if k > o.least > 0), len(o.z)})
+
+
+def free(columns: Sequence[Poly], z: Sequence[Poly]) -> Sequence[Poly]:
+    """Return z without those of which the matrix would have to have a zero for the square, that nothing else makes."""
+    others = {m for q in columns for m in q.terms}
+    others |= {m for i, a in enumerate(z) for b in z[:i] for m in (a * b).terms}
+    kept = [a for a in z if not others.isdisjoint((a * a).terms)]
+    return z if len(kept) == len(z) else free(columns, kept)
 
 
 def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
@@ -188,7 +203,10 @@ def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
     half = np.array([1.0 if i == k else np.sqrt(2.0) / 2.0 for i, k in problem.pairs])
     least = sparse.csc_matrix([[float(i == k)] for i, k in problem.pairs])
     cone = sparse.hstack([sparse.csc_matrix((len(half), head)), -sparse.diags(half), least])
-    signs = sparse.hstack([-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed + 1))])
+    positive = sparse.csc_matrix([[float(k < problem.strict)] for k in range(problem.signed)] or (0, 1))
+    signs = sparse.hstack(
+        [-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed)), positive]
+    )
     top = sparse.csc_matrix(([1.0], ([0], [count])), (1, count + 1))
     whole = sparse.vstack([sparse.hstack([A, sparse.csc_matrix((A.shape[0], 1))]), signs, top, cone])
     right = np.r_[b / unit, np.zeros(problem.signed), 1.0, np.zeros(len(half))]
@@ -250,6 +268,39 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
     return [v + Fraction(int(step[k, 0].p), int(step[k, 0].q)) for k, v in enumerate(x)]
 
 
+def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
+    """Return exact factors with a singular matrix, that takes to zero what the guess takes almost there."""
+    head, size = len(problem.columns) - len(problem.pairs), len(problem.z)
+    G = np.zeros((size, size))
+    for (i, k), v in zip(problem.pairs, guess[head:], strict=True):
+        G[i, k] = G[k, i] = v
+    values, vectors = np.linalg.eigh(G)
+    null, places = vectors[:, values < SINGULAR * values[-1]].T, list[int]()
+    for k in range(len(null)):
+        places.append(int(np.abs(null[k]).argmax()))
+        null[k] /= null[k, places[-1]]
+        null -= np.outer(np.where(np.arange(len(null)) == k, 0.0, null[:, places[-1]]), null[k])
+    if not places:
+        return None
+    # z without its part along what is taken to zero.
+    rest = [i for i in range(size) if i not in places]
+    taken = [[Fraction(int(i == k)) for k in range(size)] for i in rest]
+    for row, i in zip(taken, rest, strict=True):
+        for k, place in enumerate(places):
+            row[place] = -Fraction(float(null[k, i])).limit_denominator(SHORT)
+    face = posed(problem.p, [], problem.columns[:head], [dot(row, problem.z) for row in taken])
+    found = exactly(
+        replace(face, signed=problem.signed), [*guess[:head], *(G[rest[i], rest[k]] for i, k in face.pairs)], digits
+    )
+    if found is None:
+        return None
+    own = [[Fraction(0)] * len(rest) for _ in rest]
+    for (i, k), v in zip(face.pairs, found[head:], strict=True):
+        own[i][k] = own[k][i] = v
+    whole = times(transpose(taken), times(own, taken))
+    return [*found[:head], *(whole[i][k] for i, k in problem.pairs)]
+
+
 def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction] | None:
     """Put what is amiss of each monomial on the entries of the matrix that have it; None where none has."""
     x = list(x)
@@ -277,9 +328,10 @@ def written(
     for parts in ansatz:
         combined.append(text(dot(x[place : place + len(parts)], parts) if parts else poly(0)))
         place += len(parts)
-    gram = [["0"] * len(problem.z) for _ in problem.z]
+    at = [o.z.index(z) for z in problem.z]
+    gram = [["0"] * (max(at) + 1) for _ in range(max(at) + 1)]
     for (i, k), v in zip(problem.pairs, x[place:], strict=True):
-        gram[i][k] = gram[k][i] = str(v)
+        gram[at[i]][at[k]] = gram[at[k]][at[i]] = str(v)
     return {"multipliers": list(map(str, multipliers)), "cofactors": combined, "gram": gram}
 
 

@@ -112,7 +112,7 @@ class Station:
     def show_held(self) -> None:
         """Find another circle that a relay without a layer holds: half as far as it could, near the circle."""
         loop, circle = self.circle
-        away = next((s for s in loop.sides if circle.inverse in {name for p in s.u for name in p.names}), None)
+        away = next((s for s in loop.sides if circle.inverse in {name for p in s.value for name in p.names}), None)
         if away is None:
             raise NotFoundError("the law is no relay")
         f1, f2, _ = circle.errors
@@ -159,8 +159,8 @@ class Station:
         found: list[tuple[Fraction, dict[str, Fraction]]] = []
         for y, z in ((radius, Fraction(0)), (Fraction(0), radius)):
             at = {"x1": 0, "x2": y, "x3": z, "v1": 0, "v2": -circle.rate * z, "v3": circle.rate * y, circle.size: 0}
-            side = next(s for s in loop.sides if circle.inverse not in {name for p in s.u for name in p.names})
-            squares = [p.at(at).number ** 2 for p in side.u]
+            side = next(s for s in loop.sides if circle.inverse not in {name for p in s.value for name in p.names})
+            squares = [p.at(at).number ** 2 for p in side.value]
             found.append((max(squares) if kind == "axis" else sum(squares, Fraction(0)), {"y": y, "z": z}))
         return max(found, key=lambda one: one[0])
 

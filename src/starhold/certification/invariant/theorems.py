@@ -43,11 +43,7 @@ STEPS = {
     "never": "falls",
 }  # fmt: skip
 """What the kernel's obligations are about."""
-ASSUMPTIONS = (
-    "the equations exactly as given",
-    "where the right-hand side jumps, motions in the sense of Filippov: x' is any mean of what it is on the sides and on "
-    "the surface",
-)
+ASSUMPTIONS = "equations-as-given", "filippov"
 NEAR = 1e-6
 """The share of the largest V below which a V that rises leaves no level."""
 

@@ -16,6 +16,7 @@ Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, S
 THEOREMS: dict[str, Theorem] = {
     "converges": attitude.converges,
     "converges strictly": partial(attitude.converges, strictly=True),
+    "converges near the inertia": partial(attitude.converges, strictly=True, near=True),
     "converges whatever the inertia": partial(attitude.converges, any_inertia=True),
     "converges from both quaternions": attitude.converges_evenly,
     "converges from both quaternions whatever the inertia": partial(attitude.converges_evenly, any_inertia=True),

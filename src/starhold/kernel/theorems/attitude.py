@@ -11,7 +11,7 @@ from collections.abc import Generator, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
-from ..loops import HYSTERESIS, NONE, SHORTEST, AttitudeLoop
+from ..loops import HANDED, HYSTERESIS, NONE, SHORTEST, AttitudeLoop
 from ..numbers import cosine_below, demand
 from ..polynomials import Poly, apply, dot, horner, minus, poly
 from ..reading import Claim
@@ -23,18 +23,19 @@ Proof: TypeAlias = Generator[tuple[str, Obligation], None, Statement]
 Part: TypeAlias = Generator[tuple[str, Obligation], None, list[str]]
 
 
-def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False) -> Proof:
+def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, near: bool = False) -> Proof:
     """Every motion comes to rest on target, or, almost never, on the other quaternion of the same attitude. V' <= -c |w|^2,
-    `strictly` -c (|w|^2 + |q|^2). `any_inertia`: so does every body, while the law's own numbers stay."""
-    loop = AttitudeLoop(claim, any_inertia)
+    `strictly` -c (|w|^2 + |q|^2). `any_inertia`: so does every body, while the law's own numbers stay; `near`: so does every
+    one with an inertia near the given one."""
+    loop = AttitudeLoop(claim, any_inertia, near)
     w = loop.w
     yield from least_on_target(loop)
     z = [*w, *loop.q[1:] * strictly, *(q * x for q in loop.q for x in w)]
-    z += [w[i] * w[k] for i in range(3) for k in range(i, 3)] * strictly
+    z += [w[i] * w[k] for i in range(3) for k in range(i, 3)] * (strictly or "fastest" in claim.numbers)
     said = yield from is_non_increasing(loop, z, 6 if strictly else 3)
     if not strictly:
         # At rest the law's torque is zero only where q is.
-        resting = [p.at(loop.still) for p in loop.balance(loop.u)]
+        resting = [p.at(loop.still) for p in loop.balance(loop.quiet.value)]
         yield "only equilibrium", Solves(resting, loop.q[1:], [loop.sphere])
     return (yield from concluded(loop, said, strictly))
 
@@ -45,7 +46,7 @@ def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
     own, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), claim.numbers.get("level")
     yield from least_on_target(loop, own)
     said = yield from is_non_increasing(loop, [*loop.w, *(q * x for q in loop.q for x in loop.w)], 3)
-    at_half_turns, *pull = (-dot(own, loop.balance(loop.u)).at(loop.still)).powers("q0")
+    at_half_turns, *pull = (-dot(own, loop.balance(loop.quiet.value)).at(loop.still)).powers("q0")
     demand(not at_half_turns.terms, "the torque at rest is not zero at every half turn")
     yield "rests at half turns only", Squares(horner(pull, loop.q[0]), own, 3, modulo=[loop.sphere])
     demand(all(len(m) == 2 and "q0" not in m for m in resting.terms), "V at rest is no form of q1, q2, q3")
@@ -59,38 +60,50 @@ def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
 
 def least_on_target(loop: AttitudeLoop, turned: Sequence[Poly] = ()) -> Shown:
     """V >= c (|turned|^2 + |w|^2), turned being (1 - q0, q) unless told. Of an inertia that is not known V has the kinetic
-    energy, of which only w.Jw > 0 is used."""
+    energy, with v = w + lean q for w, of which only v.Jv > 0 is used."""
     yield from loop.sound()
-    z, momentum, energy = [*(turned or [1 - loop.q[0], *loop.q[1:]])], apply(loop.J, loop.w), list[Poly]()
+    z, momentum, energy = [*(turned or [1 - loop.q[0], *loop.q[1:]])], apply(loop.J, loop.leaning), kinetic(loop)
     if loop.any_inertia:
         yield from vanish("kinetic energy", minus([loop.lyapunov.slope(name) for name in loop.driven], momentum))
-        energy = [dot(loop.w, momentum)]
     else:
         z += loop.w
-    yield "V is least on target", Squares(loop.lyapunov, z, len(z), modulo=[loop.sphere], strict=energy)
+    known = loop.heaviest(loop.q[1:])
+    yield "V is least on target", Squares(loop.lyapunov, z, len(z), known, [loop.sphere], energy)
+
+
+def kinetic(loop: AttitudeLoop, more: Fraction | int = 0) -> list[Poly]:
+    """Return v.Jv for an inertia that is not known, where v leans by so much more."""
+    v = [x + more * q for x, q in zip(loop.leaning, loop.q[1:], strict=True)]
+    return [dot(v, apply(loop.J, v))] if loop.any_inertia else []
 
 
 def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
     """V' <= -c times the squares of the first of z, everywhere or, with a level, on {V <= level}, which is then not left; if
-    `fastest` is told, there the rate is at most that."""
+    `fastest` is told, there the rate is at most that. Where the law has cases, V' <= -c in all that hold around no rest."""
     numbers, V, w = loop.claim.numbers, loop.lyapunov, loop.w
     level, fastest = numbers.get("level"), numbers.get("fastest")
-    motion, known = loop.balance(loop.u), list[Poly]()
-    # With nothing from outside H is constant in the axes of a target at rest: a function of the attitude.
-    loop.autonomous(motion, kept="" if loop.outside or loop.moving else "h")
+    known = loop.shifted()
     said = ["from every attitude and rate the body"]
     if level is not None:
         said = [f"every motion from {{V <= {below(level)}}} stays there and"]
     if fastest is not None:
         slow = fastest * fastest - dot(w, w)
         yield "rates", Squares(slow, [poly(1), *loop.q, *w], 0, [numbers["level"] - V], [loop.sphere])
-        known = [slow * x * x for x in w]
+        known += [slow * x * x for x in w]
         said.append(f"turns no faster than {above(fastest)} rad/s and")
-    # Of any inertia V = w.Jw/2 + U(q), so that V' = w.Jw' + U'.
-    slope = loop.slopes_along(V, NONE if loop.any_inertia else loop.acceleration)
-    slope = slope + dot(w, motion) * loop.any_inertia
-    loop.autonomous([slope])
-    yield "V is non-increasing", Squares(-slope, z, least, known, [loop.sphere])
+    for case, side in enumerate(loop.sides):
+        motion = loop.balance(side.value)
+        # With nothing from outside H is constant in the axes of a target at rest: a function of the attitude.
+        loop.autonomous([*motion, *side.known], kept="" if loop.outside or loop.moving else "h")
+        # Of any inertia dV/dw = Jv, so that V' is v.Jw' and what the attitude does.
+        slope = loop.slopes_along(V, NONE if loop.any_inertia else apply(loop.J_inverse, motion))
+        slope = slope + dot(loop.leaning, motion) * loop.any_inertia
+        loop.autonomous([slope])
+        name, held = f"V is non-increasing {case}" if len(loop.sides) > 1 else "V is non-increasing", [*known, *side.known]
+        if side is loop.quiet:
+            yield name, Squares(-slope, z, least, held, [loop.sphere])
+        else:
+            yield name, Squares(-slope, [poly(1), *z], 0, held, [loop.sphere], [poly(1)])
     return said
 
 
@@ -103,12 +116,18 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         width, assumed = numbers["hysteresis"], "sign-at-once"
         yield "width", Exceeds(min(width, 1 - width))
         jump, inside = V - V.at({f"q{k}": -x for k, x in enumerate(q)}), [] if level is None else [level - V]
+        if loop.near:
+            # So much of the level leaves nothing of J but a form that is positive, and q.Jq.
+            more = numbers["jump.lean"]
+            demand(level is not None and more > 0, "a jump needs a level and a positive lean")
+            jump = jump - 2 * loop.lean / more * inside[0]
+            inside = [*kinetic(loop, more), *loop.heaviest(q[1:])]
         yield "a jump lowers V", Squares(jump, [poly(1), *q, *w], 1, [-width - q[0], *inside], [loop.sphere])
         said.append(f"comes to rest on target, with the quaternion's sign chosen anew at q0 < -{above(width)}")
     elif loop.claim.taken.get(SHORTEST):
-        assumed, energy = "sign-at-once", [dot(w, apply(loop.J, w))] * loop.any_inertia
+        assumed, known = "sign-at-once", loop.heaviest(q[1:])
         higher, z = V.at({"q0": 0}) - numbers["level"], [poly(1), *q[1:], *w]
-        yield "the sign never changes", Squares(higher, z, 1, (), [loop.sphere.at({"q0": 0})], energy)
+        yield "the sign never changes", Squares(higher, z, 1, known, [loop.sphere.at({"q0": 0})], kinetic(loop))
         said.append("comes to rest on target by the shorter turn")
     elif level is not None and not loop.any_inertia and away.number > level:
         yield "the other equilibrium is outside", Exceeds(away.number, level)
@@ -129,8 +148,13 @@ def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:
     """Add what the set holds and the limits, and say all that was shown."""
     held = yield from contents(loop, loop.lyapunov)
     limited = yield from within_limits(loop)
+    if loop.near:
+        said = [f"with every J_ik off by up to {below(loop.claim.numbers['tolerance'])} sqrt(J_ii J_kk),", *said]
+    handed = loop.claim.taken.get(HANDED)
+    told = "level" not in loop.claim.numbers or "start.rate" in loop.claim.numbers
+    demand(not handed or told, "what is handed over is not bounded")
     text = "; ".join(part for part in (" ".join(said), enumerated(held), limited.text) if part)
-    label = limited.label or ("inertia" if loop.any_inertia else "convergence")
+    label = limited.label or ("inertia" if loop.any_inertia else "hand-over" if handed else "convergence")
     return Statement(text, (*loop.assumed, "continuous-torque", *limited.assumptions, *assumed), label)
 
 
@@ -152,11 +176,13 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part:
         yield "turns from rest", Squares(inside.at(loop.still), [one, *q], 0, near(angle), [loop.sphere])
         said.append(f"the set holds every rest turned by up to {below(angle)} rad")
     if rate is not None:
-        yield "rates on target", Squares(inside.at(loop.on_target), [one, *w], 0, [rate * rate - dot(w, w)])
+        known = [rate * rate - dot(w, w), *loop.heaviest(w)]
+        yield "rates on target", Squares(inside.at(loop.on_target), [one, *w], 0, known)
         said.append(f"on target every rate up to {below(rate)} rad/s")
     if "start.rate" in numbers:
         angle, rate = numbers["start.angle"], numbers["start.rate"]
-        starts = [*near(angle), rate * rate - dot(w, w)]
+        starts = [*near(angle), rate * rate - dot(w, w), *loop.heaviest(loop.leaning)]
+        starts += [dot(q[1:], apply(loop.J, q[1:]))] * loop.near
         yield "states", Squares(inside, [one, *q, *w], 0, starts, [loop.sphere])
         said.append(f"every state turned by up to {below(angle)} rad at up to {below(rate)} rad/s")
     return said

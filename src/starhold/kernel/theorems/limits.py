@@ -6,26 +6,31 @@ from collections.abc import Generator, Iterator, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
-from ..loops import AttitudeLoop
-from ..numbers import definite, demand, inverse, times, transpose
+from ..loops import AXES, NONE, AttitudeLoop
+from ..numbers import Rows, definite, demand, inverse, times, transpose
 from ..polynomials import Poly, apply, dot, poly, variables
+from ..programs import joined
 from ..rules import Obligation, Squares
 from ..sentences import Statement, above, below, enumerated
 
-Load: TypeAlias = tuple[str, Fraction, Poly]
+Row: TypeAlias = Sequence[Poly | Fraction | int]
+Most: TypeAlias = list[Fraction | None]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
 def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, Statement]:
-    """On {V <= level}, with everything from outside at most as told: each component of the torque is at most `limit` in size
-    (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k."""
+    """On {V <= level}, or everywhere, with everything from outside at most as told: each component of the torque is at most
+    `limit` in size (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k, of
+    those that are told."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, norm = numbers.get("limit"), numbers.get("limit.norm")
-    motors = "motors.0" in numbers or "stored.0" in numbers
-    unlimited = [] if motors or not loop.wheels else ["unlimited-wheels"]
-    if limit is None and norm is None and not motors:
+    count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
+    motors, stored = ([numbers.get(f"{name}.{k}") for k in range(count)] for name in ("motors", "stored"))
+    told = [x for x in (*motors, *stored) if x is not None]
+    unlimited = ["unlimited-wheels"] * (loop.wheels and (not told or len(told) < 2 * count))
+    if limit is None and norm is None and not told:
         return Statement("", ("unlimited-torque", *unlimited))
-    known, bounded, bounds, assumed = list[Poly](), list[Poly](), list[str](), list[str]()
+    known, bounded, bounds, assumed = list[Poly](), list[list[Poly]](), list[str](), list[str]()
     if loop.outside:
         outside = [numbers[f"outside.{k}"] for k in range(3)]
         known += [most - sign * e for most, e in zip(outside, loop.e, strict=True) for sign in (1, -1)]
@@ -36,41 +41,51 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     vectors += [("momentum", loop.H, "a momentum of up to {} N m s")] * loop.wheels
     for name, vector, text in vectors:
         known.append(numbers[name] * numbers[name] - dot(vector, vector))
-        bounded += vector
+        bounded.append(vector)
         bounds.append(text.format(below(numbers[name])))
     assumed += ["bounded-target"] * loop.moving + ["bounded-momentum"] * loop.wheels + unlimited
-    known.append(numbers["level"] - loop.lyapunov)
-    said, limited = list[str](), list(loads("torque", loop.u, limit, norm))
+    known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
+    said, none = list[str](), poly(0)
+    limited = [(*load, none) for load in loads("torque", limit, norm)]
     if limit is not None:
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if norm is not None:
         said.append(f"the law asks for a torque of no more than {above(norm)} N m")
-    if motors:
-        shares, held = allocated(loop)
-        most = {name: [numbers[f"{name}.{k}"] for k in range(len(shares))] for name in ("motors", "stored")}
+    if told:
+        shares, kept = allocated(loop, motors)
         # The rotors' momenta change by share.(torque), the wheels' together by its negative.
-        gives = apply(shares, loop.u)
-        stores = [own - p for own, p in zip(held, apply(shares, loop.stored), strict=True)]
-        for k in range(len(shares)):
-            for name, bound, load in (("motor", most["motors"][k], gives[k]), ("wheel", most["stored"][k], stores[k])):
-                both = [(f"{name} {sign * (k + 1):+d}", bound, sign * load) for sign in (1, -1)]
-                limited += both if load.terms else []
-        torques, momenta = (", ".join(map(above, own)) for own in most.values())
-        said.append(f"motors give no more than {torques} N m and wheels store no more than {momenta} N m s")
-    for name, bound, load in limited:
-        # Of what is bounded from outside only what the load depends on.
-        z = [poly(1), *q, *w, *(x for x in bounded if x.names <= load.names)]
-        yield name, within(bound, load, z, w, known, [loop.sphere])
-    told = f"with {enumerated(bounds)} " if bounds else ""
-    return Statement(told + enumerated(said), tuple(assumed), "wheels" if motors else TORQUE)
+        stores = [own - p for own, p in zip(kept, apply(shares, loop.stored), strict=True)]
+        for k, row in enumerate(shares):
+            for name, most, own, rest in (("motor", motors[k], row, none), ("wheel", stored[k], NONE, stores[k])):
+                if most is None:
+                    continue
+                for sign in (1, -1):
+                    limited.append((f"{name} {sign * (k + 1):+d}", most, [sign * x for x in own], sign * rest))
+        for text, unit, own in (("motors give", "N m", motors), ("wheels store", "N m s", stored)):
+            if any(x is not None for x in own):
+                said.append(f"{text} no more than {', '.join('inf' if x is None else above(x) for x in own)} {unit}")
+    for name, bound, row, rest in limited:
+        used = [k for k in AXES if poly(row[k]).terms]
+        cases = joined(loop.law[k] for k in used)
+        for n, case in enumerate(cases):
+            load = rest + dot([row[k] for k in used], case.value)
+            # Of what is bounded from outside only what the load depends on.
+            felt = [vector for vector in bounded if any(x.names <= load.names for x in vector)]
+            z = [poly(1), *q, *w, *(x for vector in felt for x in vector)]
+            if load.terms:
+                full = name if len(cases) == 1 else f"{name} {n}"
+                yield full, within(bound, load, z, w, [*case.known, *known], [loop.sphere])
+    with_ = f"with {enumerated(bounds)} " if bounds else ""
+    return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if told else TORQUE)
 
 
-def loads(name: str, u: Sequence[Poly], axis: Fraction | None, norm: Fraction | None) -> Iterator[Load]:
-    """Yield what is at most `axis` where each component of u is, and `norm` where |u| is: d.u with every unit vector d."""
+def loads(name: str, axis: Fraction | None, norm: Fraction | None) -> Iterator[tuple[str, Fraction, Row]]:
+    """Yield rows of which the product with u is at most `axis` where each component of u is, and `norm` where |u| is: every
+    unit vector d."""
     if axis is not None:
-        yield from ((f"{name} {sign * k:+d}", axis, sign * p) for k, p in enumerate(u, 1) for sign in (1, -1))
+        yield from ((f"{name} {sign * (k + 1):+d}", axis, [sign * (i == k) for i in AXES]) for k in AXES for sign in (1, -1))
     if norm is not None:
-        yield f"norm of the {name}", norm, dot(UNIT, u)
+        yield f"norm of the {name}", norm, UNIT
 
 
 def within(
@@ -83,18 +98,15 @@ def within(
     return Squares(bound - load, [*z, *more], 0, known, [*modulo, dot(UNIT, UNIT) - 1])
 
 
-def allocated(loop: AttitudeLoop) -> tuple[list[list[Fraction]], list[Fraction]]:
+def allocated(loop: AttitudeLoop, motors: Most) -> tuple[Rows, list[Fraction]]:
     """Return for each wheel its share of the body's torque, and the momentum that it keeps whatever the body does: the rows
     of L = -A'(AA')^-1 and p + Lh. A motor that is told to give nothing has no share."""
-    subject, numbers = loop.claim.subject, loop.claim.numbers
-    demand(loop.wheels, "the loop is taken without wheels")
-    count = next(k for k in range(1000) if f"wheel.{k}.axis.0" not in subject)
-    demand(count > 0, "there are no wheels")
-    axes = [[subject[f"wheel.{k}.axis.{i}"] for i in range(3)] for k in range(count)]
-    driven = [axis if numbers[f"motors.{k}"] != 0 else [Fraction(0)] * 3 for k, axis in enumerate(axes)]
+    subject = loop.claim.subject
+    axes = [[subject[f"wheel.{k}.axis.{i}"] for i in AXES] for k in range(len(motors))]
+    driven = [axis if most != 0 else [Fraction(0)] * 3 for axis, most in zip(axes, motors, strict=True)]
     square = times(transpose(driven), driven)
     demand(definite(square), "the wheels do not act about three axes")
     shares = [[-x for x in row] for row in times(driven, inverse(square))]
-    begun = [[subject[f"wheel.{k}.momentum"]] for k in range(count)]
+    begun = [[subject[f"wheel.{k}.momentum"]] for k in range(len(axes))]
     kept = times(shares, times(transpose(axes), begun))
     return shares, [p + more for (p,), (more,) in zip(begun, kept, strict=True)]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ..loops import AXES, AttitudeLoop
+from ..loops import AXES, AttitudeLoop, around
 from ..numbers import cosine_above, demand
 from ..polynomials import Poly, apply, dot, poly, var
 from ..reading import Claim
@@ -19,7 +19,7 @@ from ..rules import Exceeds, Persists
 from ..sentences import Statement, above, below
 from .attitude import Proof
 from .limits import TORQUE
-from .sampling import linear_loop, near_rest
+from .sampling import linear_loop
 from .sliding import declared, taken_apart
 
 CALM = ("no-outside-torque", "target-at-rest", "no-wheels")
@@ -84,7 +84,7 @@ def rises_near_target(claim: Claim) -> Proof:
     """V' > 0 at a state, and at such states as near the target as one likes: no set {V <= level} is kept for it."""
     yield from rises(claim)
     loop, state = AttitudeLoop(claim), State.told(claim)
-    u = [near_rest(cases, loop.on_target | loop.still) for cases in loop.law]
+    u = [around(cases, loop.on_target | loop.still).value for cases in loop.law]
     yield "V is non-increasing near the target", Exceeds(state.leading(slope(loop, u)))
     return Statement("V rises at states as near the target as one likes", (*MOTION, *CALM), "convergence", True)
 

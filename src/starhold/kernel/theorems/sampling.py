@@ -6,21 +6,12 @@ from collections.abc import Callable, Generator
 from fractions import Fraction
 
 from ..held import over_period
-from ..loops import AttitudeLoop, slopes
+from ..loops import AttitudeLoop, around, slopes
 from ..numbers import Rows, beside, demand, plus, times
-from ..polynomials import Poly, poly
-from ..programs import Piecewise
+from ..polynomials import poly
 from ..reading import Claim
 from ..rules import Contracts, Definite, Exceeds, Obligation, vanish
 from ..sentences import Statement, above, below
-
-
-def near_rest(cases: Piecewise, rest: dict[str, int]) -> Poly:
-    """Return the one case that holds around rest on target, where none of its conditions is on its border."""
-    sides = [[(Poly(dict(p)).at(rest).number, truth) for p, truth in case.guards] for case in cases]
-    holds = [all(x != 0 and (x > 0) == truth for x, truth in own) for own in sides]
-    demand(holds.count(True) == 1, "the law switches at rest on target")
-    return cases[holds.index(True)].value
 
 
 def linear_loop(
@@ -31,7 +22,7 @@ def linear_loop(
     demand(not claim.taken.content, "the loop is taken with nothing")
     yield from loop.sound()
     rest: dict[str, int] = loop.on_target | loop.still
-    u = [loop.expanded(near_rest(cases, rest), rest) for cases in loop.law]
+    u = [loop.expanded(around(cases, rest).value, rest) for cases in loop.law]
     loop.autonomous(u)
     yield from vanish("rest on target", [p.at(rest) for p in u])
     C, K = (slopes([-p for p in u], letter, rest) for letter in "wq")

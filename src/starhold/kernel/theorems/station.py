@@ -10,8 +10,9 @@ from fractions import Fraction
 
 from ..loops import wired
 from ..numbers import RefusedError, demand
-from ..points import STATE, PointLoop, Side
+from ..points import STATE, PointLoop
 from ..polynomials import Poly, dot, horner, minus, multiple, poly, var, variables
+from ..programs import Case
 from ..reading import Claim
 from ..rules import Contracts, Exceeds, Obligation, Shown, Solves, Squares, Vanishes, vanish
 from ..sentences import Statement, above, below, enumerated
@@ -47,7 +48,7 @@ class Circle:
         wrong = self.errors[1:]
         return p.at({self.size: var(self.inverse) * dot(wrong, wrong)})
 
-    def bounds(self, side: Side) -> list[tuple[Fraction, Fraction]]:
+    def bounds(self, side: Case) -> list[tuple[Fraction, Fraction]]:
         """Return what a side says of the size n: n >= c for each f > 0 and c, n <= c for each f < 0 and c."""
         return [multiple(var(self.size), p) for p in side.known]
 
@@ -143,14 +144,14 @@ def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[
         relations, unit = [f[0] - y * y - z * z + circle.square], list[Poly]()
         if circle.inverse in loop.asked(side):
             unit = [var(circle.inverse) * p for p in f[1:]]
-            u, known = [flat(circle.met(p)) for p in side.u], [circle.met(p).at(put) for p in side.known]
+            u, known = [flat(circle.met(p)) for p in side.value], [circle.met(p).at(put) for p in side.known]
             relations.append(dot(unit, unit) - 1)
         else:
-            u, wrong = [flat(p) for p in side.u], dot(f[1:], f[1:])
+            u, wrong = [flat(p) for p in side.value], dot(f[1:], f[1:])
             known = [most * most - wrong for factor, most in circle.bounds(side) if factor < 0 <= most]
-        for name, bound, load in loads("control", u, axis, norm):
+        for name, bound, row in loads("control", axis, norm):
             terms = [poly(1), y, z, *f, *unit]
-            yield f"{name} {k}", within(bound, load, terms, (y, z, f[0]), [*known, inside], relations)
+            yield f"{name} {k}", within(bound, dot(row, u), terms, (y, z, f[0]), [*known, inside], relations)
     said = [f"{above(most)} {how}" for most, how in ((norm, "in norm"), (axis, "on every axis")) if most is not None]
     return f" with no more control than {enumerated(said)}" if said else ""
 
@@ -186,11 +187,11 @@ def returns_with_limited_control(claim: Claim) -> Proof:
     low, high, x, v = numbers["root.low"], numbers["root.high"], loop.x[0], loop.v[0]
     only_side(loop)
     held = {name: value for name, value in resting(loop).items() if name not in ("x1", "v1")}
-    pull, asks = loop.field[0].at(held), loop.sides[0].u[0].at(held)
+    pull, asks = loop.field[0].at(held), loop.sides[0].value[0].at(held)
     p, k, c = pull.slope("x1").number, -asks.slope("x1").number, -asks.slope("v1").number
     yield "the field along X", Vanishes(pull - p * x)
     yield "the law along X", Vanishes(asks + k * x + c * v)
-    for name, u in zip("YZ", loop.sides[0].u[1:], strict=True):
+    for name, u in zip("YZ", loop.sides[0].value[1:], strict=True):
         yield f"{name} can be held", Exceeds(limit, abs(u.at({**held, "x1": 0, "v1": 0}).number))
     yield from clipped(loop, limit)
     off = max(abs(k - low * c), abs(k - high * c))
@@ -210,7 +211,7 @@ def clipped(loop: PointLoop, limit: Fraction) -> Shown:
     (t - acts)(w - acts) <= 0 for w = -limit and limit."""
     t = variables("t")
     for k, case in enumerate(loop.read("limited", 3, wired("command", t), {"limit": poly(limit)})[0]):
-        known, acts, asks = Side(case.guards, []).known, case.value, t[0]
+        known, acts, asks = case.known, case.value, t[0]
         shown = {"at least": acts + limit, "at most": limit - acts}
         shown |= {"near from below": (acts - asks) * (limit - acts), "near from above": (asks - acts) * (limit + acts)}
         for name, p in shown.items():
@@ -228,7 +229,7 @@ def needs_more_control(claim: Claim) -> Proof:
     yield from vanish("on the circle", [p.at(at) for p in circle.errors], first=1)
     here = [s for s in loop.sides if all((Poly(dict(p)).at(at).number > 0) == holds for p, holds in s.guards)]
     demand(len(here) == 1, "the law has no side there")
-    squares = [p.at(at).number ** 2 for p in here[0].u]
+    squares = [p.at(at).number ** 2 for p in here[0].value]
     yield "control", Exceeds(max(squares) if limits[0] is None else sum(squares, Fraction(0)), control * control)
     yield "more than the limit", Exceeds(control, next(x for x in limits if x is not None))
     text = f"the circle itself asks for a control of {below(control)}, more than the limit"

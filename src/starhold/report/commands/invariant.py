@@ -34,11 +34,12 @@ def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
 def present(problem: InvariantProblem, certificate: SetCertificate) -> Result:
     """Each claim with its outcome, how it was shown and what is missing; the phase portrait with the sets."""
     from starhold.certification import invariant as sets
+    from starhold.certification.assumptions import texts
     from starhold.studies.phase_portraits import portraits
 
     shown = portraits(problem, certificate)
     drawn = [item for item in shown if item.V is not None]
-    assumptions = dict.fromkeys(a for claim in certificate.claims for a in claim.assumptions)
+    assumptions = texts(a for claim in certificate.claims for a in claim.assumptions)
     blocks = ["", Heading(certificate.name), _table(certificate, shown), f"  assuming: {'; '.join(assumptions)}", ""]
     figure = partial(_draw, drawn, problem.name) if drawn else None
     outcome = {"proved": "met", "refuted": "missed"}.get(certificate.outcome, "undecided")

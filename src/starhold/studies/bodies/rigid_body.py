@@ -15,13 +15,14 @@ from starhold.parts.epoch import OF_DATE, iso_text
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
-from starhold.studies.modes import certify_modes, mode_departures, named_modes, same_numbers
+from starhold.studies.modes import certify_modes, hand_overs, mode_departures, named_modes, same_numbers
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
     from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
+    from starhold.certification.hand_over import Ends
     from starhold.loop.closed_loop import ClosedLoop, Event
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.simulation.lane import Recording
@@ -139,8 +140,16 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[I
 def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, ClosedLoop]:
     """The loops that the certificates of one law of the scenario are about, by their names."""
     if mode_laws(loop.law, loop.gains):
-        return named_modes(loop, entry.name)
+        return named_modes(loop, entry.name) | {one.name: one.after for one in hand_overs(loop, entry.name)}
     return {name: now for name, now, _ in _named(scenario, entry, loop)}
+
+
+def handed_over(entry: LawEntry, loop: ClosedLoop) -> dict[str, Ends]:
+    """The rates (rad/s) and angles (rad) up to which the switches of a law hand over, by the names of their certificates."""
+    from starhold.certification.hand_over import ends
+
+    switches = hand_overs(loop, entry.name) if mode_laws(loop.law, loop.gains) else []
+    return {one.name: ends(one.levels, one.before, one.after) for one in switches}
 
 
 def _named(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[tuple[str, ClosedLoop, int]]:

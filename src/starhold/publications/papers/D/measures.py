@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from starhold.algebra.vector import ZERO
 from starhold.analysis.rigid_body import error_angle
 from starhold.analysis.roots import PUBLISHED, TwoPieceFit
 from starhold.analysis.transient import Limits
-from starhold.certification.mixed import Shape
+from starhold.laws.interface import Measurement
 from starhold.parts.craft import tensor
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
 from starhold.studies.modal_roots import Study, pick_modal, problem_of, study
+from starhold.trace.straight_line import evaluated
 
 DEGREES = 180.0 / math.pi
 SHORT = 0.002
@@ -306,13 +308,14 @@ def errors_under_torque(desk: Desk) -> Figure:
 def inside_the_region(desk: Desk) -> Finding:
     """Tell whether the printed start is inside the sets that are proved, however the quaternion's sign is chosen."""
     run = desk.recording("landing", "rounded")
-    attitude, rate = np.array(run["attitude_error"])[0], np.array(run["rate_error"])[0]
+    attitude, rate = (tuple(np.array(run[name])[0].tolist()) for name in ("attitude_error", "rate_error"))
+    told = Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
     levels: dict[str, tuple[float, float]] = {}
     for policy in ("as_published", "hysteresis"):
         claim = desk.claims("landing", "rounded", {"law.rounded.quaternion_sign": policy})["region"]
-        if claim.outcome != "proved":
+        if claim.proof is None or claim.outcome != "proved":
             return Finding(False, f"{policy}: {claim.outcome}")
-        levels[policy] = float(Shape(**claim.witness).value(attitude, rate)), claim.numbers["level"]
+        levels[policy] = float(evaluated(claim.proof.roles["lyapunov"], measurement=told)[0]), claim.numbers["level"]
     words = "; ".join(f"{policy}: V = {value:.3f} of {level:.3f}" for policy, (value, level) in levels.items())
     return Finding(all(value < level for value, level in levels.values()), words)
 

@@ -1,0 +1,148 @@
+"""What claims assume, by the identifiers of the kernel: how it is told, and where a flight does not meet it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from starhold.algebra.vector import ZERO
+from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import make_step
+from starhold.parts.effectors.wheels import BAND
+
+Unmet: TypeAlias = list[tuple[Any, str]]
+"""At which samples of a flight (n,), or whether at all, something is not met, each with a sentence without its end."""
+
+
+class Assumption(NamedTuple):
+    """How an assumption is told, and where a flight (a `Span` of analysis) does not meet it; None of what every simulation
+    meets, of what a claim's set says, and of claims that are not about motions."""
+
+    text: str
+    unmet: Callable[[Any], Unmet] | None = None
+
+
+def assumption(identifier: str) -> Assumption:
+    """Return what an identifier stands for."""
+    if identifier.startswith(WITHOUT):
+        part = identifier.removeprefix(WITHOUT)
+
+        def there(span: Any) -> Unmet:
+            return [(True, f"{HAS}{part}")]
+
+        return Assumption(f"without the {part}", there)
+    return ASSUMPTIONS[identifier]
+
+
+def texts(identifiers: Iterable[str]) -> tuple[str, ...]:
+    """Return how assumptions are told, each text once."""
+    return tuple(dict.fromkeys(assumption(name).text for name in identifiers))
+
+
+def cancels(loop: ClosedLoop) -> bool:
+    """Tell whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
+    loop = loop.without("sensor", "estimator")
+    measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
+    memory = loop.law.remember(loop.gains, loop.craft, loop.period)
+    more = 0.01 * loop.craft.torque_limit if math.isfinite(loop.craft.torque_limit) else 1.0
+    # From rest on target, where clipped and switching laws are farthest from their limits.
+    measurement = measurement._replace(attitude=(1.0, 0.0, 0.0, 0.0), rate=ZERO)
+    torques = [
+        np.array(loop.law.command(measurement._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
+        for x in (0.0, more)
+    ]
+    return bool(np.allclose(torques[0] - torques[1], more, rtol=1e-6))
+
+
+def _limited(span: Any) -> Unmet:
+    return [(span.on_limit(span["command"]), "the torque reaches its limit")]
+
+
+def _controlled(span: Any) -> Unmet:
+    return [(span.on_limit(span["command"]), "the control reaches its limit")]
+
+
+def _held_aside(span: Any) -> Unmet:
+    return [(span.on_limit(span["command"][:, 1:]), "the control along Y or Z reaches its limit")]
+
+
+def _wheels_limited(span: Any) -> Unmet:
+    wheels = span.loop.wheels
+    working = np.array(wheels.torque_limit) > 0.0
+    torque, momentum = np.abs(span["wheel_torque"]), np.abs(span["wheel_momentum"])
+    strong = span.reaches(torque, np.array(wheels.torque_limit))[:, working].any(axis=1)
+    full = (momentum > np.array(wheels.momentum_limit) * (1.0 - BAND))[:, working].any(axis=1)
+    return [*_friction(span), *_limited(span), (strong, "a motor reaches its limit"), (full, "a wheel is full")]
+
+
+def _friction(span: Any) -> Unmet:
+    wheels = span.loop.wheels
+    return [(any((*wheels.viscous, *wheels.coulomb)), "the wheels have friction")]
+
+
+def _uncancelled(span: Any) -> Unmet:
+    gravity = span.loop.has("gravity-gradient") and not cancels(span.loop)
+    return [(gravity, "the law does not cancel the gravity gradient")]
+
+
+def _pulled(span: Any) -> Unmet:
+    return [(span.loop.has("gravity-gradient"), "the gravity gradient acts")]
+
+
+def _turning(span: Any) -> Unmet:
+    return [(span.loop.target.part.name != "inertial", "the target turns")]
+
+
+UNLIMITED, WHEELS, FRICTIONLESS = "unlimited-torque", "unlimited-wheels", "frictionless-wheels"
+UNLIMITED_CONTROL, IN_THE_PLANE, LINEAR = "unlimited-control", "in-the-plane", "linear-motion"
+WITHOUT = "without:"
+"""Begins the identifier of the assumption that a part is not there, role and name."""
+HAS = "the loop has the "
+"""Begins the words for a part that a claim leaves out, role and name."""
+# What keeps measurement and actuators from being ideal is a part, which is left out by name.
+_IDEAL = Assumption("exact measurement and ideal actuators")
+# How long the torque is held, and what changes, every departure looks at.
+ASSUMPTIONS = {
+    "rigid-body": Assumption("rigid body"),
+    "inertia-as-given": Assumption("inertia exactly as given"),
+    "inertia-near": Assumption("inertia within the tolerance"),
+    "exact-measurement": _IDEAL,
+    "ideal-actuators": _IDEAL,
+    "continuous-torque": Assumption("torque applied continuously"),
+    UNLIMITED: Assumption("torque not limited", _limited),
+    WHEELS: Assumption("neither torque nor wheels limited, wheels without friction", _wheels_limited),
+    FRICTIONLESS: Assumption("wheels without friction", _friction),
+    "bounded-momentum": Assumption("total momentum at most as told"),
+    "no-wheels": Assumption("no stored momentum"),
+    "no-outside-torque": Assumption("no torque from outside", _pulled),
+    "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),
+    "bounded-outside-torque": Assumption("torque from outside bounded on each axis"),
+    "unknown-outside-torque": Assumption("torque from outside bounded in norm"),
+    "target-at-rest": Assumption("target at rest", _turning),
+    LINEAR: Assumption("linear motion near rest on a target at rest"),
+    "equations-as-given": Assumption("the equations exactly as given"),
+    "filippov": Assumption(
+        "where the right-hand side jumps, motions in the sense of Filippov: x' is any mean of what it is on the sides and "
+        "on the surface"
+    ),
+    UNLIMITED_CONTROL: Assumption(SENTENCES[UNLIMITED_CONTROL], _controlled),
+    "held-aside": Assumption(SENTENCES["held-aside"], _held_aside),
+} | {
+    name: Assumption(SENTENCES[name])
+    for name in (
+        "bounded-push",
+        "held-torque",
+        "linear-field",
+        "whole-field",
+        "circling-bodies",
+        "exact-place",
+        "continuous-control",
+        IN_THE_PLANE,
+        "off-the-bodies",
+    )
+}
+"""The assumptions of claims, but for parts that these leave out by name."""
