@@ -192,7 +192,7 @@ def draw(count: int, height: Height, level: float, random: np.random.Generator, 
         states = _at_rest(np.vstack([np.cos(0.5 * turns), np.sin(0.5 * turns) * axes]))
         slope = np.array([(height(_spun(states, e)) - height(_spun(states, -e))) / 2.0 for e in np.diag(unit)])
         middle = -np.linalg.solve(P, slope / unit[:, None])
-        lowest = height(states) - np.einsum("ik,ij,jk->k", middle, P, middle) / 2.0
+        lowest = height(_spun(states, middle))
         beyond = lowest > level
         if not beyond.any():
             break
@@ -201,8 +201,7 @@ def draw(count: int, height: Height, level: float, random: np.random.Generator, 
         turns = np.where(beyond, closer * turns, turns)
     inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count))
     reached = np.sqrt(2.0 * inside * np.maximum(level - lowest, 0.0))
-    states[ROWS.rate] = middle + reached * (np.linalg.inv(np.linalg.cholesky(P)).T @ directions)
-    return states
+    return _spun(states, middle + reached * (np.linalg.inv(np.linalg.cholesky(P)).T @ directions))
 
 
 def _squares(height: Height) -> tuple[Array, Array]:
@@ -223,9 +222,9 @@ def _at_rest(attitude: Array) -> Array:
 
 
 def _spun(states: Array, rate: Array) -> Array:
-    """Return states with another rate."""
+    """Return states with another rate (3,), or one each (3, n)."""
     found = states.copy()
-    found[ROWS.rate] = rate[:, None]
+    found[ROWS.rate] = rate if rate.ndim > 1 else rate[:, None]
     return found
 
 
