@@ -356,15 +356,19 @@ def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle():
     assert circle["left_at"] == left[0].time
 
 
-def test_a_flight_on_its_control_limit_leaves_the_claim_that_it_ends_at_the_equilibrium():
+@pytest.mark.parametrize("place", range(3))
+def test_a_flight_on_its_control_limit_leaves_the_claim_that_it_ends_at_the_equilibrium(place):
+    """All three ride on it, and two come to rest all the same, as the claim about the limited axis says."""
     scenario = load("l2-equilibrium")
-    entry = scenario.laws[2]
+    entry = scenario.laws[place]
     flight = proved_flight(scenario.text, entry.name)
     run, left = flight.recording, flight.departures[0]["equilibrium"]
     assert flight.certificates[0].claim("equilibrium").outcome == "proved"
     on = np.abs(run["command"]).max(axis=1) >= build(scenario, entry).saturation_limit()
     assert left[0].how == "the control reaches its limit"
     assert left[0].time == pytest.approx(run["time"][np.argmax(on)] * run.attrs["time_unit_s"])
+    assert "the control reaches its limit" in section([flight])
+    assert (flight.departures[0]["saturated-axis"] == ()) == (flight.lost is None)
 
 
 # --- a certificate as a whole -----------------------------------------------------------------------------------------

@@ -142,17 +142,6 @@ def _longest(J: Rows, rate: Rows, attitude: Rows, period: Any) -> Any:
     return period
 
 
-def stable_period(motion: Motion) -> float | None:
-    """A period (s) near the longest that floats find stable, the loop's own if that is; None for a law that is not linear
-    around the equilibrium, and where there is none. No part of any proof."""
-    try:
-        rate, attitude = motion.linear()
-    except ArithmeticError:
-        return None
-    halved = (motion.subject.loop.period * 0.5**count for count in range(100))
-    return next((h for h in halved if _float_radius(motion.subject.inertia, rate, attitude, h) < 1.0), None)
-
-
 def _float_radius(J: Rows, rate: Rows, attitude: Rows, h: float) -> float:
     turn = np.linalg.inv(floats(J))
     pull = np.hstack([turn @ floats(rate), turn @ floats(attitude)])

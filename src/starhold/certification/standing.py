@@ -33,9 +33,9 @@ def standing(claim: Claim, reads: Set[str]) -> Standing:
     limit = "given"
     if "torque_limit" not in reads:
         # A set on which the torque is within its limit is one for every larger limit.
-        limit = "any" if free else "above" if claim.kind == "torque-limit" else "given"
+        limit = "any" if free else "above" if "limit" in claim.numbers else "given"
     tolerance: float | None = claim.numbers.get("tolerance")
-    true = "given" if claim.kind != "inertia" else "any" if tolerance is None else "box"
+    true = "given" if "tolerance" not in claim.numbers else "any" if tolerance is None else "box"
     return Standing(
         "inertia" not in reads and true != "given",
         true,
