@@ -11,16 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.scalar import side
-from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_back, start_inside
+from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_back, shown_at, start_inside, value_of
 from starhold.certification.assumptions import ASSUMPTIONS, WITHOUT, assumption
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
+from starhold.certification.mixed import Shape
 from starhold.certification.proofs import IN_THE_LOOP
 from starhold.certification.wording import HEADINGS, sentence
 from starhold.checker import check, check_file, passed
 from starhold.checker.check import ENDS
 from starhold.checker.claims import CLAIMS
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
+from starhold.parts.craft import tensor
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.report.proved import section
 from starhold.scenario.building import build
@@ -340,6 +342,29 @@ def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
         shown, h = SIGN_POLICIES["hysteresis"](tuple(error), h, loop.hysteresis_width)
         expected.append(shown)
     assert np.array_equal(fed_back(loop, errors), np.array(expected))
+
+
+def test_the_set_of_a_claim_is_that_of_the_program_in_its_proof():
+    """Of a law whose V falls with a mixed term alone, and of one that is told by its root."""
+    craft = BASE.replace("gravity_gradient = true", "gravity_gradient = false")
+    mixed = '[[law]]\ntype = "lqr"\nform = "II"\nq = [1, 1, 1, 1, 2, 3]\nr = [1e3, 1e3, 1e3]\n'
+    for law, kind in ((mixed, "torque-limit"), ('[[law]]\ntype = "modal"\nform = "equal"\na = -0.428\n', "region")):
+        loop = built(parse(craft + law, "here"))
+        certificate = certify(loop)
+        claim = certificate.claim(kind)
+        shown = shown_at(loop, loop.start)
+        columns = shown._replace(attitude=tuple(np.full(3, x) for x in shown.attitude))
+        n, w, q = claim.witness, np.array(shown.rate), np.array(shown.attitude)
+        if kind == "region":
+            expected = Shape(**n).value(shown.attitude, shown.rate)
+        else:
+            assert n["epsilon"] > 0.0
+            own = loop.law.lyapunov(shown, loop.gains, loop.craft)
+            expected = own + n["epsilon"] * q[1:] @ tensor(loop.craft.inertia) @ w
+        for told in (shown, columns):
+            assert value_of(claim.proof.roles, loop, told) == pytest.approx(expected)
+        inside = start_inside(certificate, loop)[kind]
+        assert inside == (expected <= claim.numbers["level"])
 
 
 # --- station keeping --------------------------------------------------------------------------------------------------

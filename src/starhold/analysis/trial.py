@@ -183,15 +183,15 @@ def _sliding_period(longest: float, K: Array, reach: Array, least: float, greate
 def draw(count: int, height: Height, level: float, random: np.random.Generator, most: float = 2.0 * math.pi) -> Array:
     """Return states (16, count) of {V <= level} that are turned by at most so much, half of them on its surface. V is of
     second degree in the rate, with squares that do not depend on the attitude."""
-    P, unit = _squares(height)
+    P, units = _squares(height)
     axes, directions = random.normal(size=(2, 3, count))
     axes /= np.linalg.norm(axes, axis=0)
     directions /= np.linalg.norm(directions, axis=0)
     turns = random.uniform(0.0, most, size=count)
     while True:
         states = _at_rest(np.vstack([np.cos(0.5 * turns), np.sin(0.5 * turns) * axes]))
-        slope = np.array([(height(_spun(states, e)) - height(_spun(states, -e))) / 2.0 for e in np.diag(unit)])
-        middle = -np.linalg.solve(P, slope / unit[:, None])
+        slope = np.array([(height(_spun(states, e)) - height(_spun(states, -e))) / 2.0 for e in units])
+        middle: Array = -np.asarray(np.linalg.solve(P, slope / np.diagonal(units)[:, None]), dtype=np.float64)
         lowest = height(_spun(states, middle))
         beyond = lowest > level
         if not beyond.any():
@@ -211,7 +211,7 @@ def _squares(height: Height) -> tuple[Array, Array]:
     squares = np.array([2.0 * float(height(_spun(rest, e))[0]) for e in one])
     pairs = [[2.0 * float(height(_spun(rest, e + f))[0]) for e in one] for f in one]
     P = 0.5 * (np.array(pairs) - squares[:, None] - squares[None, :])
-    return P, np.sqrt(2.0 * top / squares)
+    return P, np.diag(np.sqrt(2.0 * top / squares))
 
 
 def _at_rest(attitude: Array) -> Array:
