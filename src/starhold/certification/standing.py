@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import dataclass
 
-from starhold.certification.assumptions import UNLIMITED, WHEELS
+from starhold.certification.assumptions import LINEAR, UNLIMITED, WHEELS
 from starhold.certification.certificate import Claim
 
 
@@ -29,7 +29,7 @@ class Standing:
 
 def standing(claim: Claim, reads: Set[str]) -> Standing:
     """Tell what a claim stands on, of a law that reads these numbers of its nominal model: "inertia", "torque_limit"."""
-    free = UNLIMITED in claim.assumptions or WHEELS in claim.assumptions
+    free = not {UNLIMITED, WHEELS, LINEAR}.isdisjoint(claim.assumptions)
     limit = "given"
     if "torque_limit" not in reads:
         # A set on which the torque is within its limit is one for every larger limit.
