@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from starhold.algebra.vector import ZERO
 from starhold.analysis.trial import draw, fly_claims
 from starhold.certification.certify import certify
 from starhold.certification.matrices import number

@@ -68,8 +68,8 @@ def of_words(r, content, claim):
         claim["taken"] = [w for w in claim["taken"] if w != word] if word in claim["taken"] else [*claim["taken"], word]
     elif way == "theorem":
         claim["theorem"] = r.choice(
-            ["converges", "converges strictly", "converges near the inertia", "converges whatever the inertia", "converges from both quaternions",
-             "converges without a preferred axis", "stays stable between samples",
+            ["converges", "converges strictly", "converges near the inertia", "converges whatever the inertia",
+             "converges from both quaternions", "converges without a preferred axis", "stays stable between samples",
              "reaches its surface", "points"])  # fmt: skip
     else:
         a, b = r.sample(sorted(claim["programs"]), 2)
