@@ -31,8 +31,8 @@ SQUARES, LYAPUNOV = "sum of squares", "Lyapunov's inequality"
 
 @dataclass(frozen=True)
 class Obligation:
-    """One thing that had to be shown. `how`: by which rule of the kernel; `evidence`: where it is refuted, the state (or inertia, or eigenvalue) that refutes it, else why it
-    is undecided."""
+    """One thing that had to be shown. `how`: by which kind of rule; `evidence`: where it is refuted, the state (or inertia,
+    or eigenvalue) that refutes it, else why it is undecided."""
 
     name: str
     how: str

@@ -1,4 +1,4 @@
-"""Definite matrices and square roots without rounding: floats only guess, rationals and balls decide.
+"""Definite matrices without rounding: floats only guess, rationals and balls decide.
 
 A matrix is a list of rows of rationals (`fmpq`) or balls (`arb`).
 """
@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import Polynomial, exact
 
 Rows: TypeAlias = list[list[Any]]
-NEAR = 16
-"""Steps from a root in floats to a bound of the exact one, at most; it takes one or two."""
 
 
 def rows(array: Any) -> Rows:
