@@ -69,7 +69,8 @@ def of_words(r, content, claim):
     elif way == "theorem":
         claim["theorem"] = r.choice(
             ["converges", "converges strictly", "converges near the inertia", "converges whatever the inertia",
-             "converges from both quaternions", "converges without a preferred axis", "stays stable between samples",
+             "converges from both quaternions",
+             "converges without a preferred axis", "stays stable between samples",
              "reaches its surface", "points"])  # fmt: skip
     else:
         a, b = r.sample(sorted(claim["programs"]), 2)

@@ -143,8 +143,8 @@ CASES = {
     "V is non-increasing": case(feedback(-C)),
     "only equilibrium": case(hilly, hills, taken=["hysteresis"], hysteresis=0.75),
     "largest moment": case(
-        V=crossed(0.1), theorem=NEAR, taken=["shortest sign"], level=0.15,
-        rate=0.54, lean=0.1, tolerance=0.5, inertia_most=1.0,
+        V=crossed(0.1), theorem=NEAR, taken=["shortest sign"], level=0.15, rate=0.54,
+        lean=0.1, tolerance=0.5, inertia_most=1.0,
     ),
     "rates": case(level=0.1, fastest=0.4),
     "width": case(taken=["hysteresis"], hysteresis=1.5),
