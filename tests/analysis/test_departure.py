@@ -11,15 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.scalar import side
-from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_back, start_inside
+from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_back, shown_at, start_inside, value_of
 from starhold.certification.assumptions import ASSUMPTIONS, WITHOUT, assumption
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
+from starhold.certification.mixed import Shape
 from starhold.certification.proofs import IN_THE_LOOP
 from starhold.certification.wording import HEADINGS, sentence
 from starhold.checker import check, check_file, passed
 from starhold.checker.check import ENDS
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
+from starhold.parts.craft import tensor
 from starhold.parts.quaternion_sign import SIGN_POLICIES
 from starhold.report.proved import section
 from starhold.scenario.building import build
@@ -339,6 +341,29 @@ def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
     assert np.array_equal(fed_back(loop, errors), np.array(expected))
 
 
+def test_the_set_of_a_claim_is_that_of_the_program_in_its_proof():
+    """Of a law whose V falls with a mixed term alone, and of one that is told by its root."""
+    craft = BASE.replace("gravity_gradient = true", "gravity_gradient = false")
+    mixed = '[[law]]\ntype = "lqr"\nform = "II"\nq = [1, 1, 1, 1, 2, 3]\nr = [1e3, 1e3, 1e3]\n'
+    for law, kind in ((mixed, "torque-limit"), ('[[law]]\ntype = "modal"\nform = "equal"\na = -0.428\n', "region")):
+        loop = built(parse(craft + law, "here"))
+        certificate = certify(loop)
+        claim = certificate.claim(kind)
+        shown = shown_at(loop, loop.start)
+        columns = shown._replace(attitude=tuple(np.full(3, x) for x in shown.attitude))
+        n, w, q = claim.witness, np.array(shown.rate), np.array(shown.attitude)
+        if kind == "region":
+            expected = Shape(**n).value(shown.attitude, shown.rate)
+        else:
+            assert n["epsilon"] > 0.0
+            own = loop.law.lyapunov(shown, loop.gains, loop.craft)
+            expected = own + n["epsilon"] * q[1:] @ tensor(loop.craft.inertia) @ w
+        for told in (shown, columns):
+            assert value_of(claim.proof.roles, loop, told) == pytest.approx(expected)
+        inside = start_inside(certificate, loop)[kind]
+        assert inside == (expected <= claim.numbers["level"])
+
+
 # --- station keeping --------------------------------------------------------------------------------------------------
 
 
@@ -353,15 +378,19 @@ def test_a_lost_flight_first_leaves_the_claim_that_it_ends_on_the_circle():
     assert circle["left_at"] == left[0].time
 
 
-def test_a_flight_on_its_control_limit_leaves_the_claim_that_it_ends_at_the_equilibrium():
+@pytest.mark.parametrize("place", range(3))
+def test_a_flight_on_its_control_limit_leaves_the_claim_that_it_ends_at_the_equilibrium(place):
+    """All three ride on it, and two come to rest all the same, as the claim about the limited axis says."""
     scenario = load("l2-equilibrium")
-    entry = scenario.laws[2]
+    entry = scenario.laws[place]
     flight = proved_flight(scenario.text, entry.name)
     run, left = flight.recording, flight.departures[0]["equilibrium"]
     assert flight.certificates[0].claim("equilibrium").outcome == "proved"
     on = np.abs(run["command"]).max(axis=1) >= build(scenario, entry).saturation_limit()
     assert left[0].how == "the control reaches its limit"
     assert left[0].time == pytest.approx(run["time"][np.argmax(on)] * run.attrs["time_unit_s"])
+    assert "the control reaches its limit" in section([flight])
+    assert (flight.departures[0]["saturated-axis"] == ()) == (flight.lost is None)
 
 
 # --- a certificate as a whole -----------------------------------------------------------------------------------------

@@ -15,6 +15,8 @@ from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO
 from starhold.analysis.departure import proved_by, shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
+from starhold.certification.evidence.attitude import TURNS
+from starhold.certification.evidence.claims import settles
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import ROWS, angular_acceleration
@@ -71,7 +73,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     free, level = _undisturbed(loop, certificate, "motors" in claim.numbers), claim.numbers["start"]
     random = np.random.default_rng(seed)
     height = _height(free, programs)
-    top = float(height(_at_rest(HALF_TURNS)).max())
+    top = _highest(height)
     # Where every rate is allowed, up to what a body spun as fast as three half turns' worth of V has.
     level = min(4.0 * top, math.inf if level is None else level)
     free, states = _paced(free, certificate, draw(flights, height, level, random), random)
@@ -183,16 +185,16 @@ def _sliding_period(longest: float, K: Array, reach: Array, least: float, greate
 def draw(count: int, height: Height, level: float, random: np.random.Generator, most: float = 2.0 * math.pi) -> Array:
     """Return states (16, count) of {V <= level} that are turned by at most so much, half of them on its surface. V is of
     second degree in the rate, with squares that do not depend on the attitude."""
-    P, unit = _squares(height)
+    P, units = _squares(height)
     axes, directions = random.normal(size=(2, 3, count))
     axes /= np.linalg.norm(axes, axis=0)
     directions /= np.linalg.norm(directions, axis=0)
     turns = random.uniform(0.0, most, size=count)
     while True:
         states = _at_rest(np.vstack([np.cos(0.5 * turns), np.sin(0.5 * turns) * axes]))
-        slope = np.array([(height(_spun(states, e)) - height(_spun(states, -e))) / 2.0 for e in np.diag(unit)])
-        middle = -np.linalg.solve(P, slope / unit[:, None])
-        lowest = height(states) - np.einsum("ik,ij,jk->k", middle, P, middle) / 2.0
+        slope = np.array([(height(_spun(states, e)) - height(_spun(states, -e))) / 2.0 for e in units])
+        middle: Array = -np.asarray(np.linalg.solve(P, slope / np.diagonal(units)[:, None]), dtype=np.float64)
+        lowest = height(_spun(states, middle))
         beyond = lowest > level
         if not beyond.any():
             break
@@ -201,18 +203,21 @@ def draw(count: int, height: Height, level: float, random: np.random.Generator, 
         turns = np.where(beyond, closer * turns, turns)
     inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count))
     reached = np.sqrt(2.0 * inside * np.maximum(level - lowest, 0.0))
-    states[ROWS.rate] = middle + reached * (np.linalg.inv(np.linalg.cholesky(P)).T @ directions)
-    return states
+    return _spun(states, middle + reached * (np.linalg.inv(np.linalg.cholesky(P)).T @ directions))
 
 
 def _squares(height: Height) -> tuple[Array, Array]:
     """Return P of w.Pw/2 in V, and rates about each axis at which V is about as large as it is at rest after half a turn."""
-    rest, one = _at_rest(np.array([[1.0], [0.0], [0.0], [0.0]])), np.eye(3)
-    top = float(np.abs(height(_at_rest(HALF_TURNS))).max())
+    rest, one = _at_rest(np.eye(4)[:, :1]), np.eye(3)
     squares = np.array([2.0 * float(height(_spun(rest, e))[0]) for e in one])
     pairs = [[2.0 * float(height(_spun(rest, e + f))[0]) for e in one] for f in one]
     P = 0.5 * (np.array(pairs) - squares[:, None] - squares[None, :])
-    return P, np.sqrt(2.0 * top / squares)
+    return P, np.diag(np.sqrt(2.0 * _highest(height) / squares))
+
+
+def _highest(height: Height) -> float:
+    """Return the largest V at rest."""
+    return float(height(_at_rest(np.array(TURNS, dtype=float).T)).max())
 
 
 def _at_rest(attitude: Array) -> Array:
@@ -223,14 +228,10 @@ def _at_rest(attitude: Array) -> Array:
 
 
 def _spun(states: Array, rate: Array) -> Array:
-    """Return states with another rate."""
+    """Return states with another rate (3,), or one each (3, n)."""
     found = states.copy()
-    found[ROWS.rate] = rate[:, None]
+    found[ROWS.rate] = rate if rate.ndim > 1 else rate[:, None]
     return found
-
-
-HALF_TURNS = np.array([(-1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)]).T
-"""The target's other quaternion, and half turns from it."""
 
 
 def _height(loop: ClosedLoop, programs: Any) -> Height:
@@ -250,14 +251,8 @@ def stable_period(loop: ClosedLoop) -> float | None:
     slopes = [_slopes(loop, step) for step in (NEAR, 0.5 * NEAR)]
     if not np.allclose(*slopes, rtol=1e-3, atol=1e-9 * float(np.abs(slopes[0]).max())):
         return None
-    pull = np.linalg.solve(tensor(loop.craft.inertia), slopes[0])
-    one, none = np.eye(3), np.zeros((3, 3))
-
-    def stable(h: float) -> bool:
-        step = np.block([[one, none], [0.5 * h * one, one]]) + np.vstack([h * pull, 0.25 * h * h * pull])
-        return float(np.abs(np.linalg.eigvals(step)).max()) < 1.0
-
-    return next((h for h in (loop.period * 0.5**count for count in range(100)) if stable(h)), None)
+    pull = -np.asarray(np.linalg.solve(tensor(loop.craft.inertia), slopes[0]), dtype=np.float64)
+    return next((h for h in (loop.period * 0.5**count for count in range(100)) if settles(pull, h)), None)
 
 
 def _slopes(loop: ClosedLoop, step: float) -> Array:

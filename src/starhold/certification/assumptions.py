@@ -1,4 +1,4 @@
-"""What claims assume, by the identifiers of the kernel: how it is told, and where a flight does not meet it."""
+"""Assumptions of claims, by the identifiers of the kernel, are told in words, and looked for in flights."""
 
 from __future__ import annotations
 

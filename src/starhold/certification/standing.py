@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import dataclass
 
-from starhold.certification.assumptions import UNLIMITED, WHEELS
+from starhold.certification.assumptions import LINEAR, UNLIMITED, WHEELS
 from starhold.certification.certificate import Claim
 
 
@@ -29,13 +29,13 @@ class Standing:
 
 def standing(claim: Claim, reads: Set[str]) -> Standing:
     """Tell what a claim stands on, of a law that reads these numbers of its nominal model: "inertia", "torque_limit"."""
-    free = UNLIMITED in claim.assumptions or WHEELS in claim.assumptions
+    free = not {UNLIMITED, WHEELS, LINEAR}.isdisjoint(claim.assumptions)
     limit = "given"
     if "torque_limit" not in reads:
         # A set on which the torque is within its limit is one for every larger limit.
-        limit = "any" if free else "above" if claim.kind == "torque-limit" else "given"
+        limit = "any" if free else "above" if "limit" in claim.numbers else "given"
     tolerance: float | None = claim.numbers.get("tolerance")
-    true = "given" if claim.kind != "inertia" else "any" if tolerance is None else "box"
+    true = "given" if "tolerance" not in claim.numbers else "any" if tolerance is None else "box"
     return Standing(
         "inertia" not in reads and true != "given",
         true,

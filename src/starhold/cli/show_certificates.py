@@ -96,17 +96,17 @@ def reasons(claim: Claim) -> list[str]:
 def assumptions(certificate: Certificate) -> str:
     """Every assumption once, with the claims that need it where not all do."""
     kinds = {claim.kind: texts(claim.assumptions) for claim in certificate.claims}
-    found: list[str] = []
+    parts: list[str] = []
     for assumption in dict.fromkeys(a for assumed in kinds.values() for a in assumed):
         holders = [HEADINGS[kind] for kind, assumed in kinds.items() if assumption in assumed]
         others = [HEADINGS[kind] for kind, assumed in kinds.items() if assumption not in assumed]
         if not others:
-            found.append(assumption)
+            parts.append(assumption)
         elif len(others) < len(holders):
-            found.append(f"{assumption} (not for: {', '.join(others)})")
+            parts.append(f"{assumption} (not for: {', '.join(others)})")
         else:
-            found.append(f"{assumption} (for: {', '.join(holders)})")
-    return "; ".join(found)
+            parts.append(f"{assumption} (for: {', '.join(holders)})")
+    return "; ".join(parts)
 
 
 def print_compared(others: Sequence[str], scenario: str | None) -> None:

@@ -116,19 +116,20 @@ def find_sampled(loop: Loop) -> None:
 def longest_stable(J: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64], period: float) -> float:
     """Return a period near the longest, from a stable one on, that floats find all stable up to."""
     pull = np.asarray(np.linalg.solve(J, np.hstack([C, K])), dtype=np.float64)
-    one, none = np.eye(3), np.zeros((3, 3))
-
-    def stable(h: float) -> bool:
-        step = np.block([[one, none], [0.5 * h * one, one]]) - np.vstack([h * pull, 0.25 * h * h * pull])
-        return float(np.abs(np.linalg.eigvals(step)).max()) < 1.0
-
     low, high = period, 2.0 * period
-    while stable(high) and high < 1e12 * period:
+    while settles(pull, high) and high < 1e12 * period:
         low, high = high, 2.0 * high
     for _ in range(50):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
+        low, high = (middle, high) if settles(pull, middle) else (low, middle)
     return low
+
+
+def settles(pull: NDArray[np.float64], h: float) -> bool:
+    """Whether floats find stable near rest the acceleration -pull (w, q) that is held for h."""
+    one, none = np.eye(3), np.zeros((3, 3))
+    step = np.block([[one, none], [0.5 * h * one, one]]) - np.vstack([h * pull, 0.25 * h * h * pull])
+    return float(np.abs(np.linalg.eigvals(step)).max()) < 1.0
 
 
 def find_sliding(loop: Loop) -> None:

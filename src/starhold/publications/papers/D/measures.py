@@ -309,13 +309,13 @@ def inside_the_region(desk: Desk) -> Finding:
     """Tell whether the printed start is inside the sets that are proved, however the quaternion's sign is chosen."""
     run = desk.recording("landing", "rounded")
     attitude, rate = (tuple(np.array(run[name])[0].tolist()) for name in ("attitude_error", "rate_error"))
-    told = Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
+    measured = Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
     levels: dict[str, tuple[float, float]] = {}
     for policy in ("as_published", "hysteresis"):
         claim = desk.claims("landing", "rounded", {"law.rounded.quaternion_sign": policy})["region"]
         if claim.proof is None or claim.outcome != "proved":
             return Finding(False, f"{policy}: {claim.outcome}")
-        levels[policy] = float(evaluated(claim.proof.roles["lyapunov"], measurement=told)[0]), claim.numbers["level"]
+        levels[policy] = float(evaluated(claim.proof.roles["lyapunov"], measurement=measured)[0]), claim.numbers["level"]
     words = "; ".join(f"{policy}: V = {value:.3f} of {level:.3f}" for policy, (value, level) in levels.items())
     return Finding(all(value < level for value, level in levels.values()), words)
 
