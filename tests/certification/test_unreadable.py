@@ -80,7 +80,12 @@ def law_of(text, folder, head=HEAD):
 def test_what_cannot_be_read_is_undecided_with_the_operation_and_its_line(operation, declared, tmp_path):
     law = law_of(PLAIN.format(size=SIZES[operation]) + V * (declared == "V"), tmp_path)
     certificate = certify(sample_loop(law, law.examples()[0]))
-    (claim,) = certificate.claims
+    claim, *others = certificate.claims
+    if declared == "V" and operation == "less_equal":
+        # The kernel can read it: V does not know of the step of the stiffness.
+        assert (claim.kind, claim.outcome) == ("convergence", "refuted")
+        return
+    assert not others
     # Near rest the switching ones are one polynomial, whose step with the torque held is stable.
     stable = declared == "no V" and operation in NEAR_REST
     assert (certificate.outcome, claim.outcome) == ("undecided", "proved" if stable else "undecided")

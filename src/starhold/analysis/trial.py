@@ -339,14 +339,14 @@ def _value(loop: ClosedLoop, programs: Any) -> Height:
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
     """Return the largest torque, or of wheels torque and momentum, as a share of what is claimed."""
     torque = states[ROWS.torque]
-    if "motors" in claim.numbers:
-        wheels = cast(Wheels, loop.wheels)
-        needs = (
-            (np.array(wheels.least) @ torque, claim.numbers["motors"]),
-            (states[ROWS.torque.stop :], claim.numbers["wheel_momentum"]),
-        )
-        # What a lost wheel is claimed to need is zero, and it needs that.
-        return max(float((np.abs(found).max(axis=1) / np.maximum(limits, 1e-300)).max()) for found, limits in needs)
+    if loop.wheels is not None:
+        needs = (("motors", np.array(loop.wheels.least) @ torque), ("wheel_momentum", states[ROWS.torque.stop :]))
+        # What a lost wheel is claimed to need is zero, and it needs that. What has no limit is not claimed.
+        limits = [np.array([np.inf if x is None else x for x in claim.numbers.get(name, [None])]) for name, _ in needs]
+        shares = [
+            np.abs(found).max(axis=1) / np.maximum(most, 1e-300) for (_, found), most in zip(needs, limits, strict=True)
+        ]
+        return float(np.concatenate(shares).max())
     size = np.linalg.norm(torque, axis=0) if loop.limit == "norm" else np.abs(torque)
     return float(size.max()) / loop.craft.torque_limit
 

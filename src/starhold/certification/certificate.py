@@ -21,7 +21,7 @@ FORMAT = "starhold certificate 3"
 FILE, KERNEL = "certificate.json", "kernel.pyz"
 NOTE = (
     "A claim with a number under 'proof' is that of the claims below, counted from 0, which kernel.pyz checks by itself. "
-    "Any other claim carries no proof: the checker of starhold derives it again from the subject."
+    "Any other claim carries no proof, and is undecided."
 )
 Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
@@ -31,9 +31,8 @@ SQUARES, LYAPUNOV = "sum of squares", "Lyapunov's inequality"
 
 @dataclass(frozen=True)
 class Obligation:
-    """One thing that had to be shown. `how`: by exact identity or inequality in rationals, by ball arithmetic, or by a
-    LaSalle argument; `evidence`: where it is refuted, the state (or inertia, or eigenvalue) that refutes it, else why it
-    is undecided."""
+    """One thing that had to be shown. `how`: by which kind of rule; `evidence`: where it is refuted, the state (or inertia,
+    or eigenvalue) that refutes it, else why it is undecided."""
 
     name: str
     how: str
@@ -57,8 +56,8 @@ class Proof:
 @dataclass(frozen=True, repr=False)
 class Claim:
     """`kind` says what is claimed, `numbers` how much, in SI units; None among them means without bound. `witness`:
-    numbers that make the proof, and that a checker needs. `proof`: what the kernel has checked; without one the checker
-    derives the claim again."""
+    numbers that make the proof, and that a checker needs. `proof`: what the kernel has checked; without one nothing
+    is decided."""
 
     kind: str
     numbers: dict[str, Any]

@@ -1,11 +1,10 @@
-"""Definite matrices and square roots without rounding: floats only guess, rationals and balls decide.
+"""Definite matrices without rounding: floats only guess, rationals and balls decide.
 
 A matrix is a list of rows of rationals (`fmpq`) or balls (`arb`).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -16,8 +15,6 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import Polynomial, exact
 
 Rows: TypeAlias = list[list[Any]]
-NEAR = 16
-"""Steps from a root in floats to a bound of the exact one, at most; it takes one or two."""
 
 
 def rows(array: Any) -> Rows:
@@ -53,27 +50,6 @@ def plus(a: Rows, b: Rows, c: Any = 1) -> Rows:
 def times(c: Any, a: Rows) -> Rows:
     """c a."""
     return [[x * c for x in row] for row in a]
-
-
-def transpose(a: Rows) -> Rows:
-    """The transposed matrix."""
-    return [list(column) for column in zip(*a, strict=True)]
-
-
-def matmul(a: Rows, b: Rows) -> Rows:
-    """a b."""
-    columns = transpose(b)
-    return [[_dot(row, column) for column in columns] for row in a]
-
-
-def symmetric_part(a: Rows) -> Rows:
-    """(a + a')/2."""
-    return times(fmpq(1, 2), plus(a, transpose(a)))
-
-
-def block(a: Rows, b: Rows, d: Rows) -> Rows:
-    """[[a, b], [b', d]]."""
-    return [[*s, *t] for s, t in zip(a, b, strict=True)] + [[*s, *t] for s, t in zip(transpose(b), d, strict=True)]
 
 
 def inverse(a: Rows) -> Rows:
@@ -124,58 +100,9 @@ def _just_below(guess: float, size: float, a: Rows) -> Any:
     raise ArithmeticError("no bound of an eigenvalue was found")
 
 
-def root_above(x: Any) -> Any:
-    """A rational just above the square root of a rational that is not negative."""
-    return _root(x, 1.0 + 1e-15)
-
-
-def root_below(x: Any) -> Any:
-    """A rational just below the square root of a rational that is not negative."""
-    return _root(x, 1.0 - 1e-15)
-
-
-def _root(x: Any, nudge: float) -> Any:
-    if x == 0:
-        return fmpq(0)
-    found = exact(math.sqrt(number(x)))
-    for _ in range(NEAR):
-        if (found * found >= x) if nudge > 1.0 else (found * found <= x):
-            return found
-        found *= exact(nudge)
-    raise OverflowError("a root is no float of normal size")
-
-
 def matrix_of(polynomial: Polynomial, first: Sequence[str], second: Sequence[str]) -> Rows:
     """The coefficients of first_i second_j; of a quadratic form (first is second) the symmetric matrix."""
     if tuple(first) == tuple(second):
         form = [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
         return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(form)]
     return [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
-
-
-def characteristic_roots(a: Rows) -> list[tuple[Any, int]]:
-    """Enclosures of the eigenvalues of a rational matrix, with multiplicities."""
-    polynomial: Any = fmpq_mat(len(a), len(a), [x for row in a for x in row]).charpoly()
-    return polynomial.complex_roots()
-
-
-def _dot(a: list[Any], b: list[Any]) -> Any:
-    total: Any = fmpq(0)
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
-
-
-def spectral_norm_above(a: Rows) -> Any:
-    """A rational above the largest singular value."""
-    return root_above(greatest(matmul(transpose(a), a)))
-
-
-def root_float(square: Any, up: bool = False) -> float:
-    """The float next to the square root of a rational that is not above it, or, up, not below it."""
-    root, toward = math.sqrt(number(square)), math.inf if up else 0.0
-    for _ in range(NEAR):
-        if (exact(root) ** 2 >= square) if up else (exact(root) ** 2 <= square):
-            return root
-        root = math.nextafter(root, toward)
-    raise OverflowError("a root is no float of normal size")

@@ -96,7 +96,8 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
         label,
         told,
         dict(witness),
-        assumed(proved.statement.assumptions, loop),
+        # Limits that a claim about wheels does not tell they do not have.
+        tuple(x for x in assumed(proved.statement.assumptions, loop) if (x, label) != (WHEELS, "wheels")),
         tuple(shown),
         Proof(dict(given), programs),
     )
@@ -142,7 +143,8 @@ def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         name: [above(_exact(numbers[at])) if (at := f"{key}.{k}") in numbers else None for k in range(len(loop.loop.rotors))]
         for name, key in (("motors", "motors"), ("wheel_momentum", "stored"))
     }
-    return _set(numbers, loop) | {"momentum": float(numbers["momentum"])} | each
+    told = {name: found for name, found in each.items() if any(x is not None for x in found)}
+    return _set(numbers, loop) | {"momentum": float(numbers["momentum"])} | told
 
 
 def _inertia(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:

@@ -182,14 +182,16 @@ def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    if "motors" not in n:
+    if "momentum" not in n:
         return "no motor of a wheel reaches its limit"
-    torque, stored = (
-        shown(max(n[name]), unit, up=True) for name, unit in (("motors", " N m"), ("wheel_momentum", " N m s"))
-    )
+    parts: list[str] = []
+    for text, name, unit in (("motor{} gives", "motors", " N m"), ("wheel{} stores", "wheel_momentum", " N m s")):
+        told = [x for x in n.get(name, ()) if x is not None]
+        if told:
+            which = text.format("" if len(told) == len(n[name]) else " with a limit")
+            parts.append(f"no {which} more than {shown(max(told), unit, up=True)}")
     while_ = f"while the total momentum is at most {shown(n['momentum'], ' N m s')}"
-    most = f"no motor gives more than {torque} and no wheel stores more than {stored}"
-    return f"{place(n, subject)} {while_}, {most}{_followed(subject)}"
+    return f"{place(n, subject)} {while_}, {' and '.join(parts)}{_followed(subject)}"
 
 
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
