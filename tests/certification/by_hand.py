@@ -45,7 +45,6 @@ def by_hand(law, gains, claims, **changes):
         "disturbance": 0.0,
         "control_period": 0.25,
         "assumed_away": [],
-        "bounded_away": [],
         "wheels": None,
         "switch": None,
         **changes,

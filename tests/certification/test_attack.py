@@ -100,12 +100,11 @@ def worst_first(loop, score, states):
 @pytest.mark.parametrize("name", NAMES)
 def test_no_proved_obligation_breaks(name):
     loop = LOOPS[name]
-    # No bound against torque is built for a V that is even in q.
-    certificate = certified(name, disturbance=0.0 if name.startswith("wheel") else 1e-4)
+    certificate = certified(name)
     random = np.random.default_rng(11)
     for claim in certificate.claims:
         assert claim.outcome == "proved"
-        if claim.kind in ("convergence", "torque-limit", "disturbance"):
+        if claim.kind in ("convergence", "torque-limit"):
             function = Function(loop, claim.witness)
             level = claim.numbers["level"]
             reach = 50.0 * function.s if level is None else min(level, 1e6 * function.s)
@@ -116,23 +115,9 @@ def test_no_proved_obligation_breaks(name):
 
 
 def attack(loop, claim, function, states):
-    if claim.kind == "disturbance":
-
-        def rising(x):
-            # Along the gradient, where a torque does most.
-            p = np.linalg.solve(function.J.T, function.P @ x[4:7]) + function.epsilon * x[1:4]
-            p = claim.numbers["torque"] * p / np.maximum(np.linalg.norm(p, axis=0), 1e-300)
-            slope, size = function.slope(x, moved(loop, x, p))
-            n, w = claim.numbers, claim.witness
-            # Only where the function is larger than in the ball that the proof leaves out.
-            value = function.value(x) + w["epsilon"] * np.einsum("ik,ij,jk->k", x[1:4], function.J, x[4:7])
-            inside = value <= n["torque"] ** 2 / (4.0 * w["tau"] * w["beta"]) * (1 + 1e-9)
-            return np.where(inside, -1.0, slope / size)
-    else:
-
-        def rising(x):
-            slope, size = function.slope(x, moved(loop, x))
-            return slope / np.maximum(size, 1e-300)
+    def rising(x):
+        slope, size = function.slope(x, moved(loop, x))
+        return slope / np.maximum(size, 1e-300)
 
     states = worst_first(loop, rising, states)
     assert rising(states).max() <= 1e-13
@@ -147,13 +132,12 @@ def attack(loop, claim, function, states):
         ("torque-limit", {"level": 10.0}, {}),
         ("convergence", {}, {"stiffness": 3.0}),
         ("convergence", {}, {"epsilon": 300.0}),
-        ("disturbance", {}, {"beta": 10.0}),
     ],
 )
 def test_the_attack_breaks_what_is_false(kind, numbers, witness):
     """Claims made too strong by these factors, with the same states as the proved ones."""
     loop = LOOPS["lqr-III"]
-    claim = certified("lqr-III", disturbance=1e-4).claim(kind)
+    claim = certified("lqr-III").claim(kind)
     strong = replace(
         claim,
         numbers={k: v * numbers[k] if k in numbers else v for k, v in claim.numbers.items()},

@@ -92,7 +92,7 @@ def worst_ends(loop, torque, directions=24):
 )
 def test_ends_against_the_worst_disturbance_found(name, torque, angle, rate):
     loop = free(LOOPS[name])
-    claim = certify(loop, name, Wanted(disturbance=torque)).claim("disturbance")
+    claim = certify(loop, name, Wanted(disturbance=torque)).claim("pointing")
     assert claim.outcome == "proved"
     assert claim.numbers["torque"] == torque
     found = worst_ends(loop, torque)

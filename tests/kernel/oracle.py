@@ -74,7 +74,7 @@ class Oracle:
     def inputs(self, q, w, e, r, a, H):
         h = H - self.J @ (w + r) if "wheels" in self.words else np.zeros(np.shape(w))
         told = {
-            "attitude": q, "rate": w, "body_rate": w + r, "target_rate": r, "target_acceleration": a, "external_torque": e,
+            "attitude": q, "rate": w, "body_rate": w + r, "target_rate": r, "target_acceleration": a - np.cross(w, r), "external_torque": e,
             "position": self.rng.normal(size=3), "wheel_momentum": h, "magnetic_field": self.rng.normal(size=3),
         }  # fmt: skip
         given = dict(self.subject)
@@ -91,7 +91,7 @@ class Oracle:
     def law(self, q, w, e, r, a, H):
         given, h = self.inputs(q, w, e, r, a, H)
         u = run(self.programs["law"], given)
-        return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ a, h
+        return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ (a - np.cross(w, r)), h
 
     def lyapunov(self, q, w):
         given, _ = self.inputs(q, w, *[np.zeros(np.shape(w))] * 4)

@@ -25,9 +25,7 @@ KINDS = {
     "converges without a preferred axis": "region",
     "stays stable between samples": "sampling",
     "reaches its surface": "sliding",
-}
-LEFT = {
-    "disturbance": "not yet among the theorems",
+    "points": "pointing",
 }
 
 

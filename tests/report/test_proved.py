@@ -45,7 +45,7 @@ def test_every_claim_is_told_with_its_obligations_and_assumptions() -> None:
     assert {claim.kind for claim in certificate.claims} == {
         "convergence",
         "torque-limit",
-        "disturbance",
+        "pointing",
         "inertia",
         "sampling",
     }

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import side
-from starhold.algebra.vector import ZERO, add, apply, subtract
+from starhold.algebra.vector import ZERO, add, apply, dot, subtract
 from starhold.analysis.metrics import ALMOST, on_limit
 from starhold.certification.certificate import WHEELS
 from starhold.certification.mixed import Shape
@@ -34,6 +35,8 @@ LOST = "the simulation loses the motion"
 """Which no proof speaks of: it is too fast for the integration, or farther away than a scenario follows it."""
 
 
+HELD = "torque held between samples"
+"""The assumption of a claim about a torque that is held."""
 TURNED = "the torque is held while the body, or stored momentum, turns it by {:.2g} rad"
 
 
@@ -102,15 +105,16 @@ def departures(
     held = {"refuted": "with which not even the linear loop is stable", "proved": ""}
     sampled = certificate.claim("sampling")
     why = held.get("" if sampled is None else sampled.outcome, "with which it is not shown to be stable")
-    common += span.always(f"the torque is held for {loop.period:g} s, {why}", bool(why))
+    held_too_long = span.always(f"the torque is held for {loop.period:g} s, {why}", bool(why))
     # What is proved of held torque is proved of the linear loop at rest, without stored momentum.
     most = _turn_that_counts(loop, sampled)
-    common += span.first(_turned(span) >= most, TURNED.format(most))
+    held_too_long += span.first(_turned(span) >= most, TURNED.format(most))
     if run.attrs.get("diverged_at") is not None:
         common.append(Departure(run.attrs["diverged_at"], LOST))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in _left(certificate):
         own = [one for assumed in claim.assumptions for one in _met(assumed, span)]
+        own += [] if HELD in claim.assumptions else held_too_long
         found[claim.kind] = tuple(sorted({*common, *own, *_set(claim, span)}))
     return found
 
@@ -201,7 +205,10 @@ MET: Mapping[str, Callable[[Span], list[Departure]]] = {
     "total momentum at most as told": _kept,
     "no torque from outside but what the law cancels": _cancelled,
     "no torque from outside": _alone,
-    "torque from outside bounded in norm": _kept,
+    # So is what has no bound; the rest is within its own.
+    "torques from outside and errors of the command no larger than told": _kept,
+    HELD: _kept,
+    "target's motion at most as told": _kept,
     "torque from outside bounded on each axis": _kept,
     "target at rest": _still,
 }
@@ -229,7 +236,7 @@ def cancels(loop: ClosedLoop) -> bool:
 
 def _set(claim: Claim, span: Span) -> list[Departure]:
     """Tell whether a flight starts outside of the claim's set, and when it leaves that."""
-    found: list[Departure] = []
+    found = _away(claim, span)
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
@@ -242,6 +249,16 @@ def _set(claim: Claim, span: Span) -> list[Departure]:
         return [*found, *span.always("it is outside the set")]
     # The integration lets V of a motion along the border rise by its own error.
     return [*found, *span.first(value > cast(float, level) * (1.0 + 1e-6), "it leaves the set")]
+
+
+def _away(claim: Claim, span: Span) -> list[Departure]:
+    """Tell when a flight that should have ended near its target is farther away."""
+    settling = claim.numbers.get("settling")
+    if settling is None:
+        return []
+    sine = np.linalg.norm(span["attitude_error"][:, 1:], axis=1)
+    far = sine > math.sin(min(claim.numbers["angle"], math.pi) / 2.0) * (1.0 + 1e-6)
+    return span.first(far & (span["time"] - span.begun > settling), "it is farther from the target than in the end")
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
@@ -276,9 +293,10 @@ def value_of(claim: Claim, loop: ClosedLoop, shown: Measurement) -> Any:
         return Shape(**claim.witness).value(shown.attitude, shown.rate)
     if claim.kind == "sliding":
         return kinetic_energy(loop.law.module.surface(shown, loop.gains), loop.craft)
+    mixed = claim.witness.get("epsilon", 0.0) * dot(vector_part(shown.attitude), apply(loop.craft.inertia, shown.rate))
     if stiffness is not None:
-        return kinetic_energy(shown.rate, loop.craft) + 2.0 * stiffness * (1.0 - shown.attitude[0])
-    return None if function is None else function(shown, loop.gains, loop.craft)
+        return kinetic_energy(shown.rate, loop.craft) + 2.0 * stiffness * (1.0 - shown.attitude[0]) + mixed
+    return None if function is None else function(shown, loop.gains, loop.craft) + mixed
 
 
 def momentum_of(loop: ClosedLoop, shown: Measurement) -> Any:

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.algebra.quaternion import vector_part
 from starhold.algebra.structure import unflatten
-from starhold.algebra.vector import ZERO, apply, dot
+from starhold.algebra.vector import ZERO
 from starhold.analysis.departure import shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.frame import take_apart
@@ -260,15 +259,8 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
 
 
 def _value(loop: ClosedLoop, claim: Claim) -> Callable[[Array], Array]:
-    """Return the claim's V + epsilon q.Jw of the states in the columns of an array."""
-    epsilon = claim.witness.get("epsilon", 0.0)
-
-    def value(states: Array) -> Array:
-        shown = _shown(loop, states)
-        mixed = dot(vector_part(shown.attitude), apply(loop.craft.inertia, shown.rate))
-        return value_of(claim, loop, shown) + epsilon * mixed
-
-    return value
+    """Return the claim's V of the states in the columns of an array."""
+    return lambda states: value_of(claim, loop, _shown(loop, states))
 
 
 def _shown(loop: ClosedLoop, states: Array) -> Measurement:

@@ -12,14 +12,14 @@ import numpy as np
 from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.convergence import assumed, converge
-from starhold.certification.disturbance import disturbance
 from starhold.certification.evidence.attitude import SAMPLED, SLIDING
 from starhold.certification.evidence.isotropic import ISOTROPIC
+from starhold.certification.evidence.pointing import POINTS
 from starhold.certification.inertia import inertia_box, told
 from starhold.certification.limits import needed, torque_limit
 from starhold.certification.motion import Motion
-from starhold.certification.openness import bounded_torque, named
-from starhold.certification.proofs import proved_claims
+from starhold.certification.openness import named
+from starhold.certification.proofs import HELD_AND_PUSHED, proved_claims
 from starhold.certification.sampling import APART, sampling
 from starhold.certification.saturation import FREE, saturation
 from starhold.certification.subject import Subject, above, described, make_subject
@@ -51,8 +51,6 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
     a loop that counts on a lost wheel. Of a law that polynomials cannot follow the one claim is undecided, and names the
     operation and its line; so it is where numbers are too far apart in size for floats to guess with."""
-    # Torques that the loop's own parts add with a bound are disturbances that nobody models.
-    wanted = replace(wanted, disturbance=wanted.disturbance + bounded_torque(loop))
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
     everywhere = {"rate_everywhere": None, "everything": True}
     try:
@@ -91,6 +89,10 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
             reason = Obligation("form", EXACT, "undecided", {"reason": failed[SAMPLED]})
             sampled = replace(sampled, numbers=numbers, obligations=(reason,))
         claims.extend([] if sampled is None else [sampled])
+        pointing = proved.get("pointing")
+        if pointing is None and wanted.disturbance:
+            pointing = _undecided("pointing", {"torque": wanted.disturbance}, subject, failed[POINTS])
+        claims.extend([] if pointing is None else [pointing])
         claims = needed(claims, Motion(subject)) if loop.law.lyapunov is not None else claims
     return claims
 
@@ -98,12 +100,11 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
 def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) -> list[Claim]:
     rate = "best" if wanted.rate is None else None if wanted.rate == float("inf") else wanted.rate
     main, basin = proved.get("convergence"), None
-    pushed = subject.disturbance != 0 or subject.modelled_norm != 0
     wheeled = subject.loop.wheels is not None
     limit, box = proved.get("wheels" if wheeled else "torque-limit"), proved.get("inertia")
     if main is not None and main.outcome == "proved" and rate != "best" and not main.numbers["everything"]:
         main = None
-    if main is None or main.outcome != "proved" or limit is None or box is None or pushed:
+    if main is None or main.outcome != "proved" or limit is None or box is None:
         derived, found, own = converge(subject, rate)
         # What refutes one V refutes no other.
         main = derived if main is None or derived.outcome == "proved" != main.outcome else main
@@ -114,7 +115,6 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim]) 
         box = box or inertia_box(basin, wanted.inertia_tolerance)
     more = (
         (limit, wanted.slew_angle or (wheeled and wanted.momentum is not None)),
-        (None if basin is None else disturbance(basin), wanted.disturbance),
         (box, wanted.inertia_tolerance),
     )
     # What nobody asked for is claimed only where it is proved.
@@ -140,6 +140,8 @@ def _unshown(subject: Subject, wanted: Wanted) -> list[Claim]:
 def _undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
     limits = {"torque-limit": (), "wheels": FREE}
     assumptions = assumed(subject, limits=limits[kind]) if kind in limits else assumed(subject)
+    if kind == "pointing":
+        assumptions = HELD_AND_PUSHED
     if kind == "sliding":
         assumptions = assumed(subject, outside=("torque from outside bounded on each axis",))
     if kind == "inertia":

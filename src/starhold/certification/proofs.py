@@ -59,13 +59,20 @@ ASSUMPTIONS = {
     "bounded-outside-torque": "torque from outside bounded on each axis",
     "frictionless-wheels": "wheels without friction",
     "bounded-momentum": "total momentum at most as told",
+    "bounded-push": "torques from outside and errors of the command no larger than told",
+    "held-torque": "torque held between samples",
+    "bounded-target": "target's motion at most as told",
     "linear-motion": "linear motion near rest on a target at rest",
 }
 """What the kernel's identifiers are called."""
 OF_A_LOOP = {"target-at-rest": "target at rest", "no-wheels": "no stored momentum"}
 """What a claim assumes only of a loop whose target moves, or that has wheels."""
-IN_THE_LOOP = {"known-target", "bounded-target", "quaternion-as-fed", "sign-at-once"}
+IN_THE_LOOP = {"known-target", "quaternion-as-fed", "sign-at-once"}
 """What every loop meets as it is composed: its law is told how the target moves, and how the quaternion's sign is chosen."""
+
+
+HELD_AND_PUSHED = tuple(ASSUMPTIONS[name] for name in ("rigid-body", "inertia-as-given", "bounded-push", "held-torque"))
+"""What a claim of how near to its target a loop comes assumes that nothing is known of."""
 
 
 def proved_claims(
@@ -174,6 +181,21 @@ def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     return {"torque": [most(f"outside.{i}") for i in range(3)], **begun, **ends}
 
 
+def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+    angle, rate = (below(_exact(numbers.get(f"start.{name}", numbers.get(name, Fraction(0))))) for name in ("angle", "rate"))
+    most = {"torque": "outside", "error": "error", "attitude_error": "error.attitude", "rate_error": "error.rate"}
+    ends = {"start": "level", "level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
+    return {
+        "period": float(numbers["period"]),
+        "slew_angle": angle,
+        "rate_start": rate,
+        **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
+        "told": "outside.0" in numbers,
+        **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
+        **{name: above(_exact(numbers[key])) for name, key in ends.items()},
+    }
+
+
 def _exact(x: Fraction) -> Any:
     return fmpq(x.numerator, x.denominator)
 
@@ -186,6 +208,7 @@ _NUMBERS = {
     "inertia": _inertia,
     "sampling": _sampled,
     "sliding": _slid,
+    "pointing": _pointed,
 }
 
 

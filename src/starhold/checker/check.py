@@ -53,7 +53,7 @@ ENDS = (
     "torque-limit",
     "wheels",
     "inertia",
-    "disturbance",
+    "pointing",
     "sliding",
     "circle",
     "equilibrium",
@@ -62,7 +62,7 @@ ENDS = (
 """Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
 BY_THE_KERNEL = "proved by the kernel"
 """The reason of findings about claims with a proof."""
-READ_BY = {"disturbance": {"disturbance", "sliding"}, "switch": {"hand-over"}}
+READ_BY = {"disturbance": {"sliding"}, "switch": {"hand-over"}}
 """Entries of a subject that are allowed only beside a claim of one of these kinds, which alone read them."""
 BITS = 192
 """Precision of balls: enough that they are far narrower than the margins of a certificate."""
@@ -208,9 +208,6 @@ def _subject(given: Any) -> LoopSubject | StationSubject:
         follows = "undecided"
     demand(given["outcome"] == follows, "the outcome does not follow from the claims")
     demand(len(set(kinds)) == len(kinds), "two claims are of one kind")
-    away = given["subject"].get("bounded_away")
-    bounded: list[Any] = [*away] if isinstance(away, list) else []
-    demand(all(f"{name}".startswith("environment ") for name in bounded), "only environments have torques with a bound")
     for name, readers in READ_BY.items():
         demand(bool(given["subject"].get(name)) <= bool(readers & set(kinds)), f"no claim is about the {name}")
     return (read_station if station else read_subject)(given["subject"])
@@ -229,16 +226,10 @@ def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, st
     return [(name, "holds", BY_THE_KERNEL) for name in names]
 
 
-def _absent(subject: Mapping[str, Any], claim: Any) -> list[str]:
-    """The parts of the loop that a claim is not about; torques with a bound are among them where it is not about such."""
-    bounded: list[str] = [] if claim.get("kind") == "disturbance" else subject.get("bounded_away", [])
-    return [*subject["assumed_away"], *bounded]
-
-
 def _claim(subject: LoopSubject, about: Mapping[str, Any], claim: Any) -> list[tuple[str, Verdict, str]]:
     """Verdict and reason for each obligation of a claim without a proof, about a subject as the file tells it."""
     shaped(claim, CLAIM, "the claim")
-    absent = _absent(about, claim)
+    absent: list[str] = about["assumed_away"]
     demand(claim["kind"] in CLAIMS, f"there is no kind of claim {claim['kind']} about such a loop")
     for obligation in claim["obligations"]:
         shaped(obligation, OBLIGATION, "an obligation")

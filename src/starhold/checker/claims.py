@@ -9,7 +9,6 @@ from typing import Any
 
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 
-from starhold.checker.disturbed import Disturbed
 from starhold.checker.even_region import EvenRegion
 from starhold.checker.exact import (
     ONE,
@@ -197,21 +196,6 @@ def inertia(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     ]
 
 
-def disturbance(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
-    """With any torque from outside up to a bound, motions from {V <= start} end near the target."""
-    region, numbers, witness = claimed(subject, claim), claim["numbers"], claim["witness"]
-    if isinstance(region, EvenRegion):
-        raise CheckError("not for a V even in q")
-    proof = Disturbed(subject, region, numbers, witness)
-    return [
-        ("descent", SIGN, proof.descent),
-        ("strict", SIGN, region.strict),
-        ("end", SIGN, proof.end),
-        ("start", SIGN, proof.start),
-        _told(region, numbers, "rate_start"),
-    ]
-
-
 def sampling(subject: LoopSubject, claim: Numbers) -> list[Obligation]:
     """The linear loop with the torque held for a period is stable."""
     loop, numbers = ExactLoop(subject, quotient=True), claim["numbers"]
@@ -301,7 +285,10 @@ CLAIMS: dict[str, Kind] = {
     ),
     # What a law cancels of a torque that depends on the inertia is not what another inertia feels.
     "inertia": Kind((_BASE[0], _BOX, *_BASE[2:5], "no torque from outside", "target at rest"), inertia, _BOX),
-    "disturbance": Kind(_instead(_BASE[5], "torque from outside bounded in norm"), disturbance),
+    "pointing": Kind(
+        (*_BASE[:2], "torques from outside and errors of the command no larger than told", "torque held between samples"),
+        by_the_kernel,
+    ),
     "sampling": Kind(
         (*_BASE[:3], "linear motion near rest on a target at rest", _BASE[4], "no torque from outside"),
         sampling,

@@ -178,7 +178,6 @@ SUBJECT: dict[str, Test] = {
     "disturbance": _number,
     "control_period": _number,
     "assumed_away": _list(_text),
-    "bounded_away": _list(_text),
     "wheels": _or_none(_within(_WHEELS)),
     "switch": _or_none(_within(_SWITCH)),
 }
@@ -214,10 +213,7 @@ NUMBERS: dict[str, dict[str, Test]] = {
         **dict.fromkeys(("motors", "wheel_momentum"), _list(_number)),
     },
     "inertia": {"tolerance": _MAYBE, **_CONTENTS},
-    "disturbance": {
-        **dict.fromkeys(("torque", "start", "level", "slew_angle", "rate_start", "angle", "rate"), _number),
-        "rate_everywhere": _MAYBE,
-    },
+    "pointing": {"torque": _number},
     "sampling": {
         **dict.fromkeys(("period", "radius", "longest"), _number),
         "every_shorter": _flag,
@@ -232,8 +228,6 @@ NUMBERS: dict[str, dict[str, Test]] = {
     },
     "region": dict.fromkeys(("level", "slew_angle", "rate"), _number),
 }
-STEP: dict[str, Test] = {"form": _list(_list(_number, 6), 6), "decay": _number, "spread": _number}
-"""A step of the proof where a torque from outside lets motions end."""
 _PROOF: dict[str, Test] = {"stiffness": _MAYBE, "epsilon": _number, "rho": _number}
 WITNESS: dict[str, dict[str, Test]] = {
     "convergence": {**_PROOF, "rate_bound": _MAYBE},
@@ -241,13 +235,7 @@ WITNESS: dict[str, dict[str, Test]] = {
     "torque-limit": {**_PROOF, **dict.fromkeys(("rate_bound", "shift", "weight"), _MAYBE)},
     "wheels": {**_PROOF, "rate_bound": _MAYBE},
     "inertia": {**_PROOF, "level": _MAYBE},
-    "disturbance": {
-        **_PROOF,
-        "rate_bound": _MAYBE,
-        "shift": _MAYBE,
-        **dict.fromkeys(("tau", "beta"), _number),
-        "steps": _list(_object),
-    },
+    "pointing": {},
     "sampling": {},
     "sliding": {},
     "region": dict.fromkeys(("p", "c2", "g", "m"), _number),

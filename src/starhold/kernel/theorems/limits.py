@@ -16,9 +16,10 @@ Load: TypeAlias = tuple[str, Fraction, Poly]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
-def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, Statement]:
+def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Generator[tuple[str, Obligation], None, Statement]:
     """On {V <= level}, with everything from outside at most as told: each component of the torque is at most `limit` in size
-    (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k."""
+    (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k. less: what the torque
+    is below its limit, for what it is not told exactly."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, norm = numbers.get("limit"), numbers.get("limit.norm")
     motors = "motors.0" in numbers or "stored.0" in numbers
@@ -40,7 +41,8 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
         bounds.append(text.format(below(numbers[name])))
     assumed += ["bounded-target"] * loop.moving + ["bounded-momentum"] * loop.wheels + unlimited
     known.append(numbers["level"] - loop.lyapunov)
-    said, limited = list[str](), list(loads("torque", loop.u, limit, norm))
+    said, asked = list[str](), [None if x is None else x - less for x in (limit, norm)]
+    limited = list(loads("torque", loop.u, *asked))
     if limit is not None:
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if norm is not None:
