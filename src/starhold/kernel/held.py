@@ -215,7 +215,7 @@ class Held:
         return A, [
             ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], tube.held + uneven),
             (scalar(0) + N, h * h / 8 * uneven),
-            (scalar(0) + scalar(1), h / 2 * wide * turn * (1 + turn)),
+            (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))),
         ]
 
 

@@ -282,7 +282,8 @@ def smallest(A: Array, pushes: list[Array]) -> tuple[Array, list[float]] | None:
     def turn(x: Array) -> float:
         return float(np.log(shape(x)[0]))
 
-    found = optimize.minimize(turn, weight, method="Nelder-Mead", options={"maxfev": 400})
+    begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
+    found = optimize.minimize(turn, weight, method="Nelder-Mead", options={"maxfev": 400, "initial_simplex": begun})
     _, X, shares = shape(found.x)
     return (X + X.T) / 2.0 * LARGER, [float(a) for a in shares]
 
