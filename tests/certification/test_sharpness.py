@@ -13,7 +13,6 @@ from starhold.algebra.polynomial import Polynomial, exact
 from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import ZERO, add, apply, cross
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.frame import take_apart
 from starhold.certification.gyroscopic import crossed, gyroscopic_torque
 from starhold.certification.matrices import floats, identity, number, plus, rows
 from starhold.certification.motion import RATE, Motion
@@ -22,6 +21,8 @@ from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.trace.calling import Compiled
 from tests.certification.loops import free, tensor, textbook
+from tests.kernel.oracle import number as number_of
+from tests.kernel.oracle import run
 
 LOOPS = textbook()
 STEPS = 1500
@@ -100,10 +101,13 @@ def test_ends_against_the_worst_disturbance_found(name, torque, angle, rate):
     assert 1.0 <= claim.numbers["rate"] / found[1] <= rate
 
 
-def largest_torque(loop, level, kind):
-    """The largest torque in norm, or on an axis, that a search by random steps finds on {V <= level}."""
-    frame = take_apart(Motion(make_subject(loop)))
-    root, potential = np.linalg.inv(np.linalg.cholesky(floats(frame.P))).T, frame.potential
+def largest_torque(loop, claim, level, kind):
+    """The largest torque in norm, or on an axis, that a random search finds on {V <= level}, by the V of the proof."""
+    found = claim.proof.claim
+    V, J = claim.proof.programs[found["programs"]["lyapunov"]], np.array(tensor(loop.craft.inertia))
+    numbers = {name: number_of(x) for name, x in found["subject"].items()}
+    for name, matrix in (("inertia", J), ("inverse_inertia", np.linalg.inv(J))):
+        numbers |= {f"craft.{name}.{i}.{k}": matrix[i, k] for i in range(3) for k in range(3)}
     random = np.random.default_rng(2)
 
     def command(q, w):
@@ -113,12 +117,28 @@ def largest_torque(loop, level, kind):
 
     torque = Compiled(command, (1.0, 0.0, 0.0, 0.0), ZERO)
 
+    def value(q, w):
+        state = {f"measurement.attitude.{k}": x for k, x in enumerate(q)} | {
+            f"measurement.rate.{k}": x for k, x in enumerate(w)
+        }
+        return run(V, numbers | state)[0]
+
+    rest = value(np.eye(4)[:1].T, np.zeros((3, 1)))
+
     def size(x):
-        axes, turning = (part / np.linalg.norm(part, axis=0) for part in (x[:3], x[3:6]))
-        t = np.minimum(level, number(potential.top)) * 0.5 * (1.0 + np.sin(x[6]))
-        q0 = potential.cosine(t, axes.T)
-        q = np.sqrt(np.maximum(1.0 - q0 * q0, 0.0)) * axes
-        u = torque.over(np.vstack([q0, q, np.sqrt(2.0 * np.maximum(level - t, 0.0)) * (root @ turning)]))
+        axes, way = (part / np.linalg.norm(part, axis=0) for part in (x[:3], x[3:6]))
+        # A turn to a share of the level, then the rate in the given direction at which V is the level.
+        low, high = 0.0 * x[6], np.full(x.shape[1], np.pi)
+        for _ in range(40):
+            half = 0.25 * (low + high)
+            below = value(np.vstack([np.cos(half), np.sin(half) * axes]), 0.0 * way) - rest < level * 0.5 * (
+                1.0 + np.sin(x[6])
+            )
+            low, high = np.where(below, 2.0 * half, low), np.where(below, high, 2.0 * half)
+        q = np.vstack([np.cos(0.5 * low), np.sin(0.5 * low) * axes])
+        still, one, other = (value(q, s * way) for s in (0.0, 1.0, -1.0))
+        a, b, c = 0.5 * (one + other) - still, 0.5 * (one - other), still - rest - level
+        u = torque.over(np.vstack([q, (np.sqrt(b * b - 4.0 * a * c) - b) / (2.0 * a) * way]))
         return np.linalg.norm(u, axis=0) if kind == "norm" else np.abs(u).max(axis=0)
 
     x = random.normal(size=(7, 20_000))
@@ -157,8 +177,8 @@ def test_the_level_under_a_torque_limit_against_the_largest_that_is_safe(name, k
     claim = certify(loop, name).claim("torque-limit")
     assert claim.outcome == "proved"
     limit, level = claim.numbers["limit"], claim.numbers["level"]
-    assert largest_torque(loop, level, kind) <= limit * (1.0 + 1e-12)
-    assert largest_torque(loop, level / share, kind) > limit
+    assert largest_torque(loop, claim, level, kind) <= limit * (1.0 + 1e-12)
+    assert largest_torque(loop, claim, level / share, kind) > limit
 
 
 MOMENTS = some.tuples(*[some.floats(0.5, 1.5)] * 3)

@@ -50,6 +50,7 @@ SIZES = {
     "less_equal": "where(less_equal(measurement.attitude[0], 0.5), 1.0, 2.0)",
     "opposite": "where(opposite(less(measurement.attitude[0], 0.5)), 1.0, 2.0)",
 }
+NEAR_REST = ("a division by what varies", "less_equal", "opposite")
 TWIST = """
 
 class Memory(NamedTuple):
@@ -80,10 +81,13 @@ def test_what_cannot_be_read_is_undecided_with_the_operation_and_its_line(operat
     law = law_of(PLAIN.format(size=SIZES[operation]) + V * (declared == "V"), tmp_path)
     certificate = certify(sample_loop(law, law.examples()[0]))
     (claim,) = certificate.claims
-    assert certificate.outcome == claim.outcome == "undecided"
-    reason = claim.obligations[0].evidence["reason"]
+    # Near rest the switching ones are one polynomial, whose step with the torque held is stable.
+    stable = declared == "no V" and operation in NEAR_REST
+    assert (certificate.outcome, claim.outcome) == ("undecided", "proved" if stable else "undecided")
+    assert (claim.kind == "sampling") == stable
+    reason = "" if stable else claim.obligations[0].evidence["reason"]
     line = next(n for n, row in enumerate((tmp_path / "own.py").read_text().splitlines(), 1) if row.startswith("    size ="))
-    assert reason.startswith(f"law own: own.py, line {line}: {operation}")
+    assert stable or reason.startswith(f"law own: own.py, line {line}: {operation}")
 
 
 @pytest.mark.parametrize("declared", ["V", "no V"])
