@@ -172,7 +172,7 @@ def small_ellipsoid(numbers, told):
         "reach": str(4 * Fraction(last["reach"])),
     }
     told["ellipsoids"].append(last | shrunk)
-    numbers |= {"end.angle": numbers["end.angle"] * 0.6, "settling": numbers["settling"] * 2}
+    numbers |= {"end.angle": numbers["end.angle"] * 0.6, "settling": numbers["settling"] * 1.5}
 
 
 def wide_entry(numbers, told):

@@ -35,7 +35,7 @@ LEAST = 1e-6
 """By how much (rad) a spring as stiff as the law gives to the least torque from outside that is told of."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
-MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.002, 8.0, 20, 6, 2000
+MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 8.0, 20, 6, 2000
 """What is given away where numbers are rounded; by how much the last level is above its limit, and ellipsoids are larger
 than the least, for motions come into them after a finite time; by how much a level may be below the one before; how many
 levels and ellipsoids there are at most; at how many states of a set the torque is looked at."""
