@@ -41,7 +41,7 @@ def points(claim: Claim) -> Proof:
         push = held.tube(region).push
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(held.felt), held.felt), -tau), H, -beta)
-        yield f"V falls {k}", Definite(fallen)
+        yield f"V falls by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
         c, region = end, held.region(end)
