@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
 import pytest
 
 from starhold.analysis.libration_point_claims import HELD, MET, UNLIMITED
@@ -20,7 +19,7 @@ from starhold.parts.catalogue import PACKAGES, fit, parts
 from starhold.parts.craft import make_craft
 from starhold.parts.part import Fitted
 from starhold.scenario.reading import builtin_text, parse
-from tests.certification.loops import FULL, certified, loop_of, textbook
+from tests.certification.loops import FULL, certified, is_pointing, loop_of, says, textbook
 from tests.kernel import stations
 from tests.making import built
 
@@ -34,17 +33,6 @@ def others(body):
     """Every installed part for a body that no theorem takes in, with its first example."""
     found = [part for role in set(PACKAGES) - {"body"} for part in parts(role).values() if part.body in ("", body)]
     return [Fitted(part, part.examples()[0]) for part in found if part.name not in TAKEN]
-
-
-def is_pointing(claim):
-    """Whether it is a claim that takes in what parts say."""
-    return (claim.kind, claim.outcome) == ("pointing", "proved")
-
-
-def says(fitted):
-    """Whether a part tells a bound of its torque, or finite ones of its errors."""
-    bound, error = (fitted.part.hook(name) for name in ("bound", "error"))
-    return bound is not None or (error is not None and np.isfinite(error(fitted.params)).all())
 
 
 @cache

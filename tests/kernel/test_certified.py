@@ -16,7 +16,7 @@ from starhold.kernel.check import check as prove
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.part import Fitted
 from starhold.scenario.building import build
-from tests.certification.test_left_out import is_pointing, says
+from tests.certification.loops import is_pointing, says
 from tests.tiers import leading
 
 LAWS = [

@@ -232,9 +232,9 @@ def keeps_what_it_says(part: Part) -> None:
     if tell_torque is None and tell_errors is None:
         raise NotApplicableError("it says no bound of its torque or of its errors")
     for params in part.examples():
-        most, torque = tell_errors(params) if tell_errors else UNBOUNDED, tell_torque(params) if tell_torque else inf
-        require(min(*most, torque) >= 0.0, f"the bounds {(*most, torque)} are not all positive or 0")
-        for name, size, bound in _pushes(part, loop_with(part, params), (*most, torque)):
+        errors, torque = tell_errors(params) if tell_errors else UNBOUNDED, tell_torque(params) if tell_torque else inf
+        require(min(*errors, torque) >= 0.0, f"the bounds {(*errors, torque)} are not all positive or 0")
+        for name, size, bound in _pushes(part, loop_with(part, params), (*errors, torque)):
             require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
 
 
@@ -261,13 +261,13 @@ def _pushes(part: Part, loop: ClosedLoop, bounds: tuple[float, ...]) -> Iterator
             if hasattr(reading, "rate"):
                 yield "error of the rate", norm(subtract(reading.rate, state.rate)), rate
         elif part.role == "actuator" and part.hook("command"):
-            asked: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
-            yield "error of the command", norm(subtract(module.command(asked, numbers), asked)), command
+            wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
+            yield "error of the command", norm(subtract(module.command(wanted, numbers), wanted)), command
     if part.role == "effector":
         for step in (1, 5, STEPS):
             end = fly(loop, step)[1]
-            own = end.effectors[[f.part for f in loop.used("effector")].index(part)]
-            yield "torque", norm(module.reaction(own, None, end.state, numbers)), torque
+            effector = end.effectors[[f.part for f in loop.used("effector")].index(part)]
+            yield "torque", norm(module.reaction(effector, None, end.state, numbers)), torque
 
 
 def _draws(part: Part) -> bool:
