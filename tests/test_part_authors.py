@@ -79,10 +79,10 @@ def test_claims_say_of_its_parts_what_it_tells(folder):
         away = {name for name in claim.assumptions if name.startswith("without:")}
         assert "without:sensor drifting-tracker" in away
         assert "without:effector panel" in away
-        assert any("sunlight" in name for name in away) == (claim.kind != "disturbance")
-    pushed = certificate.claim("disturbance")
+        assert any("sunlight" in name for name in away) == (claim.kind != "pointing")
+    pushed = certificate.claim("pointing")
     assert pushed.outcome == "proved"
-    assert certificate.subject["disturbance"] == pytest.approx(20e-6 * 0.05)
+    assert pushed.numbers["torque"] == pytest.approx(20e-6 * 0.05)
 
 
 def test_its_package_names_the_modules_of_its_parts():

@@ -24,7 +24,7 @@ def alone(content, kind):
     # The linear loop alone proves nothing of where the motion ends.
     outcome = "undecided" if (kind, claim["outcome"]) == ("sampling", "proved") else claim["outcome"]
     subject = certificate["subject"]
-    if kind not in ("disturbance", "sliding") and "disturbance" in subject:
+    if kind != "sliding" and "disturbance" in subject:
         subject = {**subject, "disturbance": 0.0}
     one = {**certificate, "outcome": outcome, "subject": subject, "claims": [claim]}
     return with_kinds({**content, "certificates": [one], "claims": [], "programs": {}})

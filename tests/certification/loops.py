@@ -106,3 +106,14 @@ def random_craft(random):
 def gain_names(law):
     """The names of a law's gains."""
     return [item.name for item in fields(catalogue()[law].gains)]
+
+
+def is_pointing(claim):
+    """Whether it is a claim that takes in what parts say."""
+    return (claim.kind, claim.outcome) == ("pointing", "proved")
+
+
+def says(fitted):
+    """Whether a part tells a bound of its torque, or finite ones of its errors."""
+    bound, error = (fitted.part.hook(name) for name in ("bound", "error"))
+    return bound is not None or (error is not None and np.isfinite(error(fitted.params)).all())

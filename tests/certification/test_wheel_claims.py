@@ -150,7 +150,7 @@ def test_momentum_that_piles_up_is_not_passed_over():
 
 def test_claims_that_are_not_built_say_so():
     loop = rotors("wheel", EVEN)
-    found = certify(loop, "", Wanted(disturbance=1e-4)).claim("disturbance")
+    found = certify(loop, "", Wanted(disturbance=1e3)).claim("pointing")
     assert found.outcome == "undecided"
     peak = on_wheels(loop, allocation=1)
     assert certify(peak).claim("wheels") is None

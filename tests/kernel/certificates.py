@@ -9,7 +9,8 @@ import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations
-from starhold.certification.evidence.pointing import find_pointing
+from starhold.certification.evidence.pointing import Pushed
+from starhold.certification.openness import Pushes
 from starhold.certification.subject import make_subject
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build
@@ -59,7 +60,8 @@ def flying(name):
     kept = {"simulation": {"duration": "1 min", "control_period": period}, "name": name, "law": [law]}
     given = sh.scenario({"spacecraft": {"inertia": inertia}} | kept)
     loop = Loop(make_subject(build(given, given.laws[0])))
-    assert find_pointing(loop, *told), loop.failed
+    outside, error, *start = told
+    assert Pushed(loop, Pushes(outside, command=error)).find(*start), loop.failed
     return loop
 
 

@@ -1,6 +1,8 @@
 """Flights of a body with a held torque, many lanes at once, under pushes that are chosen against what is claimed: an own
 motion in NumPy, which shares no code with the kernel or with what starhold flies."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 
@@ -12,20 +14,88 @@ def along(v):
     return v / np.maximum(np.linalg.norm(v, axis=0), 1e-300)
 
 
+def times(p, q):
+    """The product of quaternions."""
+    return np.concatenate([[p[0] * q[0] - (p[1:] * q[1:]).sum(0)], p[0] * q[1:] + q[0] * p[1:] + cross(p[1:], q[1:])])
+
+
+def seen(q, v):
+    """A vector of the target's axes in the body's."""
+    return v + 2 * cross(-q[1:], cross(-q[1:], v) + q[0] * v)
+
+
 def rates(J, inverse, q, w, torque):
     own = q[1:]
     turned = np.concatenate([[-(own * w).sum(0)], q[0] * w + cross(own, w)]) / 2
     return turned, inverse @ (torque - cross(w, J @ w))
 
 
+def stepped(slope, x, h):
+    """The parts of a state after a time (Runge and Kutta)."""
+    a = slope(*x)
+    b = slope(*(y + h / 2 * k for y, k in zip(x, a, strict=True)))
+    c = slope(*(y + h / 2 * k for y, k in zip(x, b, strict=True)))
+    d = slope(*(y + h * k for y, k in zip(x, c, strict=True)))
+    q, *others = (y + h / 6 * (a[k] + 2 * b[k] + 2 * c[k] + d[k]) for k, y in enumerate(x))
+    return q / np.linalg.norm(q, axis=0), *others
+
+
 def moved(J, inverse, q, w, torque, h):
-    """The state after a time in which the torque does not change (Runge and Kutta)."""
-    a = rates(J, inverse, q, w, torque)
-    b = rates(J, inverse, q + h / 2 * a[0], w + h / 2 * a[1], torque)
-    c = rates(J, inverse, q + h / 2 * b[0], w + h / 2 * b[1], torque)
-    d = rates(J, inverse, q + h * c[0], w + h * c[1], torque)
-    q, w = (x + h / 6 * (a[k] + 2 * b[k] + 2 * c[k] + d[k]) for k, x in enumerate((q, w)))
-    return q / np.linalg.norm(q, axis=0), w
+    """The state after a time in which the torque does not change."""
+    return stepped(lambda q, w: rates(J, inverse, q, w, torque), (q, w), h)
+
+
+class Surroundings(NamedTuple):
+    """Bounds of a torque that the law is told (about each axis), of a target's rate and acceleration, of the momentum with
+    wheels (None: there are none), and of errors of the attitude and the rate that it is told."""
+
+    told: list
+    rate: float
+    acceleration: float
+    momentum: float | None
+    turned: float
+    rated: float
+
+
+class Around:
+    """What acts on lanes from their surroundings: targets that swing about axes of their own as fast as they may, told
+    torques that change sides, and errors along the pushes."""
+
+    def __init__(self, bounds, J, inverse, rng, lanes):
+        self.bounds, self.J, self.inverse = bounds, J, inverse
+        self.axis, self.phase = along(rng.normal(size=(3, lanes))), rng.uniform(0, np.pi, lanes)
+        self.axis[:, ::2] = np.eye(3)[:, rng.integers(3, size=len(self.phase[::2]))]
+        self.swing = bounds.acceleration / max(bounds.rate, 1e-300)
+        self.told = np.array(bounds.told)[:, None]
+        self.kept = 0.7 * (bounds.momentum or 0.0) * along(rng.normal(size=(3, lanes)))
+
+    def target(self, q, t):
+        angle = self.swing * t + self.phase
+        rate, slope = self.bounds.rate * np.cos(angle), -self.bounds.acceleration * np.sin(angle)
+        return seen(q, rate * self.axis), seen(q, slope * self.axis)
+
+    def command(self, law, q, w, t, unit):
+        """What the law asks for, with what it is told."""
+        half = self.bounds.turned / 2
+        wrong = times(q, np.concatenate([[np.full(w.shape[1], np.cos(half))], np.sin(half) * unit]))
+        (r, _), (off, a) = self.target(q, t), self.target(wrong, t)
+        rate = w + r - off - self.bounds.rated * unit
+        stored = self.kept - self.J @ (w + r)
+        total = stored + self.J @ (rate + off) if self.bounds.momentum is not None else self.kept
+        return law(wrong, rate, -self.told * np.sign(unit), off, a, total)
+
+    def after(self, q, w, t, torque, outside, h):
+        """The state after a time in which torques do not change."""
+
+        def slope(q, w, H):
+            r, a = self.target(q, t)
+            H = H if self.bounds.momentum is not None else self.J @ (w + r)
+            turning, _ = rates(self.J, self.inverse, q, w, torque)
+            pushed = torque + outside - cross(w + r, H) - self.J @ (a - cross(w, r))
+            return turning, self.inverse @ pushed, outside - cross(w + r, H)
+
+        q, w, self.kept = stepped(slope, (q, w, self.kept), h)
+        return q, w
 
 
 def pushes(rng, lanes, h, slow):
@@ -59,7 +129,7 @@ class Fleet:
     def __init__(self, J, law, h, outside, error, slow, seed=1, lanes=400):
         self.J, self.law, self.h, self.outside, self.error = np.asarray(J, dtype=float), law, h, outside, error
         self.inverse, self.rng, self.lanes = np.linalg.inv(self.J), np.random.default_rng(seed), lanes
-        self.push = pushes(self.rng, lanes, h, slow)
+        self.push, self.around = pushes(self.rng, lanes, h, slow), None
 
     def directions(self):
         return along(self.rng.normal(size=(3, self.lanes)))
@@ -69,9 +139,21 @@ class Fleet:
         return q, np.zeros((3, self.lanes))
 
     def fly(self, q, w, periods, parts=2):
-        """Yield the states between and at samples."""
+        """Yield the states between and at samples, as long as the momentum is not exceeded."""
+        around = self.around and Around(self.around, self.J, self.inverse, self.rng, self.lanes)
         for n in range(periods):
             unit = self.push(n, q, w)
+            if around:
+                part, t = self.h / parts, n * self.h
+                command = around.command(self.law, q, w, t, unit) + self.error * unit
+                for k in range(parts):
+                    # A torque that was told comes the other way at once.
+                    outside = self.outside * unit + around.told * np.sign(unit)
+                    q, w = around.after(q, w, t + (k + 0.5) * part, command, outside, part)
+                    if np.linalg.norm(around.kept, axis=0).max() > (self.around.momentum or np.inf):
+                        return
+                    yield n + 1, q, w
+                continue
             command = self.law(q, w) + self.error * unit
             for _ in range(parts):
                 q, w = moved(self.J, self.inverse, q, w, command + self.outside * unit, self.h / parts)

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 from scipy.optimize import least_squares
 
-from tests.kernel.flights import Fleet, turn
+from tests.kernel.flights import Fleet, Surroundings, cross, turn
 
 STEP = 1e-6
 PLAIN = {
@@ -86,8 +86,9 @@ class Oracle:
     def inputs(self, q, w, e, r, a, H):
         h = H - self.J @ (w + r) if "wheels" in self.words else np.zeros(np.shape(w))
         told = {
-            "attitude": q, "rate": w, "body_rate": w + r, "target_rate": r, "target_acceleration": a, "external_torque": e,
-            "position": self.rng.normal(size=3), "wheel_momentum": h, "magnetic_field": self.rng.normal(size=3),
+            "attitude": q, "rate": w, "body_rate": w + r, "target_rate": r, "target_acceleration": a - cross(w, r),
+            "external_torque": e, "position": self.rng.normal(size=3), "wheel_momentum": h,
+            "magnetic_field": self.rng.normal(size=3),
         }  # fmt: skip
         given = dict(self.subject)
         for field, value in told.items():
@@ -103,7 +104,7 @@ class Oracle:
     def law(self, q, w, e, r, a, H):
         given, h = self.inputs(q, w, e, r, a, H)
         u = run(self.programs["law"], given)
-        return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ a, h
+        return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ (a - cross(w, r)), h
 
     def lyapunov(self, q, w):
         given, _ = self.inputs(q, w, *[np.zeros(np.shape(w))] * 4)
@@ -298,12 +299,16 @@ class Oracle:
         n, zero = self.numbers, np.zeros(3)
         V0, level = self.lyapunov(np.eye(4)[0], zero), n["level"]
 
-        def law(q, w):
-            return run(self.programs["law"], self.inputs(q, w, *[np.zeros(w.shape)] * 4)[0])
+        def law(q, w, *around):
+            return run(self.programs["law"], self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0])
 
         _, stiffness = self.linear()
         slow = math.sqrt(np.linalg.eigvals(np.linalg.solve(self.J, stiffness)).real.min() / 2)
         fleet = Fleet(self.J, law, n["period"], n["outside"], n["error"], slow, int(self.rng.integers(1000)), 2 * tries)
+        fleet.around = Surroundings(
+            [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
+            n.get("momentum") if "wheels" in self.words else None, n.get("error.attitude", 0.0), n.get("error.rate", 0.0),
+        )  # fmt: skip
         states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
         states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]
         start = (np.array(part).T for part in zip(*states, strict=True))

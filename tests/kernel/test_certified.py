@@ -16,6 +16,7 @@ from starhold.kernel.check import check as prove
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.part import Fitted
 from starhold.scenario.building import build
+from tests.certification.loops import is_pointing, says
 from tests.tiers import leading
 
 LAWS = [
@@ -99,5 +100,5 @@ def test_every_part_that_no_program_holds_is_named(scenario, law):
     assert {"lag", "rate-limit", "gaussian", "random-torque"} <= {fitted.part.name for fitted in others}
     for claim in certify(loop.with_parts(*others), law).claims:
         for fitted in others:
-            enters = claim.kind == "disturbance" and fitted.part.hook("bound") is not None
+            enters = is_pointing(claim) and says(fitted)
             assert (f"without:{fitted.part.role} {fitted.called}" in claim.assumptions) != enters, fitted.called

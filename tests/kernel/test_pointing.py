@@ -172,7 +172,7 @@ def small_ellipsoid(numbers, told):
         "reach": str(4 * Fraction(last["reach"])),
     }
     told["ellipsoids"].append(last | shrunk)
-    numbers |= {"end.angle": numbers["end.angle"] * 0.6, "settling": numbers["settling"] * 1.2}
+    numbers |= {"end.angle": numbers["end.angle"] * 0.6, "settling": numbers["settling"] * 1.5}
 
 
 def wide_entry(numbers, told):
@@ -188,7 +188,7 @@ def wide_entry(numbers, told):
 FALSE = {
     "turns from rest": lambda numbers, told: numbers.update({"angle": 1.5 * numbers["angle"]}),
     "V between samples": lambda numbers, told: numbers.update(highest=0.5 * numbers["level"]),
-    "V falls": fast_fall,
+    "V falls by a share": fast_fall,
     "level": low_level,
     "ellipsoid": small_ellipsoid,
     "entry": wide_entry,

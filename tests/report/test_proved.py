@@ -46,7 +46,7 @@ def test_every_claim_is_told_with_its_obligations_and_assumptions() -> None:
     assert {claim.kind for claim in certificate.claims} == {
         "convergence",
         "torque-limit",
-        "disturbance",
+        "pointing",
         "inertia",
         "sampling",
     }
@@ -123,7 +123,7 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "convergence": {"rate_everywhere": 0.1, "everything": False},
         "torque-limit": {"limit": 0.1, "kind": "axis", "level": 0.0, "start": 0.0, "slew_angle": 0.0, "rate": 0.0},
         "inertia": {"tolerance": 0.4},
-        "disturbance": {"torque": 1e-3},
+        "pointing": {"torque": 1e-3},
         "sampling": {"period": 1.0, "radius": 1.2, "eigenvalues": [[1.2, 0.0]], "longest": None, "every_shorter": False},
         "wheels": {"momentum": 0.1},
         "region": {},

@@ -109,16 +109,17 @@ def departures(
     held = {"refuted": "with which not even the linear loop is stable", "proved": ""}
     sampled = certificate.claim("sampling")
     why = held.get("" if sampled is None else sampled.outcome, "with which it is not shown to be stable")
-    common += span.first(bool(why), f"the torque is held for {loop.period:g} s, {why}")
+    held_too_long = span.first(bool(why), f"the torque is held for {loop.period:g} s, {why}")
     # What is proved of held torque is proved of the linear loop at rest, without stored momentum.
     most = _turn_that_counts(loop, sampled)
-    common += span.first(_turned(span) >= most, TURNED.format(most))
+    held_too_long += span.first(_turned(span) >= most, TURNED.format(most))
     if run.attrs.get("diverged_at") is not None:
         common.append(Departure(run.attrs["diverged_at"], LOST))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in _left(certificate):
         programs = proved_by(certificate, claim, loop)
-        found[claim.kind] = tuple(sorted({*common, *span.unmet(claim), *_set(claim, programs, span)}))
+        own = [] if "held-torque" in claim.assumptions else held_too_long
+        found[claim.kind] = tuple(sorted({*common, *own, *span.unmet(claim), *_set(claim, programs, span)}))
     return found
 
 
@@ -149,7 +150,7 @@ def _left(certificate: Certificate) -> list[Claim]:
 
 def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
     """Tell whether a flight starts outside of the claim's set, and when it leaves that."""
-    found: list[Departure] = []
+    found = _away(claim, span)
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
@@ -164,6 +165,16 @@ def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departur
         return [*found, *span.first(True, "it is outside the set")]
     # The integration lets V of a motion along the border rise by its own error.
     return [*found, *span.first(value > cast(float, level) * (1.0 + 1e-6), "it leaves the set")]
+
+
+def _away(claim: Claim, span: Span) -> list[Departure]:
+    """Tell when a flight that should have ended near its target is farther away."""
+    settling = claim.numbers.get("settling")
+    if settling is None:
+        return []
+    sine = np.linalg.norm(span["attitude_error"][:, 1:], axis=1)
+    far = sine > math.sin(min(claim.numbers["angle"], math.pi) / 2.0) * (1.0 + 1e-6)
+    return span.first(far & (span["time"] - span.begun > settling), "it is farther from the target than in the end")
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:

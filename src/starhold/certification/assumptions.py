@@ -122,6 +122,7 @@ ASSUMPTIONS = {
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),
     "bounded-outside-torque": Assumption("torque from outside bounded on each axis"),
     "unknown-outside-torque": Assumption("torque from outside bounded in norm"),
+    "bounded-target": Assumption("target's motion at most as told"),
     "target-at-rest": Assumption("target at rest", _turning),
     LINEAR: Assumption("linear motion near rest on a target at rest"),
     "equations-as-given": Assumption("the equations exactly as given"),

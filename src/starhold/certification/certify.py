@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite, isinf
 from typing import Any
 
@@ -15,8 +15,9 @@ from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, 
 from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.isotropic import ISOTROPIC
-from starhold.certification.openness import bounded_torque, named
-from starhold.certification.proofs import proved_claims
+from starhold.certification.evidence.pointing import POINTS
+from starhold.certification.openness import named
+from starhold.certification.proofs import HELD_AND_PUSHED, proved_claims
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -59,8 +60,6 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
     a loop that counts on a lost wheel. Of a law that polynomials cannot follow the one claim is undecided, and names the
     operation and its line; so it is where numbers are too far apart in size for floats to guess with."""
-    # Torques that the loop's own parts add with a bound are disturbances that nobody models.
-    wanted = replace(wanted, disturbance=wanted.disturbance + bounded_torque(loop))
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
     try:
         # What overflows in a guess is caught where the guess is verified.
@@ -92,6 +91,9 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
                 claims.append(proved.get("sliding") or undecided("sliding", torque, subject, failed[SLIDING]))
             claims.extend(_unshown(subject, wanted, proved, "the law declares no V to show it with"))
         claims.extend(between_samples(subject, proved, failed))
+        if "pointing" in proved or wanted.disturbance:
+            reason = failed.get(POINTS, "no proof was found")
+            claims.append(proved.get("pointing") or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
     return claims
 
 
@@ -138,8 +140,6 @@ def _unshown(
         asked.append(("torque-limit", {"slew_angle": turn, "kind": loop.limit, "limit": limit}, reason))
     if tolerance is not None:
         asked.append(("inertia", {"tolerance": tolerance}, uncertain or reason))
-    if wanted.disturbance and loop.law.lyapunov is not None:
-        asked.append(("disturbance", {"torque": wanted.disturbance}, "nothing bounds where the motion ends"))
     return [undecided(kind, told, subject, why) for kind, told, why in asked if kind not in proved]
 
 
@@ -149,6 +149,8 @@ def undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str)
     assumptions = [*ASSUMPTIONS, *besides] + ["no-wheels"] * (kind == "sampling" and subject.loop.wheels is not None)
     if subject.loop.wheels is not None:
         assumptions = [WHEELS if name == UNLIMITED else name for name in assumptions]
+    if kind == "pointing":
+        assumptions = [*HELD_AND_PUSHED]
     if kind == "inertia":
         assumptions[1] = "inertia-near"
     return Claim(kind, numbers, {}, tuple(assumptions), (Obligation("form", EXACT, "undecided", {"reason": reason}),))

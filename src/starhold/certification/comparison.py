@@ -7,12 +7,15 @@ from fractions import Fraction
 from math import inf, isfinite
 from typing import Any
 
+from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
+from starhold.certification.evidence.pointing import POINTS
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
+from starhold.certification.openness import pushes
 from starhold.certification.subject import make_subject
-from starhold.kernel.loops import HANDED, HYSTERESIS, SHORTEST, WHEELS
+from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import BAND
@@ -58,6 +61,12 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     exactly = {"period": loop.period, "hysteresis": loop.hysteresis_width}
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
+    if claim["theorem"] == POINTS:
+        own_torque, *errors = map(exact, pushes(loop))
+        least["outside"] = own_torque + (0 if OUTSIDE in claim["taken"] else known.modelled_norm)
+        least |= dict(zip(("error.attitude", "error.rate", "error"), errors, strict=True))
+        # What is not told of is none.
+        told = {name: Fraction(0) for name in ("error.attitude", "error.rate")} | told
     most = {"limit": float(loop.craft.torque_limit), "limit.norm": float(loop.craft.torque_limit)}
     if wheels is not None:
         most |= {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit)}
@@ -97,7 +106,7 @@ def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     taken, theorem = set(claim["taken"]), claim["theorem"]
     if theorem in REFUTING:
         return
-    signed = theorem in (SLIDING, STRICTLY) or (theorem.startswith(CONVERGES) and "both" not in theorem)
+    signed = theorem in (SLIDING, STRICTLY, POINTS) or (theorem.startswith(CONVERGES) and "both" not in theorem)
     if taken & {SHORTEST, HYSTERESIS} != set(sign_words(own.loop) if signed else []):
         yield "the sign of the quaternion is chosen in another way"
     if theorem != SAMPLED and (WHEELS in taken) != (own.loop.wheels is not None):

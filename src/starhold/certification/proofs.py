@@ -45,8 +45,12 @@ HOW = {
     **dict.fromkeys(("Contracts", "Persists"), LYAPUNOV),
 }
 """How each rule of the kernel shows what it shows."""
-IN_THE_LOOP = {"known-target", "bounded-target", "quaternion-as-fed", "sign-at-once"}
+IN_THE_LOOP = {"known-target", "quaternion-as-fed", "sign-at-once"}
 """What every loop meets as it is composed: its law is told how the target moves, and how the quaternion's sign is chosen."""
+
+
+HELD_AND_PUSHED = ("rigid-body", "inertia-as-given", "bounded-push", "held-torque")
+"""What a claim of how near to its target a loop comes assumes that nothing is known of."""
 
 
 def proved_claims(
@@ -183,6 +187,21 @@ def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     return {"torque": [most(f"outside.{i}") for i in range(3)], **begun, **ends}
 
 
+def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+    angle, rate = (below(_exact(numbers.get(f"start.{name}", numbers.get(name, Fraction(0))))) for name in ("angle", "rate"))
+    most = {"torque": "outside", "error": "error", "attitude_error": "error.attitude", "rate_error": "error.rate"}
+    ends = {"start": "level", "level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
+    return {
+        "period": float(numbers["period"]),
+        "slew_angle": angle,
+        "rate_start": rate,
+        **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
+        "told": "outside.0" in numbers,
+        **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
+        **{name: above(_exact(numbers[key])) for name, key in ends.items()},
+    }
+
+
 def _exact(x: Fraction) -> Any:
     return fmpq(x.numerator, x.denominator)
 
@@ -196,6 +215,7 @@ _NUMBERS = {
     "inertia": _inertia,
     "sampling": _sampled,
     "sliding": _slid,
+    "pointing": _pointed,
 }
 
 

@@ -12,7 +12,7 @@ from flint import arb, fmpq
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
-from starhold.certification.openness import READ, assumed_away, bounded_away
+from starhold.certification.openness import READ, assumed_away
 from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
@@ -105,10 +105,9 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
         "target_acceleration": above(subject.target_acceleration),
         "modelled_torque": [above(m) for m in subject.modelled],
         "modelled_torque_norm": above(subject.modelled_norm),
-        "disturbance": number(subject.disturbance) if {"disturbance", "sliding"} & {*kinds} else 0.0,
+        "disturbance": number(subject.disturbance) if "sliding" in kinds else 0.0,
         "control_period": loop.period,
         "assumed_away": assumed_away(loop),
-        "bounded_away": bounded_away(loop),
         "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
     }
 

@@ -20,7 +20,7 @@ HEADINGS = {
     "torque-limit": "within the torque limit",
     "inertia": "uncertain inertia",
     "wheels": "within the wheels' limits",
-    "disturbance": "torque from outside",
+    "pointing": "pointing as it flies",
     "sampling": "torque held between samples",
     "sliding": "reaches its surface",
     "circle": "ends on the circle",
@@ -203,12 +203,21 @@ def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     )
 
 
-def _disturbance(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "angle" not in n:
         return f"a torque from outside of up to {shown(n['torque'], ' N m')} leaves the body near the target"
+    start = f"rest at up to {angle(n['slew_angle'])}"
+    if n["rate_start"]:
+        start = f"up to {angle(n['slew_angle'])} at up to {speed(n['rate_start'])}"
+    kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
+    beside = " beside those that the law is told" if n["told"] else ""
+    bounds = [f"torques from outside of up to {shown(n['torque'], ' N m')}{beside}"]
+    bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
+    bounds += [f"errors of the command of up to {shown(n['error'], ' N m')}"] if n["error"] else []
     return (
-        f"{place(n, subject)} against any torque from outside of up to {shown(n['torque'], ' N m')}, it ends within "
-        f"{angle(n['angle'], up=True)} and {speed(n['rate'], up=True)}"
+        f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times, from "
+        f"{start}, torque held for {n['period']:.12g} s, with "
+        f"{listed(bounds)}{_followed(subject)}"
     )
 
 
@@ -278,7 +287,7 @@ _SENTENCES = {
     "torque-limit": _torque_limit,
     "wheels": _wheels,
     "inertia": _inertia,
-    "disturbance": _disturbance,
+    "pointing": _pointing,
     "sampling": _sampling,
     "sliding": _sliding,
     "circle": _circle,

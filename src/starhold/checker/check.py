@@ -46,7 +46,7 @@ ENDS = (
     "torque-limit",
     "wheels",
     "inertia",
-    "disturbance",
+    "pointing",
     "sliding",
     "circle",
     "equilibrium",

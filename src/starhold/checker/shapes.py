@@ -160,7 +160,6 @@ SUBJECT: dict[str, Test] = {
     "disturbance": _number,
     "control_period": _number,
     "assumed_away": _list(_text),
-    "bounded_away": _list(_text),
     "wheels": _or_none(_within(_WHEELS)),
 }
 UNKNOWN_BODY: dict[str, Test] = {"body": _text, "law": _text}

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from starhold.algebra.quaternion import to_reference
+from starhold.algebra.quaternion import conjugate, multiply, to_reference, vector_part
 from starhold.algebra.structure import flatten, leaves
-from starhold.algebra.vector import ZERO, add, apply
+from starhold.algebra.vector import ZERO, add, apply, norm, subtract
 from starhold.conformance.bench import PERIOD, sample_loop
 from starhold.conformance.units import rescale, rescale_params
 from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, require, run
@@ -20,7 +21,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import fly_plainly, numbers_of
 from starhold.parts.catalogue import as_part, from_file, parts, read_module, role_of
-from starhold.parts.contract import Card
+from starhold.parts.contract import UNBOUNDED, Card
 from starhold.parts.craft import make_craft
 from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice
@@ -225,6 +226,50 @@ def draws_in_its_range(part: Part) -> None:
         require(not np.array_equal(arrays[0], arrays[2]), "another run has the same random numbers")
 
 
+def keeps_what_it_says(part: Part) -> None:
+    """No torque is larger than its `bound`, and no error than its `error`."""
+    tell_torque, tell_errors = part.hook("bound"), part.hook("error")
+    if tell_torque is None and tell_errors is None:
+        raise NotApplicableError("it says no bound of its torque or of its errors")
+    for params in part.examples():
+        errors, torque = tell_errors(params) if tell_errors else UNBOUNDED, tell_torque(params) if tell_torque else inf
+        require(min(*errors, torque) >= 0.0, f"the bounds {(*errors, torque)} are not all positive or 0")
+        for name, size, bound in _pushes(part, loop_with(part, params), (*errors, torque)):
+            require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
+
+
+def _pushes(part: Part, loop: ClosedLoop, bounds: tuple[float, ...]) -> Iterator[tuple[str, float, float]]:
+    """Yield torques and errors of a part at states of a flight and at other attitudes, and their bounds."""
+    fitted, module, dice = next(f for f in loop.parts if f.part == part), part.module, Dice((1, 2), 3, 0)
+    numbers, random = fitted.prepared(loop.period), np.random.default_rng(1)
+    attitude, rate, command, torque = bounds
+    memory = fitted.remembered(numbers, *([loop.start] if part.role == "sensor" else []))
+    for step in range(STEPS):
+        turned = random.normal(size=4)
+        state = loop.start._replace(
+            attitude=tuple((turned / np.linalg.norm(turned)).tolist()), rate=tuple(random.normal(size=3).tolist())
+        )
+        if part.role == "environment":
+            memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
+            yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), torque
+        elif part.role == "sensor":
+            reading, memory = module.measure(state, memory, numbers, dice, step)
+            if hasattr(reading, "attitude"):
+                # The angle, of whichever quaternion.
+                turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
+                yield "error of the attitude", turn, attitude
+            if hasattr(reading, "rate"):
+                yield "error of the rate", norm(subtract(reading.rate, state.rate)), rate
+        elif part.role == "actuator" and part.hook("command"):
+            wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
+            yield "error of the command", norm(subtract(module.command(wanted, numbers), wanted)), command
+    if part.role == "effector":
+        for step in (1, 5, STEPS):
+            end = fly(loop, step)[1]
+            effector = end.effectors[[f.part for f in loop.used("effector")].index(part)]
+            yield "torque", norm(module.reaction(effector, None, end.state, numbers)), torque
+
+
 def _draws(part: Part) -> bool:
     """Whether its equation draws random numbers."""
     places: list[int] = []
@@ -259,4 +304,5 @@ CHECKS = (
     keeps_momentum,
     measures_what_it_says,
     draws_in_its_range,
+    keeps_what_it_says,
 )

@@ -1,7 +1,8 @@
 """A loop with its torque held between samples: how V changes in a period, and the linear motion, from sets of states.
 
 J w' = u + d - w x Jw with u = the law's torque at the last sample and an error. What errors and torques d from outside do is
-bounded by what they are; what is of higher order in the period, or not linear, by the size of the set. Docs/kernel.md, 10.
+bounded by what they are; what is of higher order in the period, or not linear, by the size of the set, and so is what the
+law's torque and the motion have of a moving target, wheels and a torque that the law is told. Docs/kernel.md, 10.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import prod
 
-from .loops import AXES, AttitudeLoop, slopes
+from .loops import AXES, NONE, AttitudeLoop, slopes
 from .numbers import (
     RefusedError,
     Rows,
@@ -28,7 +29,7 @@ from .numbers import (
     transpose,
     up,
 )  # fmt: skip
-from .polynomials import Poly, apply, cross, dot, most, poly, var, variables
+from .polynomials import Poly, apply, dot, minus, most, poly, var, variables
 
 STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
@@ -52,11 +53,18 @@ class Region:
 @dataclass(frozen=True)
 class Tube:
     """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
-    drift, and how far q turns."""
+    drift, how far q turns, and the torques beside the law's: what is held with it, and what is not."""
 
     sizes: Sizes
     drift: list[Fraction]
     turned: Fraction
+    held: Fraction
+    uneven: Fraction
+
+    @property
+    def push(self) -> Fraction:
+        """Return the bound of both together."""
+        return self.held + self.uneven
 
 
 class Held:
@@ -65,13 +73,24 @@ class Held:
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h, self.outside, self.error = loop, numbers["period"], numbers["outside"], numbers["error"]
-        self.push = self.outside + self.error
+        self.turned, self.rated = (numbers.get(f"error.{name}") or Fraction(0) for name in ("attitude", "rate"))
         demand(self.h > 0, "a period is not positive")
-        demand(not (loop.outside or loop.moving or loop.wheels), "the loop is taken with nothing")
-        loop.autonomous(loop.u)
+        told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
+        names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}
+        each = {"e": [f"outside.{k}" for k in AXES]} | {letter: [name] * 3 for letter, name in names.items()}
+        self.others: Sizes = {
+            f"{letter}{k + 1}": numbers[name] for letter, own in each.items() if told[letter] for k, name in enumerate(own)
+        }
+        alone = dict.fromkeys(self.others, 0)
+        self.u, free = ([p.at(alone) for p in parts] for parts in (loop.u, loop.balance(NONE)))
+        loop.autonomous(self.u)
+        loop.autonomous(loop.u, kept="".join(letter for letter in told if told[letter]))
+        self.told = {name: numbers[name] for letter, own in each.items() if told[letter] for name in own}
+        self.beside = minus(loop.balance(NONE), free)
+        self.left = [p + q for p, q in zip(minus(loop.u, self.u), self.beside, strict=True)]
         self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
-        self.gyroscopic = cross(loop.w, apply(loop.J, loop.w))
-        self.pull, self.bend = apply(self.N, loop.u), apply(self.N, self.gyroscopic)
+        self.gyroscopic = [-p for p in free]
+        self.pull, self.bend = apply(self.N, self.u), apply(self.N, self.gyroscopic)
         # V' to V'''' while the acceleration u is held.
         acceleration = [u - g for u, g in zip(variables("u"), self.bend, strict=True)]
         self.rates = [loop.slopes_along(V, acceleration)]
@@ -105,31 +124,67 @@ class Held:
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
         return Region(X, sizes | {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in STATE[TURN]}, least)
 
+    def misread(self, region: Region) -> Fraction:
+        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told."""
+        if not self.turned + self.rated:
+            return Fraction(0)
+        e, r, a, _ = (self.size(letter) for letter in "erah")
+        J = [[poly(x).number for x in row] for row in self.loop.J]
+        wrong = {"q": self.turned / 2, "w": self.rated + self.turned * r, "r": self.turned * r, "a": self.turned * a}
+        wrong |= {"h": stretch(J) * self.rated, "e": 2 * e}
+        sizes = {name: x + wrong[name[0]] for name, x in (region.sizes | self.others).items()}
+        columns = {letter: [name for name in sizes if name[0] == letter] for letter in wrong}
+        slopes = {
+            k: [[most(p.slope(name), sizes) for name in own] for p in self.loop.u] for k, own in columns.items() if own
+        }
+        return sum((stretch(rows) * wrong[letter] for letter, rows in slopes.items()), Fraction(0))
+
+    def size(self, letter: str) -> Fraction:
+        """Return a bound of the norm of a vector from outside."""
+        own = [x for name, x in self.others.items() if name[0] == letter]
+        return norm(own) if letter == "e" else max(own, default=Fraction(0))
+
+    def stale(self, sizes: Sizes, drift: list[Fraction]) -> Fraction:
+        """Return how far the torques beside the law's come from where they are at a sample."""
+        e, r, a, H = (self.size(letter) for letter in "erah")
+        w = norm(sizes[name] for name in STATE[RATE])
+        change = {"r": self.h * (a + w * r), "a": 2 * a, "h": self.h * ((w + r) * H + e + self.outside), "e": 2 * e}
+        changes = named(STATE[RATE], drift) | {name: change[name[0]] for name in self.others}
+        return norm(sum((most(p.slope(x), sizes) * changes[x] for x in sorted(p.names)), Fraction(0)) for p in self.beside)
+
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
-        sizes, held = region.sizes, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
-        pushed = [u + self.push * norm(row) for u, row in zip(held.values(), self.N, strict=True)]
+        sizes, held = region.sizes | self.others, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
+        steady = self.error + self.misread(region) + norm(most(p, sizes) for p in self.left)
+        widths = [norm(row) for row in self.N]
+
+        def drifted(wide: list[Fraction]) -> list[Fraction]:
+            return [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
+
+        def uneven(wide: list[Fraction]) -> Fraction:
+            return self.outside + self.stale(sizes | named(STATE[RATE], wide), drifted(wide))
 
         def reached(wide: list[Fraction]) -> list[Fraction]:
-            columns = zip(STATE[RATE], pushed, self.bend, strict=True)
-            return [sizes[x] + self.h * (p + most(g, named(STATE[RATE], wide))) for x, p, g in columns]
+            push, columns = steady + uneven(wide), zip(STATE[RATE], held.values(), widths, self.bend, strict=True)
+            return [sizes[x] + self.h * (u + push * n + most(g, named(STATE[RATE], wide))) for x, u, n, g in columns]
 
-        wide = settled(reached)
+        wide = settled(reached, [sizes[name] for name in STATE[RATE]])
         turned = self.h / 2 * norm(wide)
         far = {name: min(sizes[name] + turned, Fraction(1)) for name in STATE[TURN]}
-        drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
-        return Tube({"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held, drift, turned)
+        sizes = sizes | {"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held
+        return Tube(sizes, drifted(wide), turned, steady, uneven(wide))
 
     def fall(self, region: Region) -> tuple[Rows, Rows, Fraction]:
-        """Return Q, H and r such that V changes in a period by h (push |felt x| + r - x.Qx) at most, and V <= x.Hx."""
+        """Return Q, H and r such that V changes in a period by h (p |felt x| + r - x.Qx) at most, with the push p of the
+        tube, and V <= x.Hx."""
         h, tube = self.h, self.tube(region)
         bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
-        pushed = [self.push * norm(row) for row in self.N]
+        pushed = [tube.push * norm(row) for row in self.N]
         # How far pushes take the rates from where they go without.
         away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(bent, d), strict=True)])
         slope = {name: most(self.rates[0].slope(name), tube.sizes) for name in ("q0", *STATE)}
         rest = h**3 / 24 * most(self.rates[3], tube.sizes)
-        rest += self.push / 2 * norm(reach(self.felt, [*tube.drift, *[tube.turned] * 3]))
+        rest += tube.push / 2 * norm(reach(self.felt, [*tube.drift, *[tube.turned] * 3]))
         rest += reach([[slope[name] for name in STATE[RATE]]], away)[0] / 2
         rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
@@ -138,13 +193,14 @@ class Held:
 
     def swing(self, region: Region) -> Fraction:
         """Return a bound of |V'| between samples."""
-        sizes = self.tube(region).sizes
-        return most(self.rates[0], sizes) + self.push * norm(reach(self.felt, [sizes[name] for name in STATE]))
+        tube = self.tube(region)
+        sizes = tube.sizes
+        return most(self.rates[0], sizes) + tube.push * norm(reach(self.felt, [sizes[name] for name in STATE]))
 
     def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
         """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, of
         what is not linear and what comes from outside."""
-        h, N, tube, u = self.h, self.N, self.tube(region), self.loop.u
+        h, N, tube, u = self.h, self.N, self.tube(region), self.u
         rest = self.loop.on_target | self.loop.still
         linear = beside(*(slopes(u, letter, rest) for letter in "wq"))
         A = over_period([[-x for x in row] for row in times(N, linear)], h)
@@ -155,11 +211,11 @@ class Held:
         unlike = [p - own - g for p, own, g in zip(u, apply(linear, x), self.gyroscopic, strict=True)]
         bent = [[most(g.slope(name), tube.sizes) for name in STATE[RATE]] for g in self.gyroscopic]
         odd = [most(p.at({"q0": 1 - var("v")}), near) + y for p, y in zip(unlike, reach(bent, tube.drift), strict=True)]
-        uneven = self.outside + norm(odd)
+        uneven = tube.uneven + norm(odd)
         return A, [
-            ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], self.error + uneven),
+            ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], tube.held + uneven),
             (scalar(0) + N, h * h / 8 * uneven),
-            (scalar(0) + scalar(1), h / 2 * wide * turn * (1 + turn)),
+            (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))),
         ]
 
 
@@ -195,9 +251,15 @@ def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
     return dict(zip(names, values, strict=True))
 
 
-def settled(change: Callable[[list[Fraction]], list[Fraction]]) -> list[Fraction]:
+def stretch(rows: Rows) -> Fraction:
+    """Return a bound of how much longer a matrix makes a vector, of the sums of its rows and of its columns."""
+    across, down = (max(sum(map(abs, row), Fraction(0)) for row in own) for own in (rows, transpose(rows)))
+    return root(across * down)
+
+
+def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:
     """Return bounds that a monotone change leaves bounds: what begins within them at no time leaves them."""
-    found = [Fraction(0)] * 3
+    found = begun or [Fraction(0)] * 3
     for _ in range(ITERATIONS):
         further = change(found)
         if all(x <= y for x, y in zip(further, found, strict=True)):

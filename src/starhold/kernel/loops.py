@@ -1,9 +1,9 @@
 """An attitude loop, wired from programs by the kernel: a certificate cannot say what is connected with what.
 
-The body is relative to its target: q turns the target's axes to the body's, w is the body's rate relative to the target and
-r the target's rate, both in body axes, a the derivative of r as the body sees it:
+The body is relative to its target: q turns the target's axes to the body's, w is the body's rate relative to the target,
+r the target's rate and a its derivative as the target sees it, all in body axes:
 
-    J w' = u + e - (w + r) x (J (w + r) + h) - J a,    q' = q (0, w)/2,    |q| = 1,
+    J w' = u + e - (w + r) x (J (w + r) + h) - J (a - w x r),    q' = q (0, w)/2,    |q| = 1,
 
 with the law's torque u, a torque e from outside, and the momentum h of wheels, that makes H = J (w + r) + h with the body's.
 """
@@ -92,6 +92,7 @@ class AttitudeLoop(Loop):
         self.outside, self.moving, self.wheels = (claim.taken.get(word) is True for word in (OUTSIDE, MOVING, WHEELS))
         self.e = variables("e") if self.outside else NONE
         self.r, self.a = (variables(letter) if self.moving else NONE for letter in "ra")
+        self.speeding = minus(self.a, cross(self.w, self.r))
         self.J, self.J_inverse = self._inertia()
         # dV/dw = J (w + lean q).
         self.lean = claim.numbers["lean"] if near else Fraction(0)
@@ -102,7 +103,7 @@ class AttitudeLoop(Loop):
         self.stored = minus(self.H, spin)
         fields = {
             "attitude": self.q, "rate": self.w, "body_rate": self.rate, "target_rate": self.r,
-            "target_acceleration": self.a, "external_torque": self.e, "position": variables("p"),
+            "target_acceleration": self.speeding, "external_torque": self.e, "position": variables("p"),
             "wheel_momentum": self.stored, "magnetic_field": variables("b"),
         }  # fmt: skip
         self.told = {name: p for field, value in fields.items() for name, p in wired(f"measurement.{field}", value).items()}
@@ -182,7 +183,7 @@ class AttitudeLoop(Loop):
 
     def balance(self, u: Sequence[Poly]) -> list[Poly]:
         """Return J w' under a torque of the law."""
-        outside = minus(self.e, apply(self.J, self.a))
+        outside = minus(self.e, apply(self.J, self.speeding))
         return [torque + own for torque, own in zip(u, minus(outside, cross(self.rate, self.H)), strict=True)]
 
     @cached_property

@@ -25,6 +25,18 @@ class NoParams(NamedTuple):
     """The parameters of a part that takes none."""
 
 
+class Errors(NamedTuple):
+    """The largest errors that a sensor, estimator, actuator or effector makes: of the attitude (rad) and of the rate (rad/s)
+    that it gives, and of the command that it passes on (N m), in norm; `inf` for one without a bound."""
+
+    attitude: float = 0.0
+    rate: float = 0.0
+    command: float = 0.0
+
+
+NO_ERRORS, UNBOUNDED = Errors(), Errors(math.inf, math.inf, math.inf)
+
+
 @dataclass(frozen=True)
 class Card:
     """Title, sources and assumptions of a part."""

@@ -20,7 +20,7 @@ from starhold.certification.subject import Subject, above
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
-from starhold.kernel.programs import digest
+from starhold.kernel.programs import Program, digest
 from starhold.kernel.rules import Obligation, Solves, Squares
 from starhold.laws import program
 from starhold.laws.interface import Measurement
@@ -339,27 +339,11 @@ class Loop:
 
     def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any], turn: float | None) -> bool:
         """Find the largest level on which everything is within its limits; False where that does not hold the turn."""
-        loop, known, wheels = self.loop, self.known, self.loop.wheels
-        numbers: dict[str, Any] = dict(more)
-        if OUTSIDE in words:
-            numbers |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
-        if MOVING in words:
-            numbers |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
-        if WHEELS in words:
-            numbers["momentum"] = float(known.total_momentum)
-            if self.too_little_momentum():
-                self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
-                return False
-        limit = loop.craft.torque_limit if loop.limit != "none" else inf
-        shared = dict[str, float]()
-        if wheels is not None and wheels.allocation == 0:
-            shared = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)}
-            shared |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)}
-        if shared:
-            numbers |= shared
-        elif isfinite(limit):
-            numbers["limit" if loop.limit == "axis" else "limit.norm"] = limit
-        else:
+        numbers: dict[str, Any] = dict(more) | self.bounds(words) | self.limits
+        if WHEELS in words and self.too_little_momentum():
+            self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
+            return False
+        if not self.limits:
             return False
         if "fastest" not in numbers and SHORTEST not in words:
             # A law that clips may keep its limits everywhere.
@@ -390,6 +374,32 @@ class Loop:
             if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
                 return True
         return False
+
+    def bounds(self, words: list[str]) -> dict[str, Any]:
+        """Return the numbers that bound what the loop is taken with."""
+        known, found = self.known, dict[str, Any]()
+        if OUTSIDE in words:
+            found |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
+        if MOVING in words:
+            found |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
+        return found | ({"momentum": float(known.total_momentum)} if WHEELS in words else {})
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """Return the limits of the torque, or those of the wheels; nothing where there are none."""
+        loop, wheels = self.loop, self.loop.wheels
+        limit = loop.craft.torque_limit if loop.limit != "none" else inf
+        shared = dict[str, Any]()
+        if wheels is not None and wheels.allocation == 0:
+            shared = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)}
+            shared |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)}
+        if shared:
+            return shared
+        return {"limit" if loop.limit == "axis" else "limit.norm": limit} if isfinite(limit) else {}
+
+    def is_told(self, name: str) -> bool:
+        """Tell whether the law's program asks for an input."""
+        return name + ".0" in Program.read(self.by_digest[self.roles["law"]]).inputs
 
     def too_little_momentum(self) -> bool:
         """Tell whether a body at rest on a target that turns has more momentum than is told."""

@@ -20,14 +20,15 @@ from starhold.certification.evidence.attitude import (
     Loop,
     sign_words,
 )
-from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.finding import floats, obligations
 from starhold.certification.evidence.inertia import find_near
 from starhold.certification.evidence.isotropic import find_isotropic
+from starhold.certification.evidence.pointing import find_pointed
 from starhold.certification.evidence.refuted import against_sampling
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.subject import Subject
 from starhold.kernel.loops import HANDED, MOVING, OUTSIDE, SHORTEST
-from starhold.kernel.numbers import RefusedError, Rows, plus
+from starhold.kernel.numbers import RefusedError, plus
 from starhold.kernel.rules import Contracts, Definite
 from starhold.parts.craft import tensor
 
@@ -37,8 +38,8 @@ LIMITS = {"limit", "limit.norm", "motors.0"}
 
 
 def find_claims(subject: Subject, turn: float | None = None, tolerance: float | None = None) -> Loop:
-    """Find the claims that can be proved: where motions end, for other inertias, within limits, between samples. turn: what
-    the set within the limits is to hold (rad); tolerance: of the inertia, the largest unless told."""
+    """Find the claims that can be proved: where motions end, for other inertias, within limits, between samples, and how
+    near to the target the loop that flies comes. turn: what the set within the limits is to hold (rad); tolerance: of the inertia, the largest unless told."""
     loop, flown = Loop(subject), subject.loop
     if not flown.remembers:
         if flown.law.lyapunov is not None:
@@ -50,6 +51,7 @@ def find_claims(subject: Subject, turn: float | None = None, tolerance: float | 
         if hasattr(flown.law.module, "surface"):
             find_sliding(loop)
         find_sampled(loop)
+        find_pointed(loop)
     return loop
 
 
@@ -175,11 +177,6 @@ def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
     }
     found |= {"surface.low": k, "surface.high": steep, "surface": size, "end.rate": (size + steep * size / k) * more}
     return found | {"end.angle": 2.0 * asin(min(size / k, 1.0)) * more}
-
-
-def floats(rows: Rows) -> NDArray[np.float64]:
-    """Return a matrix in floats."""
-    return np.array([[float(x) for x in row] for row in rows], dtype=np.float64)
 
 
 def largest_ratio(a: Any, b: Any) -> float:

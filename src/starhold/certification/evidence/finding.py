@@ -9,11 +9,12 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import plainly, rounded, squares, text
 from starhold.kernel import rules
-from starhold.kernel.numbers import Account, RefusedError, inverse, rational
+from starhold.kernel.numbers import Account, RefusedError, Rows, inverse, rational
 from starhold.kernel.polynomials import Poly, multiple
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.reading import Claim, Numbers, Told
@@ -88,6 +89,11 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
     except RefusedError as reason:
         raise NotFoundError(f"{name}: {reason}") from None
     return found
+
+
+def floats(rows: Rows) -> NDArray[np.float64]:
+    """Return a matrix in floats."""
+    return np.array([[float(x) for x in row] for row in rows], dtype=np.float64)
 
 
 def in_proportion(o: rules.Solves) -> dict[str, Any] | None:

@@ -5,19 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib import import_module
-from math import inf, pi, sin, sqrt
+from itertools import takewhile
+from math import inf, isfinite, pi, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop, sign_words
-from starhold.certification.evidence.claims import floats
-from starhold.certification.evidence.finding import read
-from starhold.kernel.held import RATE, TURN, Held, Region
-from starhold.kernel.loops import AttitudeLoop, slopes
-from starhold.kernel.numbers import Account, RefusedError, Rows, norm
-from starhold.kernel.theorems.pointing import image, periods
+from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
+from starhold.certification.openness import Pushes, pushes
+from starhold.certification.subject import above
+from starhold.kernel.held import RATE, STATE, TURN, Held, Region
+from starhold.kernel.loops import OUTSIDE, AttitudeLoop, slopes
+from starhold.kernel.numbers import Account, RefusedError, Rows, demand, norm
+from starhold.kernel.theorems.pointing import image, periods, points
+from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
 linalg: Any = import_module("scipy.linalg")
@@ -25,12 +29,16 @@ optimize: Any = import_module("scipy.optimize")
 Array = NDArray[np.float64]
 
 POINTS = "points"
+ANGLES = (175, 150, 120, 90, 60, 30, 10)
+"""From up to which turns (deg) motions are tried to be shown to come to the target."""
+LEAST = 1e-6
+"""By how much (rad) a spring as stiff as the law gives to the least torque from outside that is told of."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
-MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS = 1.0 + 1e-9, 1.03, 1.01, 8.0, 20, 6
+MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 8.0, 20, 6, 2000
 """What is given away where numbers are rounded; by how much the last level is above its limit, and ellipsoids are larger
 than the least, for motions come into them after a finite time; by how much a level may be below the one before; how many
-levels and ellipsoids there are at most."""
+levels and ellipsoids there are at most; at how many states of a set the torque is looked at."""
 
 
 @dataclass
@@ -69,10 +77,11 @@ class Chain:
         """Return tau and beta for the lowest level that is shown to be reached from another, and that level."""
         held = self.held
         try:
-            exact, above, rest = held.fall(held.region(c))
+            region = held.region(c)
+            (exact, above, rest), push = held.fall(region), held.tube(region).push
         except RefusedError:
             return None
-        Q, H, felt, push = floats(exact), floats(above), floats(held.felt), float(held.push)
+        Q, H, felt = floats(exact), floats(above), floats(held.felt)
         if float(np.linalg.eigvalsh(Q)[0]) <= 0.0:
             return None
         R = felt.T @ felt
@@ -82,13 +91,13 @@ class Chain:
             tau = largest * share
             beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
             beta = min(beta, (1.0 - 1e-6) / float(held.h))
-            return ((push * push / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
+            return ((float(push) ** 2 / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
 
         _, tau, beta = min(floor(share) for share in np.linspace(0.02, 0.98, 33))
         if beta <= 0.0:
             return None
         t, b = Fraction(tau), Fraction(beta)
-        return t, b, (held.push * held.push / (4 * t) + rest) / b
+        return t, b, (push * push / (4 * t) + rest) / b
 
     def tighten(self, region: Region) -> tuple[float, float]:
         """Find the ellipsoids, and return the angle (rad) and the rate (rad/s) where motions end."""
@@ -120,6 +129,27 @@ class Chain:
             region, (angle, fastest) = inner, end
         return angle, fastest
 
+    def asks_more(self, limits: dict[str, float]) -> bool:
+        """Tell whether the law asks for more than its limit at some state of the set."""
+        most = min((x for name, x in limits.items() if name.startswith("limit")), default=inf)
+        r, G, s = np.random.default_rng(1), floats(self.held.G), float(self.held.s)
+        along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STATES)))
+        half = r.uniform(0.0, pi, STATES)
+        q = np.sin(half) * axes
+        # V is quadratic in the rate along each direction.
+        a, b = (along * (G[RATE, RATE] @ along)).sum(0), (along * (G[RATE, TURN] @ q)).sum(0)
+        c = s * (1.0 - np.cos(half)) + (q * (G[TURN, TURN] @ q)).sum(0) - self.level
+        inside = b * b >= a * c
+        far = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
+        names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
+        x = dict(zip(names, (np.cos(half), *q, *(far * along)), strict=True))
+        u = [
+            sum(float(k) * np.prod([x[name] for name in m], axis=0) for m, k in p.terms.items()) + 0.0 * half
+            for p in self.held.u
+        ]
+        size = np.linalg.norm(u, axis=0) if "limit.norm" in limits else np.abs(u).max(axis=0)
+        return bool(size[inside].max(initial=0.0) > most)
+
     def ends(self, region: Region) -> tuple[float, float]:
         """Return the angle (rad) and the rate (rad/s) that motions of a region do not exceed, between samples either."""
         X, drift = floats(region.X), float(norm(self.held.tube(region).drift))
@@ -131,55 +161,107 @@ class Chain:
         return 2.0 * half * MORE if half < 1.0 else inf, fastest
 
 
-def find_pointing(
-    loop: Loop, outside: float, error: float, angle: float, rate: float = 0.0, limit: dict[str, float] | None = None
-) -> bool:
-    """Find the claim of how near to its target the loop with a held torque comes, and add it. outside: the largest torque
-    from outside (N m); error: of the command (N m); the set holds turns of up to `angle` (rad) at up to `rate` (rad/s);
-    limit: what the law is to ask for at most, `limit` about each axis or `limit.norm`, without its errors."""
-    if loop.loop.remembers:
-        loop.failed[POINTS] = "the law has a memory"
+def find_pointed(loop: Loop) -> bool:
+    """Find how near the loop comes to its target against what its parts do, and what is asked for beside, within its limits
+    if that is found: from the largest turns, at the rate of the loop's start or from rest."""
+    begun = loop.loop.without("sensor", "estimator")
+    shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
+    rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
+    own = pushes(loop.loop)
+    tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
+    try:
+        pushed = Pushed(loop, own._replace(outside=own.outside + float(loop.known.disturbance)))
+        return any(pushed.find(*one) for one in tried)
+    except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
+        # Floats may be too far apart in size, or too large.
+        loop.failed[POINTS] = str(reason)
         return False
-    told: dict[str, Any] = {"period": loop.loop.period, "outside": outside, "error": error} | (limit or {})
-    told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
-    words, moments = sign_words(loop.loop), np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))
-    J, stiffness, begun = float(moments[-1]), feedback(loop, words), list[Chain]()
-    for lean in LEANS:
-        epsilon = float(f"{lean * sqrt(stiffness / J):.4g}")
-        V = loop.crossed(stiffness, epsilon)
-        level = 4.0 * stiffness * sin(angle / 4.0) ** 2 + J * rate * (rate / 2.0 + epsilon * sin(min(angle, pi) / 2.0))
-        told["level"] = level * (1.0 + 1e-6)
+
+
+class Pushed:
+    """A loop against torques that no law is told, and errors. RefusedError for a law that the theorem does not take."""
+
+    def __init__(self, loop: Loop, against: Pushes) -> None:
+        words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
+        if OUTSIDE in loop.words and loop.is_told("measurement.external_torque"):
+            words.append(OUTSIDE)
+        else:
+            outside = above(exact(outside) + loop.known.modelled_norm)
+        self.loop, self.words = loop, words + sign_words(loop.loop)
+        self.stiffness = feedback(loop, self.words)
+        demand(self.stiffness > 0.0, "the law does not turn the body to its target")
+        outside = max(outside, LEAST * self.stiffness)
+        self.told: dict[str, Any] = {"period": loop.loop.period, "outside": outside, "error": against.command}
+        self.told |= {f"error.{name}": x for name, x in (("attitude", against.attitude), ("rate", against.rate)) if x}
+        self.told |= loop.bounds(words)
+        self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
+        slow = sqrt(self.stiffness / self.J)
+        self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
+        self.leans = [(float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}"))) for lean in LEANS]
+
+    def held(self, epsilon: float) -> tuple[str, Held]:
+        """Return V and the loop."""
+        V = self.loop.crossed(self.stiffness, epsilon)
         Account.left = 10**12
-        try:
-            held = Held(AttitudeLoop(read(loop.claim(POINTS, words, V, **told), loop.by_digest)))
-        except RefusedError as reason:
-            loop.failed[POINTS] = str(reason)
+        return V, Held(AttitudeLoop(read(self.loop.claim(POINTS, self.words, V, **self.told), self.loop.by_digest)))
+
+    def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
+        """Find the claim of how near to its target the loop comes, and add it. The set holds turns of up to `angle` (rad) at
+        up to `rate` (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
+        loop, words, J, begun = self.loop, self.words, self.J, list[Chain]()
+        told = self.told | (limits or {})
+        told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
+        for epsilon, V, held in self.leans:
+            lean = epsilon * sin(min(angle, pi) / 2.0)
+            level = 4.0 * self.stiffness * sin(angle / 4.0) ** 2 + J * rate * (rate / 2.0 + lean)
+            begun.append(Chain(held, V, level * (1.0 + 1e-6)))
+        Account.left = 10**12
+        # The best in the small is tried first, and taken if it comes down from the whole set.
+        begun.sort(key=Chain.aim)
+        if begun[0].asks_more(limits or {}):
+            loop.failed[POINTS] = "the torque exceeds its limit"
             return False
-        begun.append(Chain(held, V, told["level"]))
-    # The best in the small is tried first, and taken if it comes down from the whole set.
-    for chain in sorted(begun, key=Chain.aim):
-        if chain.descend() < 4.0 * chain.aim():
-            break
-    else:
-        chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)
-    if not chain.levels:
-        loop.failed[POINTS] = "V does not fall on the set from which motions start"
+        if not begins(loop, loop.claim(POINTS, words, begun[0].V, **told | {"level": begun[0].level}), self.scales):
+            return False
+        for chain in begun:
+            if chain.descend() < 4.0 * chain.aim():
+                break
+        else:
+            chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)
+        if not chain.levels:
+            loop.failed[POINTS] = "V does not fall on the set from which motions start"
+            return False
+        held, start = chain.held, Fraction(chain.level)
+        angle, fastest = chain.tighten(held.region(Fraction(chain.levels[-1]["end"])))
+        told["level"] = chain.level
+        told["highest"] = float(start + held.h / 2 * held.swing(held.region(start))) * MORE
+        told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
+        if not isfinite(angle):
+            loop.failed[POINTS] = "motions do not come near the target"
+            return False
+        claim = loop.claim(POINTS, words, chain.V, **told)
+        claim["evidence"] = {"levels": chain.levels, "ellipsoids": chain.ellipsoids}
+        return loop.try_to_show(claim, self.scales)
+
+
+def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
+    """Tell whether the set of a claim without levels is sound, and the torque keeps its limits on it."""
+    try:
+        shown = points(read(claim | {"numbers": claim["numbers"] | {"highest": "0"}}, loop.by_digest))
+        wanted = dict(takewhile(lambda one: one[0] != "V between samples", shown))
+        for name in wanted:
+            evidence(name, wanted, scales)
+    except (NotFoundError, RefusedError) as reason:
+        loop.failed[POINTS] = str(reason)
         return False
-    held, start = chain.held, Fraction(chain.level)
-    angle, fastest = chain.tighten(held.region(Fraction(chain.levels[-1]["end"])))
-    told["level"] = chain.level
-    told["highest"] = float(start + held.h / 2 * held.swing(held.region(start))) * MORE
-    told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
-    claim = loop.claim(POINTS, words, chain.V, **told)
-    claim["evidence"] = {"levels": chain.levels, "ellipsoids": chain.ellipsoids}
-    scales = {f"q{k}": 1.0 for k in (1, 2, 3)} | {f"w{k}": sqrt(stiffness / J) for k in (1, 2, 3)}
-    return loop.try_to_show(claim, scales)
+    return True
 
 
 def feedback(loop: Loop, words: list[str]) -> float:
     """Return the stiffness of the law near rest, a third of its trace."""
     own = AttitudeLoop(read(loop.claim(POINTS, words, None), loop.by_digest))
-    return -float(sum(row[k] for k, row in enumerate(slopes(own.u, "q", own.on_target | own.still)))) / 3.0
+    at = own.on_target | own.still | {f"{letter}{k}": 0 for letter in "erah" for k in (1, 2, 3)}
+    return -float(sum(row[k] for k, row in enumerate(slopes(own.u, "q", at)))) / 3.0
 
 
 def smallest(A: Array, pushes: list[Array]) -> tuple[Array, list[float]] | None:
@@ -200,7 +282,8 @@ def smallest(A: Array, pushes: list[Array]) -> tuple[Array, list[float]] | None:
     def turn(x: Array) -> float:
         return float(np.log(shape(x)[0]))
 
-    found = optimize.minimize(turn, weight, method="Nelder-Mead", options={"maxfev": 400})
+    begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
+    found = optimize.minimize(turn, weight, method="Nelder-Mead", options={"maxfev": 400, "initial_simplex": begun})
     _, X, shares = shape(found.x)
     return (X + X.T) / 2.0 * LARGER, [float(a) for a in shares]
 

@@ -18,10 +18,10 @@ Most: TypeAlias = list[Fraction | None]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
-def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, Statement]:
+def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Generator[tuple[str, Obligation], None, Statement]:
     """On {V <= level}, or everywhere, with everything from outside at most as told: each component of the torque is at most
     `limit` in size (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k, of
-    those that are told."""
+    those that are told. less: what the torque is below its limit, for what it is not told exactly."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, norm = numbers.get("limit"), numbers.get("limit.norm")
     count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
@@ -46,7 +46,8 @@ def within_limits(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None,
     assumed += ["bounded-target"] * loop.moving + ["bounded-momentum"] * loop.wheels + unlimited
     known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
     said, none = list[str](), poly(0)
-    limited = [(*load, none) for load in loads("torque", limit, norm)]
+    asked = [None if x is None else x - less for x in (limit, norm)]
+    limited = [(*load, none) for load in loads("torque", *asked)]
     if limit is not None:
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if norm is not None:

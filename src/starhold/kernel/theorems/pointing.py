@@ -19,17 +19,18 @@ from .limits import within_limits
 def points(claim: Claim) -> Proof:
     """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
     by no more than end.angle and turns no faster than end.rate. The torque is what the law asks for at the last sample and
-    an error, |error| <= error; torques from outside are no more than `outside`."""
+    an error, |error| <= error; it is told the attitude turned by error.attitude at most and the rate off by error.rate;
+    torques from outside that it is not told are no more than `outside`."""
     loop = AttitudeLoop(claim)
     yield from loop.sound()
     held, numbers, samples = Held(loop), claim.numbers, 0
     c, h = numbers["level"], held.h
     start = yield from contents(loop, loop.lyapunov)
-    limited = yield from within_limits(loop)
     region = held.region(c)
+    limited = yield from within_limits(loop, held.misread(region))
     signs = {SHORTEST, HYSTERESIS} & claim.taken.content.keys()
     if any(claim.taken.get(word) for word in (SHORTEST, HYSTERESIS)):
-        yield "the sign never changes", Exceeds(region.least)
+        yield "the sign never changes", Exceeds(region.least, held.turned / 2)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(region))
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
@@ -37,9 +38,10 @@ def points(claim: Claim) -> Proof:
         end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
         demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
         Q, H, rest = held.fall(region)
-        pushed = held.push * held.push / (4 * tau) + rest
+        push = held.tube(region).push
+        pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(held.felt), held.felt), -tau), H, -beta)
-        yield f"V falls {k}", Definite(fallen)
+        yield f"V falls by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
         c, region = end, held.region(end)
@@ -62,17 +64,25 @@ def points(claim: Claim) -> Proof:
         demand(most_of > 0, f"the {name} is too small")
         yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in region.X[part]], -1))
     yield "settling", Exceeds(numbers["settling"], h * samples)
+    told = [f"errors of the command of up to {below(held.error)} N m"]
+    told += [f"of the attitude that it is told of up to {below(held.turned)} rad"] if held.turned else []
+    told += [f"of the rate of up to {below(held.rated)} rad/s"] if held.rated else []
     text = (
         f"every motion from {{V <= {below(numbers['level'])}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
         f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside of up to"
-        f" {below(held.outside)} N m and errors of the command of up to {below(held.error)} N m"
+        f" {below(held.outside)} N m and {enumerated(told)}"
     )
-    assumptions = ("rigid-body", "inertia-as-given", "bounded-push", "held-torque", *limited.assumptions, "target-at-rest")
+    text += "".join(f", {name} of up to {below(x)}" for name, x in held.told.items())
+    taken = (
+        *(["bounded-outside-torque"] if loop.outside else []),
+        "bounded-target" if loop.moving else "target-at-rest",
+        *(["frictionless-wheels", "bounded-momentum"] if loop.wheels else ["no-wheels"]),
+    )
+    assumptions = ("rigid-body", "inertia-as-given", "bounded-push", "held-torque", *limited.assumptions, *taken)
     sign = "sign-at-once" if signs else "quaternion-as-fed"
-    asked = f"{limited.text} but for errors" if limited.text else ""
-    said = "".join(f"; {part}" for part in (enumerated(start), asked) if part)
-    return Statement(text + said, (*assumptions, "no-wheels", sign), "pointing")
+    said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
+    return Statement(text + said, tuple(dict.fromkeys((*assumptions, sign))), "pointing")
 
 
 def image(X: Rows, shares: Sequence[Fraction], A: Rows, pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:

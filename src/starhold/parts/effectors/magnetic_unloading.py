@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import ZERO, Vector, scale, subtract
+from starhold.algebra.vector import ZERO, Vector, norm, scale, subtract
 from starhold.parts import magnetic_field
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.effectors import magnetorquers
@@ -27,6 +27,7 @@ ROLE = "effector"
 OUTSIDE = True
 NEEDS = ("two-body", "wheels")
 ABOUT = "Earth"
+BOUND_FROM = magnetic_field.RADIUS
 READS = ("magnetic_field",)
 
 
@@ -83,6 +84,11 @@ remember, reaction, rates, momentum = (
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
     """The recorded quantities."""
     return Sample(state.dipole, reaction(state, command, body, params))
+
+
+def bound(params: Params) -> float:
+    """The largest norm of the torque (N m) at distances from `BOUND_FROM` on, where the field is nowhere stronger."""
+    return norm(params.dipole_limit) * magnetic_field.strongest(params.epoch)
 
 
 def examples() -> list[Params]:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, multiply, normalise
 from starhold.algebra.vector import Vector, add
-from starhold.parts.contract import Card, NoMemory, Parameter
+from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, NoMemory, Parameter
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -41,6 +41,11 @@ def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int)
     d = dice.vector(0, 0.5 * params.attitude)
     attitude = normalise(multiply(state.attitude, (1.0, d[0], d[1], d[2])))
     return Reading(attitude, add(state.rate, dice.vector(3, params.rate))), memory
+
+
+def error(params: Params) -> Errors:
+    """None without noise; noise has no bound."""
+    return UNBOUNDED if params.attitude or params.rate else NO_ERRORS
 
 
 def examples() -> list[Params]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Vector, add, clip_axes, scale
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import UNBOUNDED, Card, Errors, Parameter
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -69,7 +69,13 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
     return Reading(clip_axes(shown, params.limit)), add(memory, dice.vector(3, params.walk))
 
 
+def error(params: Params) -> Errors:
+    """The bias, of a gyro that does nothing else wrong; noise, and what grows with the rate or with time, has no bound."""
+    grows = params.noise or params.bias_walk or params.scale_error or params.limit < math.inf
+    return UNBOUNDED if grows else Errors(rate=math.hypot(*params.bias))
+
+
 def examples() -> list[Params]:
-    """A MEMS gyro, and one that is exact."""
+    """A MEMS gyro, one that has a bias alone, and one that is exact."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
-    return [mems._replace(limit=math.radians(100.0)), Params()]
+    return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params()]

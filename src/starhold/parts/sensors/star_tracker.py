@@ -10,7 +10,7 @@ from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.scalar import Scalar, both, less, opposite, where
 from starhold.algebra.structured import when
 from starhold.algebra.vector import Vector, add, dot, scale, subtract
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Parameter
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
 
@@ -112,6 +112,12 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
     waiting = (state.attitude, *memory.waiting[:-1]) if params.late else ()
     left = where(due, params.every - 1.0, memory.left - 1.0)
     return Reading(shown, where(due, 1.0, 0.0)), Memory(shown, waiting, left)
+
+
+def error(params: Params) -> Errors:
+    """None where it is at once and without noise; noise has no bound, nor has what the craft turns meanwhile."""
+    wrong = params.cross or params.roll or params.interval or params.delay or params.outage != NEVER
+    return UNBOUNDED if wrong else NO_ERRORS
 
 
 def examples() -> list[Params]:
