@@ -12,8 +12,9 @@
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
+   Program of the law: sha256 d5137098524b4413b6d496ad62634b43647fe728da0c5962b960f411facfefe2
 
-   Certificate: certificate.json, sha256 7dd5f36bf1331e704b5483a2270f71ceeeda9f0b29789b5b20029b733f3bde84:
+   Certificate: certificate.json, sha256 cbcb21b3a3a2c8b2bef6efdee68807b268e1dba08308be094f03b4a063cdc51f:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
@@ -24,9 +25,14 @@
      the inertia of the body really is
      proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
      every period up to 39.99 s
-   These claims assume: rigid body; exact measurement and ideal actuators; torque applied continuously;
-   inertia exactly as given; torque not limited; no torque from outside but what the law cancels; torque
-   from outside bounded on each axis; no torque from outside; linear motion near rest on a target at rest.
+     proved: pointing as it flies: within 0.4292° of the target after 2539 s at all times, from up to 10°
+     at up to 3.085°/s, torque held for 0.1 s, with torques from outside of up to 9e-09 N m beside those
+     that the law is told
+   These claims assume: rigid body; exact measurement and ideal actuators; inertia exactly as given; no
+   torque from outside but what the law cancels; torque applied continuously; torque not limited; torque
+   from outside bounded on each axis; no torque from outside; linear motion near rest on a target at rest;
+   torques from outside and errors of the command are no larger than told; the torque is what the law asks
+   for at the last sample, and the error.
    Check it independently: starhold check certificate.json */
 
 #ifndef LYAPUNOV_H

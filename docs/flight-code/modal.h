@@ -13,18 +13,19 @@
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
+   Program of the law: sha256 99130acbe6b13c7bcd3c5cbc219c37d087ae6db2517dfd9e6fe729d84998d648
 
-   Certificate: certificate.json, sha256 c3e893757edd950b59cc325c52db3799b5d15a5648d6dcf010e4fce6f78552e0:
+   Certificate: certificate.json, sha256 308d5bd1a9cfdcd6bd201909fac8e142b9a5dc0f49efc13af226333c89abf8c7:
    proved
    Claims:
      proved: region of attraction: from the level set of V that holds rest at every attitude told by the
-     shorter of its quaternions, and by the longer up to 288.5° of 360° and, on target, 109.5°/s about any
-     axis, the body comes to rest on target without leaving the set; the set is the same for every inertia
+     shorter of its quaternions, and by the longer up to 288.2° of 360° and, on target, 109.5°/s about any
+     axis, the body comes to rest on target without leaving the set
      proved: torque held between samples: the linear loop is stable with the torque held for 0.005 s and
      for every period up to 2.334 s
-   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
-   applied continuously; torque not limited; no torque from outside but what the law cancels; linear motion
-   near rest on a target at rest; no torque from outside.
+   These claims assume: rigid body; exact measurement and ideal actuators; inertia exactly as given; no
+   torque from outside; torque applied continuously; torque not limited; linear motion near rest on a
+   target at rest.
    Check it independently: starhold check certificate.json */
 
 #ifndef MODAL_H

@@ -19,7 +19,7 @@
    wheels.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 4ffb6612a401266e66e66151902f7f7a52c2fdcf50eb9cbe9a0df8165149cd8e:
+   Certificate: certificate.json, sha256 0d88b4ae6330ca9f17cb964989fb3e54cbe383db812fc267b0c81ef5a40f1310:
    undecided
    Claims:
    Check it independently: starhold check certificate.json */

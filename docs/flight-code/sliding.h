@@ -14,20 +14,21 @@
    Bits are those of the simulation where doubles are IEEE and nothing is contracted or reassociated:
    compile with -std=c99 -ffp-contract=off, never with -ffast-math.
 
+   Program of the law: sha256 d376113421b72aa7157bcc6305eb095cd9517e199b91f6fd8db1158f23a2d30a
    ****************************************************************************************************
    WARNING  NOT DECIDED: torque held between samples: the linear loop is stable with the torque held for
    0.1 s.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 6020d8c9880d24e9fdd69cc1b3cdbcad7896460419342d2f20fbd69e111974ad:
+   Certificate: certificate.json, sha256 e6dcbc61444004ac3f70633616dc9f4b68509ad7caded1cded5b3db0398bd6c2:
    undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches
      the surface against any torque from outside of up to 3.486e-06 N m on an axis and slides to rest on
      target
      undecided: torque held between samples: the linear loop is stable with the torque held for 0.1 s
-   These claims assume: rigid body; inertia exactly as given; exact measurement and ideal actuators; torque
-   applied continuously; torque not limited; torque from outside bounded on each axis; linear motion near
+   These claims assume: rigid body; exact measurement and ideal actuators; inertia exactly as given; torque
+   from outside bounded on each axis; torque applied continuously; torque not limited; linear motion near
    rest on a target at rest; no torque from outside.
    Check it independently: starhold check certificate.json */
 

@@ -39,7 +39,8 @@ LIMITS = {"limit", "limit.norm", "motors.0"}
 
 def find_claims(subject: Subject, turn: float | None = None, tolerance: float | None = None) -> Loop:
     """Find the claims that can be proved: where motions end, for other inertias, within limits, between samples, and how
-    near to the target the loop that flies comes. turn: what the set within the limits is to hold (rad); tolerance: of the inertia, the largest unless told."""
+    near to the target the loop that flies comes. turn: what the set within the limits is to hold (rad); tolerance: of the
+    inertia, the largest unless told."""
     loop, flown = Loop(subject), subject.loop
     if not flown.remembers:
         if flown.law.lyapunov is not None:
