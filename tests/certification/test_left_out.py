@@ -9,7 +9,7 @@ import pytest
 import starhold as sh
 from starhold.certification.assumptions import ASSUMPTIONS
 from starhold.certification.certificate import write
-from starhold.certification.certify import certify
+from starhold.certification.certify import Wanted, certify
 from starhold.certification.openness import named, pushes
 from starhold.certification.station import certify_station
 from starhold.certification.wording import sentence
@@ -78,7 +78,7 @@ def test_a_loop_of_all_parts_at_once_passes_the_checker(name, tmp_path):
 
 def test_a_bounded_torque_is_left_out_but_where_it_is_taken_in(tmp_path):
     loop = textbook()["pd-0"].with_parts(fit("environment", "constant-torque", (1e-6, 0.0, 0.0)))
-    certificate = certify(loop)
+    certificate = certify(loop, "", Wanted(pointing=True))
     told = "without:environment constant-torque"
     assert {claim.kind: told in claim.assumptions for claim in certificate.claims} == {
         claim.kind: claim.kind != "pointing" for claim in certificate.claims
@@ -148,7 +148,7 @@ def test_a_bound_enters_only_where_it_holds():
     assert pushes(magnetic(velocity=(0.0, speed * 1.001, 0.0))).outside > 0.0
     for loop in outside:
         assert pushes(loop).outside == 0.0
-        (claim,) = named([certified("pd-0").claim("pointing")], loop)
+        (claim,) = named([certified("pd-0", disturbance=1e-6).claim("pointing")], loop)
         assert "without:environment residual-dipole" in claim.assumptions
 
 

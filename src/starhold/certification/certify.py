@@ -30,7 +30,8 @@ class Wanted:
 
     rate: convergence from every attitude and rates up to this (rad/s; inf for any); turn: torque within its limit on every
     turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of a torque nobody models (N m);
-    momentum: norm of the total angular momentum in claims about wheels (N m s), if absent that of the start.
+    momentum: norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; pointing: how
+    near to the target the loop comes as it flies, which takes seconds, and is wanted with a disturbance in any case.
     """
 
     rate: float | None = None
@@ -38,6 +39,7 @@ class Wanted:
     inertia_tolerance: float | None = None
     disturbance: float = 0.0
     momentum: float | None = None
+    pointing: bool = False
 
 
 BEST = Wanted()
@@ -80,7 +82,9 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
     if loop.remembers and loop.law.lyapunov is not None:
         claims.append(undecided("convergence", EVERYWHERE, subject, "the law keeps a memory from call to call"))
     if sound and not loop.remembers:
-        proved, failed = proved_claims(subject, wanted.slew_angle, wanted.rate, wanted.inertia_tolerance)
+        pointing = wanted.pointing or wanted.disturbance > 0.0
+        told = wanted.slew_angle, wanted.rate, wanted.inertia_tolerance
+        proved, failed = proved_claims(subject, *told, pointing)
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted, proved, failed))
         else:

@@ -23,6 +23,7 @@ from starhold.certification.certificate import (
 from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import certificate, obligations
+from starhold.certification.evidence.pointing import find_pointed
 from starhold.certification.evidence.refuted import (
     AWAY,
     EXCEEDS,
@@ -54,13 +55,19 @@ HELD_AND_PUSHED = ("rigid-body", "inertia-as-given", "bounded-push", "held-torqu
 
 
 def proved_claims(
-    subject: Subject, turn: float | None = None, rate: float | None = None, tolerance: float | None = None
+    subject: Subject,
+    turn: float | None = None,
+    rate: float | None = None,
+    tolerance: float | None = None,
+    pointing: bool = False,
 ) -> tuple[dict[str, Claim], dict[str, str]]:
     """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: what is proved,
     and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within limits
     is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any); tolerance: of
-    the inertia, the largest unless told."""
+    the inertia, the largest unless told; pointing: whether to find how near to the target the loop comes as it flies."""
     found = find_claims(subject, turn, tolerance)
+    if pointing and not subject.loop.remembers:
+        find_pointed(found)
     find_refuted(found, turn, rate)
     claims = checked(found)
     # What is refuted is what was asked for, where less may be proved.

@@ -78,8 +78,8 @@ class BodyStudy:
         """Time the law's calls; empty where that is not worth telling."""
         return {}
 
-    def certify(self, scenario: Scenario, entry: LawEntry, loop: Any) -> list[Issued]:
-        """Certify one law, as it starts and after each change that it knows of."""
+    def certify(self, scenario: Scenario, entry: LawEntry, loop: Any, pointing: bool = False) -> list[Issued]:
+        """Certify one law, as it starts and after each change that it knows of; pointing: how near to its target, too."""
         # A certificate without claims is undecided.
         return [Issued(Certificate(entry.name, {"body": scenario.body, "law": entry.law.name}, ()), loop)]
 

@@ -73,5 +73,9 @@ def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
         )
     # All of them before the first proof, so that what is wrong with the last is said at once.
     loops = [build(scenario, entry) for entry in entries]
-    issued = [one for entry, loop in zip(entries, loops, strict=True) for one in study.certify(scenario, entry, loop)]
+    issued = [
+        one
+        for entry, loop in zip(entries, loops, strict=True)
+        for one in study.certify(scenario, entry, loop, pointing=True)
+    ]
     return [Tried(one.certificate, study.fly_claims(one), study.start_inside(one)) for one in issued]

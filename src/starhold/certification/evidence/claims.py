@@ -23,7 +23,6 @@ from starhold.certification.evidence.attitude import (
 from starhold.certification.evidence.finding import floats, obligations
 from starhold.certification.evidence.inertia import find_near
 from starhold.certification.evidence.isotropic import find_isotropic
-from starhold.certification.evidence.pointing import find_pointed
 from starhold.certification.evidence.refuted import against_sampling
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.subject import Subject
@@ -38,9 +37,8 @@ LIMITS = {"limit", "limit.norm", "motors.0"}
 
 
 def find_claims(subject: Subject, turn: float | None = None, tolerance: float | None = None) -> Loop:
-    """Find the claims that can be proved: where motions end, for other inertias, within limits, between samples, and how
-    near to the target the loop that flies comes. turn: what the set within the limits is to hold (rad); tolerance: of the
-    inertia, the largest unless told."""
+    """Find the claims that can be proved: where motions end, for other inertias, within limits, between samples. turn: what
+    the set within the limits is to hold (rad); tolerance: of the inertia, the largest unless told."""
     loop, flown = Loop(subject), subject.loop
     if not flown.remembers:
         if flown.law.lyapunov is not None:
@@ -52,7 +50,6 @@ def find_claims(subject: Subject, turn: float | None = None, tolerance: float | 
         if hasattr(flown.law.module, "surface"):
             find_sliding(loop)
         find_sampled(loop)
-        find_pointed(loop)
     return loop
 
 

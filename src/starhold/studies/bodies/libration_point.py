@@ -63,7 +63,7 @@ class LibrationPointStudy(BodyStudy):
     def resources(self, entry: LawEntry) -> Values:
         return {"limit": (entry.options.limit, "1")} | ({"lag": (entry.options.lag, "1")} if entry.options.lag else {})
 
-    def certify(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
+    def certify(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing: bool = False) -> list[Issued]:
         from starhold.certification.station import certify_station
 
         return [Issued(certify_station(loop, entry.name), loop)]

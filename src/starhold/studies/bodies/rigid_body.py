@@ -87,8 +87,8 @@ class RigidBodyStudy(BodyStudy):
 
         return call_costs(loop, recorded_states(loop, run))
 
-    def certify(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
-        return certify_law(scenario, entry, loop)
+    def certify(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing: bool = False) -> list[Issued]:
+        return certify_law(scenario, entry, loop, pointing)
 
     def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
         from starhold.analysis.departure import departures
@@ -125,13 +125,13 @@ def _differs(event: Event, issued: Issued) -> bool:
     return not (same and all(same_numbers(one.params, other.params) for one, other in pairs))
 
 
-def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[Issued]:
+def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing: bool = False) -> list[Issued]:
     """The certificates of one law of the scenario, with the claims that its [certify] table asks for: as it starts, and from
     each time on at which wheels, gains or craft are others and the law knows of it."""
     from starhold.certification.certify import Wanted, certify
 
     table = scenario.table.certify
-    wanted = Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum)
+    wanted = Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum, pointing)
     if mode_laws(loop.law, loop.gains):
         return certify_modes(loop, entry.name, wanted)
     return [Issued(certify(now, name, wanted), now, step) for name, now, step in _named(scenario, entry, loop)]
