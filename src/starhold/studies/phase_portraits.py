@@ -108,7 +108,7 @@ def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
     width = np.array([0.5 * (high - low) for low, high in what.box[2:moving]])
     for step in range(STEPS):
         centre = best.copy()
-        side = np.linspace(-1.0, 1.0, 9 if step == 0 else 3)
+        side = np.linspace(-1.0, 1.0, 9 if step == 0 and len(width) < 4 else 3)
         for offset in np.array(np.meshgrid(*[side] * len(width))).reshape(len(width), -1).T:
             tried = centre.copy()
             tried[2:moving] += (offset * width)[:, None]
@@ -124,11 +124,12 @@ class _Rates:
 
     def __init__(self, what: Candidate, moving: int) -> None:
         pieces = what.pieces
-        self._moving = moving
+        self._moving, self._system = moving, what.system
         self._surfaces = [Floats(surface) for surface in pieces.surfaces]
         self._cells = [(cell.signs, [Floats(rate) for rate in cell.rates[:moving]]) for cell in pieces.cells]
 
     def __call__(self, points: Any) -> Any:
+        points = self._system.with_angles(points)
         speeds = np.full((self._moving, points.shape[1]), np.nan)
         sides, free = [surface.at(points) for surface in self._surfaces], np.ones(points.shape[1], dtype=bool)
         for signs, rates in self._cells:

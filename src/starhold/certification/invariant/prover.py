@@ -28,6 +28,8 @@ LESS = (1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1)
 HALVINGS = 18
 CLOSE, FAR = 1e-5, 5e-4
 """How close floats come to the largest level, of one cell and of more."""
+DEGREES = {False: (0, 2), True: (0, 2, 4)}
+"""Degrees above that of what is to be shown, without and with angles, whose series want more."""
 SLOPES = (0, 1, -1, 8, -8, 64, -64)
 """Multiples of a surface by which V is bent where it is crossed."""
 
@@ -92,7 +94,8 @@ class Attempt:
 
     def shown(self, o: Sum, exact: bool = True, name: str = "") -> dict[str, Any] | None:
         """Return evidence for a sum, None where none was found."""
-        return find(o, self.scales, self.basis if name.startswith("changes") else None, exact=exact)
+        basis = self.basis if name.startswith("changes") else None
+        return find(o, self.scales, basis, DEGREES[bool(self.system.angles)], exact)
 
 
 def proved(attempt: Attempt, top: float, escape: Poly | None) -> dict[str, Any] | str:

@@ -27,10 +27,11 @@ from starhold.certification.invariant import search
 from starhold.certification.invariant.candidate import Candidate
 from starhold.certification.invariant.prover import Attempt, proved, scales
 from starhold.certification.invariant.recording import program
-from starhold.certification.invariant.system import System, plain
+from starhold.certification.invariant.system import System, plain, turned
 from starhold.kernel.check import prove as kernel_proves
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import Poly as Exact
+from starhold.kernel.polynomials import var
 from starhold.kernel.reading import Claim as KernelClaim
 from starhold.kernel.reading import read_certificate
 
@@ -58,7 +59,7 @@ class WantedSet:
     variables and parameters; `equilibrium`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
     of M; `squares`: functions that vanish on M, of whose multiples squares are made; `known`: the area (or
-    volume) of the true region, if somebody knows it."""
+    volume) of the true region, if somebody knows it; `published`: the largest level that somebody has shown."""
 
     theorem: str
     V: Any
@@ -68,6 +69,7 @@ class WantedSet:
     escape: Any = None
     squares: tuple[Any, ...] = ()
     known: float | None = None
+    published: float | None = None
     name: str = ""
 
 
@@ -98,7 +100,14 @@ def show(system: System, wanted: WantedSet) -> Shown:
         raise ValueError(f"a box of {len(wanted.box)} sides for {len(system.names)} variables and parameters")
     if wanted.equilibrium is not None and len(wanted.equilibrium) != len(system.variables):
         raise ValueError(f"an equilibrium of {len(wanted.equilibrium)} numbers for {len(system.variables)} variables")
-    point = None if wanted.equilibrium is None else (*map(exact, wanted.equilibrium), *(None for _ in system.parameters))
+    if system.angles and (wanted.equilibrium is None or wanted.theorem == "unstable"):
+        raise ValueError(f"{wanted.theorem} with angles: sets and states with a sine or cosine have no exact values")
+    if any(wanted.equilibrium[system.variables.index(x)] for x in system.angles if wanted.equilibrium):
+        raise ValueError("an equilibrium at which an angle is not zero")
+    point = None
+    if wanted.equilibrium is not None:
+        others = (*(None for _ in system.parameters), *map(exact, (0, 1) * len(system.angles)))
+        point = (*map(exact, wanted.equilibrium), *others)
     what = Candidate(system, indicator(wanted), wanted.box, point)
     return _Proof(wanted, what).shown()
 
@@ -109,7 +118,7 @@ class _Proof:
     def __init__(self, wanted: WantedSet, what: Candidate) -> None:
         self.wanted, self.what = wanted, what
         system = what.system
-        self.programs = {"rates": program(system.rates, system.names), "V": program([what.V], system.names)}
+        self.programs = {"rates": program(system.rates, system.inputs), "V": program([what.V], system.inputs)}
         self.unstable = wanted.theorem == "unstable"
         self.numbers: dict[str, Any] = {"theorem": wanted.theorem}
         if wanted.level is not None and not self.unstable:
@@ -150,15 +159,21 @@ class _Proof:
             point = dict(zip(system.variables, (fraction(exact(x)) for x in wanted.equilibrium), strict=True))
         told = {f"equilibrium.{x}": v for x, v in point.items()} | numbers
         sizes = scales(box, {x: float(v) for x, v in point.items()})
+        for x in system.angles:
+            sizes |= {turned("sin", x): min(sizes[x], 1.0), turned("cos", x): min(sizes[x] ** 2 / 2.0, 2.0)}
         basis = [self.polynomial(h) for h in wanted.squares] or None
         return Attempt(theorem, self.programs, subject, {x: str(v) for x, v in told.items()}, sizes, basis, taken=taken)
 
     def polynomial(self, function: Any) -> Exact:
-        """Return a function that is not piecewise as the kernel has it."""
-        found = plain(self.what.system, function).to_dict().items()
-        names = self.what.system.names
+        """Return a function that is not piecewise as the kernel has it: from the equilibrium, of a cosine what it lacks."""
+        system = self.what.system
+        found = plain(system, function).to_dict().items()
+        names = system.inputs
         terms = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in found}
-        return Exact({tuple(sorted(m)): Fraction(int(c.p), int(c.q)) for m, c in terms.items()})
+        point = zip(system.variables, self.wanted.equilibrium or (), strict=False)
+        about = {x: var(x) + fraction(exact(at)) for x, at in point}
+        about |= {cosine: 1 - var(cosine) for cosine in (turned("cos", x) for x in system.angles)}
+        return Exact({tuple(sorted(m)): Fraction(int(c.p), int(c.q)) for m, c in terms.items()}).at(about)
 
     def proof(self) -> dict[str, Any] | str:
         """Return the claim with evidence that the kernel accepts, or why there is none."""
@@ -186,6 +201,8 @@ class _Proof:
     def refutations(self) -> list[tuple[str, str, Callable[[], dict[str, Any] | None]]]:
         """Return what may refute the claim: the names of what is needed and of how V fails, and a search for a state."""
         what, level = self.what, self.wanted.level
+        if what.system.angles:
+            return []
         sense, word = (-1, "does not grow") if self.unstable else (1, "does not fall")
         found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
         found.append(("continuous", "jumps", lambda: search.jump(what)))
@@ -222,7 +239,7 @@ class _Proof:
     def tell(self) -> None:
         """Say how near the level is to what refutes, and about how large the set."""
         what, numbers = self.what, self.numbers
-        if self.wanted.theorem in ("region", "intersection") and self.wanted.level is None:
+        if self.wanted.theorem in ("region", "intersection") and self.wanted.level is None and not what.system.angles:
             rising, border = (find(what, math.inf, digits=search.NEAR) for find in (search.rising, search.reaching))
             kinds = {"V rises": rising, "border": border}
             above = {kind: float(found["V"]) for kind, found in kinds.items() if found}
