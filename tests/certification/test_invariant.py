@@ -149,9 +149,8 @@ def test_sine_and_cosine_of_an_angle():
     box = ((-2.0, 2.0), (-4.0, 4.0))
     found = claim(PENDULUM, "attracts", ENERGY, box, (0, 0), 1.0, variables="x v", angles="x")
     assert found.outcome == "proved"
-    # Upside down, a weight does not come to rest.
-    fallen = claim(("v", "sin(x) - v"), "attracts", ENERGY, box, (0, 0), 1.0, variables="x v", angles="x")
-    assert fallen.outcome == "undecided"
+    negative = claim(PENDULUM, "attracts", "2*(1 - cos(x)) - v**2", box, (0, 0), 1.0, variables="x v", angles="x")
+    assert outcomes(negative) == {"positive": "undecided"}
     for theorem, point, said in (("unstable", (0, 0), "no exact values"), ("region", (1, 0), "not zero")):
         with pytest.raises(ValueError, match=said):
             claim(PENDULUM, theorem, ENERGY, box, point, variables="x v", angles="x")
@@ -164,6 +163,15 @@ def test_v_along_an_angle_is_what_differences_say():
     now, then = (Values(what, points) for points in (state, ahead))
     assert now.V[0] == pytest.approx(2 * (1 - np.cos(0.7)) - 0.105 + 0.09)
     assert now.slope[0] == pytest.approx((then.V[0] - now.V[0]) / step, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "rates",
+    [("-x + x*y", "-y"), ("4*x**3 - x**2*y - 6*x*y**2 - y**3", "x**3 + 4*x**2*y + x*y**2 - 6*y**3")],
+)
+def test_what_no_polynomial_shows_is_not_proved(rates):
+    """All motions come to rest, but V' of no polynomial V is negative everywhere (Ahmadi, Krstic, Parrilo 2011)."""
+    assert claim(rates, "region", ROUND, ((-9.0, 9.0), (-9.0, 9.0)), (0, 0), level=80.0).outcome != "proved"
 
 
 # --- theorem 3 ------------------------------------------------------------------------------------------------------------
@@ -211,6 +219,45 @@ def test_intersection_that_one_function_leaves():
 def test_intersection_where_one_function_stands_still_is_undecided():
     found = claim(("0", "-y"), "intersection", ("x**2 - 1", "y**2 - 1"))
     assert found.outcome == "undecided"
+
+
+# --- barriers -------------------------------------------------------------------------------------------------------------
+
+
+def between(rates, V, unsafe=("x + y - 3",), **more):
+    sets = {"start": ("1 - x**2", "1 - y**2"), "unsafe": unsafe}
+    return claim(rates, "avoids", V, **{name: tuple(map(expression, own)) for name, own in sets.items()}, **more)
+
+
+def test_a_barrier_parts_what_starts_from_what_is_unsafe():
+    found = between(("-x", "-y"), f"{ROUND} - 3")
+    assert (found.outcome, found.numbers["within"]) == ("proved", False)
+    assert sentence(found) == "no motion from the start set comes to the unsafe set"
+    # Where only the box holds motions back from x^2 + y^2 > 8.
+    boxed = between(("-x*(8 - x**2 - y**2)", "-y*(8 - x**2 - y**2)"), f"({ROUND} - 3)*(9 - x**2 - y**2)")
+    assert (boxed.outcome, boxed.numbers["within"]) == ("proved", True)
+    assert "while it stays in the box" in sentence(boxed)
+
+
+@pytest.mark.parametrize(
+    ("rates", "V", "name"),
+    [
+        (("-x", "-y"), f"{ROUND} - 1.5", "start"),
+        (("-x", "-y"), f"{ROUND} - 6", "unsafe"),
+        (("x", "y"), f"{ROUND} - 3", "barrier"),
+        (("1", "0"), f"{ROUND} - 3", "barrier"),
+    ],
+)
+def test_a_false_barrier_is_not_proved(rates, V, name):
+    found = between(rates, V)
+    assert (found.outcome, found.obligations[0].name) == ("undecided", name)
+
+
+def test_sets_of_a_barrier_hold_a_state():
+    with pytest.raises(ValueError, match="empty"):
+        between(("-x", "-y"), f"{ROUND} - 3", ("-1 - x**2",))
+    with pytest.raises(ValueError, match="no equilibrium"):
+        between(("-x", "-y"), f"{ROUND} - 3", equilibrium=ORIGIN)
 
 
 # --- right-hand sides that jump ------------------------------------------------------------------------------------------

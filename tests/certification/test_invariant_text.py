@@ -221,6 +221,7 @@ def test_what_is_wrong_with_a_file_is_one_line(old, new, key, said):
     ("theorem", "more", "key", "said"),
     [
         ("unstable", ORIGIN, "theorem", "another theorem"),
+        ("avoids", 'start = ["x"]\nunsafe = ["y"]', "theorem", "another theorem"),
         ("region", "", "equilibrium", "an equilibrium, as the system has sin or cos"),
         ("region", "equilibrium = { x = 1, y = 0 }", "equilibrium.x", "found an angle"),
     ],
@@ -228,6 +229,27 @@ def test_what_is_wrong_with_a_file_is_one_line(old, new, key, said):
 def test_what_is_not_said_of_angles_is_one_line(theorem, more, key, said):
     with refused(said, start=f"a.toml: claim[1].{key}"):
         parse(file("y", "-sin(x) - y", '"1 - cos(x) + y**2"', theorem, more), "a.toml")
+
+
+SETS = 'start = ["1 - x**2", "1 - y**2"]\nunsafe = ["x + y - 3"]'
+
+
+@pytest.mark.parametrize(
+    ("theorem", "more", "key", "said"),
+    [
+        ("avoids", 'start = ["1 - x**2"]', "unsafe", "this key is required"),
+        ("avoids", SETS.replace("1 - y**2", "x - 1.5"), "start", "found a set that is empty"),
+        ("avoids", SETS.replace('["x + y - 3"]', "[]"), "unsafe", "found a set that is empty"),
+        ("avoids", SETS.replace("x + y - 3", "-1 - x**2"), "unsafe", "found a set that is empty"),
+        ("avoids", SETS.replace("x + y - 3", "abs(x) - 1"), "unsafe[1]", "one polynomial"),
+        ("avoids", f"{SETS}\n{ORIGIN}", "equilibrium", "alone"),
+        ("region", f"{SETS}\n{ORIGIN}", "start", 'theorem = "avoids"'),
+    ],
+)
+def test_sets_of_a_barrier_are_told_and_not_empty(theorem, more, key, said):
+    assert len(parse(file(theorem="avoids", more=SETS), "b.toml").claims[0].start) == 2
+    with refused(said, start=f"b.toml: claim[1].{key}"):
+        parse(file(theorem=theorem, more=more), "b.toml")
 
 
 def test_angles_are_the_variables_whose_sine_or_cosine_occurs():

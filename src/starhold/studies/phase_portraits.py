@@ -13,7 +13,7 @@ from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.invariant import InvariantProblem, System, WantedSet
 from starhold.certification.invariant.candidate import Candidate, Floats
 from starhold.certification.invariant.search import Values
-from starhold.certification.invariant.theorems import indicator
+from starhold.certification.invariant.theorems import common, indicator
 
 POINTS = 400
 """Along each side of a portrait."""
@@ -30,8 +30,8 @@ class Portrait:
     """The plane of the first two variables with what a claim says there, parameters in the middle of their intervals.
 
     x, y: (n,); V: (n, n), by y, then x, with more variables the least (unstable: greatest) over them; u, v: the same shape,
-    None with more; orbit: (2, points), the border of the true region, with its area; marks: states that refute. One
-    variable: no arrays."""
+    None with more; orbit: (2, points), the border of the true region, with its area; marks: states that refute; sets:
+    functions (n, n) that are not negative in the start and unsafe sets. One variable: no arrays."""
 
     claim: Claim
     names: tuple[str, ...]
@@ -44,6 +44,7 @@ class Portrait:
     orbit_area: float | None = None
     marks: tuple[tuple[float, float], ...] = ()
     equilibrium: tuple[float, float] | None = None
+    sets: tuple[Any, ...] = ()
 
 
 def portraits(problem: InvariantProblem, certificate: Certificate) -> list[Portrait]:
@@ -99,7 +100,9 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
     marked = tuple((mark[names[0]], mark[names[1]]) for mark in marks)
     equilibrium = None if wanted.equilibrium is None else (float(wanted.equilibrium[0]), float(wanted.equilibrium[1]))
     area = None if orbit is None else _area(orbit)
-    return Portrait(claim, names, x, y, V, u, v, orbit, area, marked, equilibrium)
+    least = (common(functions) for functions in (wanted.start, wanted.unsafe) if flat and functions)
+    sets = tuple(Values(Candidate(problem.system, f, wanted.box), points).V.reshape(shape) for f in least)
+    return Portrait(claim, names, x, y, V, u, v, orbit, area, marked, equilibrium, sets)
 
 
 def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:

@@ -18,7 +18,7 @@ from starhold.certification.certificate import Certificate
 from starhold.certification.evidence.finding import certificate as kernel_certificate
 from starhold.certification.invariant.system import TURNED, System, split, turned
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
-from starhold.certification.invariant.theorems import THEOREMS, Shown, WantedSet, indicator, show
+from starhold.certification.invariant.theorems import THEOREMS, Shown, WantedSet, a_state, indicator, show
 from starhold.errors import InputError
 from starhold.files import read_text
 
@@ -26,7 +26,8 @@ MOVING, MOST, LARGEST, LONGEST = 7, 9, 1e100, 100
 """Variables, and with parameters, beyond which no evidence would be found; numbers of a box, of which floats hold the
 powers; characters of a name."""
 _KEYS = ("name", "description", "variables", "parameters", "define", "rates", "box", "claim")
-_CLAIM = ("name", "theorem", "V", "box", "equilibrium", "level", "escape", "squares", "known", "published", "orbit")
+_NUMBERS = ("level", "known", "published")
+_CLAIM = ("name", "theorem", "V", "box", "equilibrium", "escape", "squares", "start", "unsafe", "orbit", *_NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,8 @@ class _File:
             raise InputError(self.where, "claim", _show(claims), "at least one [[claim]] table")
         tables = [self._table(item, f"claim[{k}]") for k, item in enumerate(cast(list[Any], claims), 1)]
         wanted = [self._claim(table, f"claim[{k}]") for k, table in enumerate(tables, 1)]
-        held = {x for value in (*read_rates, *(indicator(item[0]) for item in wanted)) for x in _names(value)}
+        functions = [f for item, _ in wanted for f in (indicator(item), *item.start, *item.unsafe)]
+        held = {x for value in (*read_rates, *functions) for x in _names(value)}
         angles = (x for x in self.variables if held.intersection(turned(f, x) for f in TURNED))
         system = System(self.variables, read_rates, tuple(self.parameters), tuple(angles))
         for k, (item, _) in enumerate(wanted, 1):
@@ -140,7 +142,7 @@ class _File:
         if any(point is not None for point in points):
             names = self.variables
             written["equilibrium"] = [at and {n: str(x) for n, x in zip(names, at, strict=True)} for at in points]
-        for key in ("escape", "squares"):
+        for key in ("escape", "squares", "start", "unsafe"):
             if any(key in table for table in tables):
                 written[key] = [table.get(key) for table in tables]
         return InvariantProblem(
@@ -178,17 +180,27 @@ class _File:
         V = self._indicator(self._required(table, "V", key), theorem, f"{key}.V")
         at = self._state(table["equilibrium"], f"{key}.equilibrium") if "equilibrium" in table else None
         escape = self._polynomial(table["escape"], f"{key}.escape") if "escape" in table else None
-        listed = self._list(table.get("squares", []), f"{key}.squares")
-        squares = tuple(self._polynomial(h, f"{key}.squares[{k}]") for k, h in enumerate(listed, 1))
-        level, known, published = (self._positive(table, name, key) for name in ("level", "known", "published"))
+        squares = self._polynomials(table.get("squares", []), f"{key}.squares")
+        sets = dict[str, tuple[Any, ...]]()
+        for name in ("start", "unsafe"):
+            if theorem == "avoids":
+                self._required(table, name, key)
+            elif name in table:
+                raise InputError(self.where, f"{key}.{name}", f'a set with theorem "{theorem}"', 'theorem = "avoids"')
+            sets[name] = self._polynomials(table.get(name, []), f"{key}.{name}")
+        if theorem == "avoids" and at is not None:
+            raise InputError(self.where, f"{key}.equilibrium", "a point", "a start and an unsafe set alone")
+        numbers = {name: self._positive(table, name, key) for name in _NUMBERS}
         orbit = tuple(float(x) for x in self._state(table["orbit"], f"{key}.orbit")) if "orbit" in table else None
         exactly = None if at is None else tuple(exact(x) for x in at)
         name = self._text(table, "name", key, "")
-        return WantedSet(theorem, V, self._box(table, key), exactly, level, escape, squares, known, published, name), orbit
+        more: dict[str, Any] = {"escape": escape, "squares": squares, **numbers, **sets}
+        return WantedSet(theorem, V, self._box(table, key), exactly, name=name, **more), orbit
 
     def _fits(self, system: System, wanted: WantedSet, key: str) -> None:
-        if system.angles and wanted.theorem == "unstable":
-            raise InputError(self.where, f"{key}.theorem", '"unstable" of a system with sin or cos', "another theorem")
+        if system.angles and wanted.theorem in ("unstable", "avoids"):
+            found = f'"{wanted.theorem}" of a system with sin or cos'
+            raise InputError(self.where, f"{key}.theorem", found, "another theorem")
         if system.angles and wanted.equilibrium is None:
             raise InputError(self.where, f"{key}.equilibrium", "nothing", "an equilibrium, as the system has sin or cos")
         for x in system.angles:
@@ -198,6 +210,11 @@ class _File:
             split(system, indicator(wanted))
         except ValueError as error:
             raise InputError(self.where, f"{key}.V", str(error), "fewer comparisons, or lower powers") from None
+        for name in ("start", "unsafe") if wanted.theorem == "avoids" else ():
+            try:
+                a_state(system, wanted, getattr(wanted, name))
+            except ValueError as error:
+                raise InputError(self.where, f"{key}.{name}", str(error), "one that holds a state of the box") from None
 
     def _indicator(self, value: Any, theorem: str, key: str) -> Any:
         if theorem != "intersection":
@@ -210,6 +227,9 @@ class _File:
         if not isinstance(value, list):
             raise InputError(self.where, key, _show(value), "a list of expressions")
         return cast(list[Any], value)
+
+    def _polynomials(self, value: Any, key: str) -> tuple[Any, ...]:
+        return tuple(self._polynomial(h, f"{key}[{k}]") for k, h in enumerate(self._list(value, key), 1))
 
     def _polynomial(self, value: Any, key: str) -> Any:
         found = self._expression(value, key)

@@ -7,20 +7,21 @@ M is a compact set, V its indicator: continuous, zero on M and positive elsewher
 * `region` (its corollary): all motions that start in {V <= level} stay there and come to M.
 * `unstable` (theorem 3): V' > 0 wherever V > 0 in a neighbourhood; V need be positive somewhere in every neighbourhood only.
 * `intersection` (theorem 4): M is where none of several V_k is positive, and each falls outside. Their maximum is a V.
+* `avoids`: no motion from one set comes to another. V <= 0 on the one, V > 0 on the other, V' <= c V with a polynomial c.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from typing import Any
 
 from starhold.algebra.polynomial import exact
-from starhold.algebra.scalar import maximum
+from starhold.algebra.scalar import maximum, minimum
 from starhold.certification.certificate import Claim, Obligation
 from starhold.certification.evidence.finding import certificate
 from starhold.certification.invariant import search
@@ -36,12 +37,12 @@ from starhold.kernel.reading import Claim as KernelClaim
 from starhold.kernel.reading import read_certificate
 
 SQUARES, VERIFIED = "sums of squares", "exact inequality"
-KERNEL = {"stable": "is stable", "unstable": "is unstable"}
+KERNEL = {"stable": "is stable", "unstable": "is unstable", "avoids": "avoids"}
 """The kernel's theorems; the others are about what attracts."""
-THEOREMS = ("stable", "attracts", "region", "unstable", "intersection")
+THEOREMS = ("stable", "attracts", "region", "unstable", "intersection", "avoids")
 STEPS = {
     "positive": "positive", "border": "bounded", "changes": "falls", "agree": "switching", "continuous": "continuous",
-    "never": "falls",
+    "never": "falls", "start": "start", "unsafe": "unsafe", "barrier": "barrier",
 }  # fmt: skip
 """What the kernel's obligations are about."""
 ASSUMPTIONS = (
@@ -58,8 +59,9 @@ class WantedSet:
     """One claim to be shown. `V`: a polynomial or piecewise one, for `intersection` several; `box`: where, in the order of
     variables and parameters; `equilibrium`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
-    of M; `squares`: functions that vanish on M, of whose multiples squares are made; `known`: the area (or
-    volume) of the true region, if somebody knows it; `published`: the largest level that somebody has shown."""
+    of M; `squares`: functions that vanish on M, of whose multiples squares are made; `start` and `unsafe`, for `avoids`:
+    functions of which none is negative in these sets; `known`: the area (or volume) of the true region, if somebody knows
+    it; `published`: the largest level that somebody has shown."""
 
     theorem: str
     V: Any
@@ -68,6 +70,8 @@ class WantedSet:
     level: float | None = None
     escape: Any = None
     squares: tuple[Any, ...] = ()
+    start: tuple[Any, ...] = ()
+    unsafe: tuple[Any, ...] = ()
     known: float | None = None
     published: float | None = None
     name: str = ""
@@ -87,6 +91,19 @@ def indicator(wanted: WantedSet) -> Any:
     return reduce(maximum, (*wanted.V, 0)) if wanted.theorem == "intersection" else wanted.V
 
 
+def common(functions: Sequence[Any]) -> Any:
+    """Return the function that is not negative where none of several is."""
+    return reduce(minimum, functions)
+
+
+def a_state(system: System, wanted: WantedSet, functions: Sequence[Any]) -> tuple[Any, ...]:
+    """Return an exact state at which none of these functions is negative; ValueError where none is found in the box."""
+    state = search.member(Candidate(system, 0 - common(functions), wanted.box), 0.0) if functions else None
+    if state is None:
+        raise ValueError("a set that is empty, as far as states of the box tell")
+    return state
+
+
 def prove(system: System, wanted: WantedSet) -> Claim:
     """Return the claim with what was shown of it."""
     return show(system, wanted).claim
@@ -102,6 +119,8 @@ def show(system: System, wanted: WantedSet) -> Shown:
         raise ValueError(f"an equilibrium of {len(wanted.equilibrium)} numbers for {len(system.variables)} variables")
     if system.angles and (wanted.equilibrium is None or wanted.theorem == "unstable"):
         raise ValueError(f"{wanted.theorem} with angles: sets and states with a sine or cosine have no exact values")
+    if wanted.theorem == "avoids" and wanted.equilibrium is not None:
+        raise ValueError("what avoids a set has no equilibrium")
     if any(wanted.equilibrium[system.variables.index(x)] for x in system.angles if wanted.equilibrium):
         raise ValueError("an equilibrium at which an angle is not zero")
     point = None
@@ -118,7 +137,14 @@ class _Proof:
     def __init__(self, wanted: WantedSet, what: Candidate) -> None:
         self.wanted, self.what = wanted, what
         system = what.system
-        self.programs = {"rates": program(system.rates, system.inputs), "V": program([what.V], system.inputs)}
+        self.programs = {
+            "rates": program(system.rates, system.inputs),
+        }
+        self.states: dict[str, tuple[Any, ...]] = {}
+        for role in ("start", "unsafe") if wanted.theorem == "avoids" else ():
+            self.states[role] = a_state(system, wanted, getattr(wanted, role))
+            self.programs[role] = program([common(getattr(wanted, role))], system.inputs)
+        self.programs["V"] = program([what.V], system.inputs)
         self.unstable = wanted.theorem == "unstable"
         self.numbers: dict[str, Any] = {"theorem": wanted.theorem}
         if wanted.level is not None and not self.unstable:
@@ -128,7 +154,7 @@ class _Proof:
 
     def shown(self) -> Shown:
         """Return the claim with its outcome."""
-        kernel = self.proof()
+        kernel = self.avoided() if self.states else self.proof()
         if not isinstance(kernel, str):
             statement = kernel_proves(claim_of(kernel, self.programs)).statement
             if "level" in kernel["numbers"]:
@@ -149,11 +175,15 @@ class _Proof:
         claim = Claim(f"invariant-{self.wanted.theorem}", self.numbers, self.witness, assumptions, (obligation,))
         return Shown(claim, kernel, tuple(self.programs.values()))
 
-    def attempt(self, theorem: str, numbers: dict[str, Fraction], taken: tuple[str, ...] = ()) -> Attempt:
-        """Return a claim for the kernel without evidence."""
+    def attempt(
+        self, theorem: str, numbers: dict[str, Fraction], taken: tuple[str, ...] = (), within: bool = True
+    ) -> Attempt:
+        """Return a claim for the kernel without evidence, of the box, or of all states."""
         wanted, system = self.wanted, self.what.system
         box = dict(zip(system.names, wanted.box, strict=True))
         subject = {f"box.{x}.{k}": str(Fraction(end)) for x, ends in box.items() for k, end in enumerate(ends)}
+        if not within:
+            subject = {f"box.{x}.{k}": subject[f"box.{x}.{k}"] for x in system.parameters for k in (0, 1)}
         point: dict[str, Any] = {}
         if wanted.equilibrium is not None:
             point = dict(zip(system.variables, (fraction(exact(x)) for x in wanted.equilibrium), strict=True))
@@ -198,10 +228,20 @@ class _Proof:
         escape = None if wanted.escape is None else self.polynomial(wanted.escape)
         return proved(self.attempt(KERNEL.get(wanted.theorem, "attracts"), numbers), top, escape)
 
+    def avoided(self) -> dict[str, Any] | str:
+        """Return the claim that one set avoids another with its evidence: of all states, or else in the box."""
+        names = self.what.system.names
+        numbers = {f"{role}.{x}": fraction(v) for role, at in self.states.items() for x, v in zip(names, at, strict=True)}
+        for self.numbers["within"] in (False, True):
+            found = proved(self.attempt("avoids", numbers, within=self.numbers["within"]), math.inf, None)
+            if not isinstance(found, str):
+                break
+        return found
+
     def refutations(self) -> list[tuple[str, str, Callable[[], dict[str, Any] | None]]]:
         """Return what may refute the claim: the names of what is needed and of how V fails, and a search for a state."""
         what, level = self.what, self.wanted.level
-        if what.system.angles:
+        if what.system.angles or self.states:
             return []
         sense, word = (-1, "does not grow") if self.unstable else (1, "does not fall")
         found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
