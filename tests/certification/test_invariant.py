@@ -174,6 +174,41 @@ def test_what_no_polynomial_shows_is_not_proved(rates):
     assert claim(rates, "region", ROUND, ((-9.0, 9.0), (-9.0, 9.0)), (0, 0), level=80.0).outcome != "proved"
 
 
+def nested(V, core=ROUND, rates=("-x + x**3", "-y"), **more):
+    return claim(rates, "region", V, core=expression(core), equilibrium=ORIGIN, **more)
+
+
+def test_v_that_has_no_least_value_at_the_equilibrium_leads_into_a_proved_set():
+    V = f"{ROUND} + x/50 - 1/5"
+    alone = claim(("-x + x**3", "-y"), "region", V.removesuffix(" - 1/5"), equilibrium=ORIGIN)
+    assert alone.outcome != "proved"
+    found = nested(V)
+    assert found.outcome == "proved"
+    # V is 1/5 less than about x^2 + y^2, which falls up to 1.
+    assert 0.75 < found.numbers["level"] < 0.83
+    assert 0.99 < found.numbers["core"] < 1.0
+    assert "come to the equilibrium" in sentence(found)
+    assert claim(("-x + x**3", "-y"), "region", V, core=expression(f"{ROUND} - 1/10")).outcome == "proved"
+
+
+@pytest.mark.parametrize(
+    ("V", "core", "rates"),
+    [
+        # V does not fall up to its zero; the core holds less than that; the core does not attract.
+        (f"{ROUND} - 2", ROUND, ("-x + x**3", "-y")),
+        (f"{ROUND} - 1/2", f"({ROUND})*(1 - 4*({ROUND}))", ("-x", "-y")),
+        (f"{ROUND} - 1", ROUND, (f"-x*({ROUND} - 1/2)", f"-y*({ROUND} - 1/2)")),
+    ],
+)
+def test_what_does_not_lead_into_a_proved_set_is_not_proved(V, core, rates):
+    assert nested(V, core, rates).outcome != "proved"
+
+
+def test_a_core_is_told_of_what_attracts():
+    with pytest.raises(ValueError, match="a core"):
+        claim(("-x", "-y"), "stable", ROUND, core=expression(ROUND), equilibrium=ORIGIN)
+
+
 # --- theorem 3 ------------------------------------------------------------------------------------------------------------
 
 

@@ -223,6 +223,7 @@ def test_what_is_wrong_with_a_file_is_one_line(old, new, key, said):
         ("unstable", ORIGIN, "theorem", "another theorem"),
         ("avoids", 'start = ["x"]\nunsafe = ["y"]', "theorem", "another theorem"),
         ("region", "", "equilibrium", "an equilibrium, as the system has sin or cos"),
+        ("region", f'core = "x**2"\n{ORIGIN}', "core", "V alone"),
         ("region", "equilibrium = { x = 1, y = 0 }", "equilibrium.x", "found an angle"),
     ],
 )
@@ -244,6 +245,7 @@ SETS = 'start = ["1 - x**2", "1 - y**2"]\nunsafe = ["x + y - 3"]'
         ("avoids", SETS.replace("x + y - 3", "abs(x) - 1"), "unsafe[1]", "one polynomial"),
         ("avoids", f"{SETS}\n{ORIGIN}", "equilibrium", "alone"),
         ("region", f"{SETS}\n{ORIGIN}", "start", 'theorem = "avoids"'),
+        ("stable", f'core = "x**2"\n{ORIGIN}', "core", "theorem attracts or region"),
     ],
 )
 def test_sets_of_a_barrier_are_told_and_not_empty(theorem, more, key, said):

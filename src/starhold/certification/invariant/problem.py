@@ -27,7 +27,7 @@ MOVING, MOST, LARGEST, LONGEST = 7, 9, 1e100, 100
 powers; characters of a name."""
 _KEYS = ("name", "description", "variables", "parameters", "define", "rates", "box", "claim")
 _NUMBERS = ("level", "known", "published")
-_CLAIM = ("name", "theorem", "V", "box", "equilibrium", "escape", "squares", "start", "unsafe", "orbit", *_NUMBERS)
+_CLAIM = ("name", "theorem", "V", "box", "equilibrium", "escape", "squares", "core", "start", "unsafe", "orbit", *_NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class _File:
             raise InputError(self.where, "claim", _show(claims), "at least one [[claim]] table")
         tables = [self._table(item, f"claim[{k}]") for k, item in enumerate(cast(list[Any], claims), 1)]
         wanted = [self._claim(table, f"claim[{k}]") for k, table in enumerate(tables, 1)]
-        functions = [f for item, _ in wanted for f in (indicator(item), *item.start, *item.unsafe)]
+        functions = [f for item, _ in wanted for f in (indicator(item), item.core or 0, *item.start, *item.unsafe)]
         held = {x for value in (*read_rates, *functions) for x in _names(value)}
         angles = (x for x in self.variables if held.intersection(turned(f, x) for f in TURNED))
         system = System(self.variables, read_rates, tuple(self.parameters), tuple(angles))
@@ -142,7 +142,7 @@ class _File:
         if any(point is not None for point in points):
             names = self.variables
             written["equilibrium"] = [at and {n: str(x) for n, x in zip(names, at, strict=True)} for at in points]
-        for key in ("escape", "squares", "start", "unsafe"):
+        for key in ("escape", "squares", "core", "start", "unsafe"):
             if any(key in table for table in tables):
                 written[key] = [table.get(key) for table in tables]
         return InvariantProblem(
@@ -181,6 +181,9 @@ class _File:
         at = self._state(table["equilibrium"], f"{key}.equilibrium") if "equilibrium" in table else None
         escape = self._polynomial(table["escape"], f"{key}.escape") if "escape" in table else None
         squares = self._polynomials(table.get("squares", []), f"{key}.squares")
+        core = self._expression(table["core"], f"{key}.core") if "core" in table else None
+        if core is not None and theorem not in ("attracts", "region"):
+            raise InputError(self.where, f"{key}.core", f'a core with theorem "{theorem}"', "theorem attracts or region")
         sets = dict[str, tuple[Any, ...]]()
         for name in ("start", "unsafe"):
             if theorem == "avoids":
@@ -194,20 +197,23 @@ class _File:
         orbit = tuple(float(x) for x in self._state(table["orbit"], f"{key}.orbit")) if "orbit" in table else None
         exactly = None if at is None else tuple(exact(x) for x in at)
         name = self._text(table, "name", key, "")
-        more: dict[str, Any] = {"escape": escape, "squares": squares, **numbers, **sets}
+        more: dict[str, Any] = {"escape": escape, "squares": squares, "core": core, **numbers, **sets}
         return WantedSet(theorem, V, self._box(table, key), exactly, name=name, **more), orbit
 
     def _fits(self, system: System, wanted: WantedSet, key: str) -> None:
         if system.angles and wanted.theorem in ("unstable", "avoids"):
             found = f'"{wanted.theorem}" of a system with sin or cos'
             raise InputError(self.where, f"{key}.theorem", found, "another theorem")
+        if system.angles and wanted.core is not None:
+            raise InputError(self.where, f"{key}.core", "a core of a system with sin or cos", "V alone")
         if system.angles and wanted.equilibrium is None:
             raise InputError(self.where, f"{key}.equilibrium", "nothing", "an equilibrium, as the system has sin or cos")
         for x in system.angles:
             if wanted.equilibrium and wanted.equilibrium[system.variables.index(x)]:
                 raise InputError(self.where, f"{key}.equilibrium.{x}", "an angle at an equilibrium", "zero")
         try:
-            split(system, indicator(wanted))
+            for V in (indicator(wanted), wanted.core):
+                split(system, 0 if V is None else V)
         except ValueError as error:
             raise InputError(self.where, f"{key}.V", str(error), "fewer comparisons, or lower powers") from None
         for name in ("start", "unsafe") if wanted.theorem == "avoids" else ():

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import reduce
 from typing import Any
@@ -59,9 +59,10 @@ class WantedSet:
     """One claim to be shown. `V`: a polynomial or piecewise one, for `intersection` several; `box`: where, in the order of
     variables and parameters; `equilibrium`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
-    of M; `squares`: functions that vanish on M, of whose multiples squares are made; `start` and `unsafe`, for `avoids`:
-    functions of which none is negative in these sets; `known`: the area (or volume) of the true region, if somebody knows
-    it; `published`: the largest level that somebody has shown."""
+    of M; `squares`: functions that vanish on M, of whose multiples squares are made; `core`: in place of V an indicator of
+    M, which is shown to attract from a set that holds {V <= 0}; `start` and `unsafe`, for `avoids`: functions of which none
+    is negative in these sets; `known`: the area (or volume) of the true region, if somebody knows it; `published`: the
+    largest level that somebody has shown."""
 
     theorem: str
     V: Any
@@ -70,6 +71,7 @@ class WantedSet:
     level: float | None = None
     escape: Any = None
     squares: tuple[Any, ...] = ()
+    core: Any = None
     start: tuple[Any, ...] = ()
     unsafe: tuple[Any, ...] = ()
     known: float | None = None
@@ -123,12 +125,18 @@ def show(system: System, wanted: WantedSet) -> Shown:
         raise ValueError("what avoids a set has no equilibrium")
     if any(wanted.equilibrium[system.variables.index(x)] for x in system.angles if wanted.equilibrium):
         raise ValueError("an equilibrium at which an angle is not zero")
+    if wanted.core is not None and (system.angles or wanted.theorem not in ("attracts", "region")):
+        raise ValueError("a core is told of what attracts, in a system without angles")
+    return _Proof(wanted, candidate(system, wanted)).shown()
+
+
+def candidate(system: System, wanted: WantedSet) -> Candidate:
+    """Return the function V of a claim with its box; of the point that M is if no core is about that."""
     point = None
-    if wanted.equilibrium is not None:
+    if wanted.core is None and wanted.equilibrium is not None:
         others = (*(None for _ in system.parameters), *map(exact, (0, 1) * len(system.angles)))
         point = (*map(exact, wanted.equilibrium), *others)
-    what = Candidate(system, indicator(wanted), wanted.box, point)
-    return _Proof(wanted, what).shown()
+    return Candidate(system, indicator(wanted), wanted.box, point)
 
 
 class _Proof:
@@ -137,14 +145,14 @@ class _Proof:
     def __init__(self, wanted: WantedSet, what: Candidate) -> None:
         self.wanted, self.what = wanted, what
         system = what.system
-        self.programs = {
-            "rates": program(system.rates, system.inputs),
-        }
+        self.programs = {"rates": program(system.rates, system.inputs)}
         self.states: dict[str, tuple[Any, ...]] = {}
         for role in ("start", "unsafe") if wanted.theorem == "avoids" else ():
             self.states[role] = a_state(system, wanted, getattr(wanted, role))
             self.programs[role] = program([common(getattr(wanted, role))], system.inputs)
         self.programs["V"] = program([what.V], system.inputs)
+        if wanted.core is not None:
+            self.programs["core"] = program([wanted.core], system.inputs)
         self.unstable = wanted.theorem == "unstable"
         self.numbers: dict[str, Any] = {"theorem": wanted.theorem}
         if wanted.level is not None and not self.unstable:
@@ -161,6 +169,7 @@ class _Proof:
                 self.numbers["level"] = float(Fraction(kernel["numbers"]["level"]))
             self.tell()
             return self.made(Obligation("proof", SQUARES, "proved"), kernel, "filippov" in statement.assumptions)
+        self.programs.pop("core", None)
         for name, word, find in self.refutations():
             state = find()
             if state is not None:
@@ -214,19 +223,35 @@ class _Proof:
             return "V is not positive on the border of the box, or V rises however small it is: border"
         if levelled:
             numbers["level"] = Fraction(wanted.level or 0.0)
-        if what.equilibrium is None:
+        given = dict[str, Any]()
+        if wanted.core is not None:
+            inner = self.inner()
+            if isinstance(inner, str):
+                return inner
+            told = {"core.level" if name == "level" else name: Fraction(x) for name, x in inner["numbers"].items()}
+            numbers |= {name: x for name, x in told.items() if not name.startswith("equilibrium")}
+            given = {f"{name[:-1]}core": hint for name, hint in inner["evidence"].items() if name.endswith(" of V")}
+            self.numbers["core"] = float(numbers["core.level"])
+        if what.equilibrium is None and not any(name.startswith("member") for name in numbers):
             falls = wanted.theorem not in ("stable", "unstable")
             member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if falls else 0.0)
             if member is None:
                 return "no state with V <= 0 was found in the box: member"
             numbers |= {f"member.{x}": fraction(v) for x, v in zip(what.pieces.names, member, strict=True)}
-        elif self.unstable:
+        elif self.unstable and what.equilibrium is not None:
             way = search.ray(what, lambda V, slope: V)
             if way is None:
                 return "no direction was found in which V > 0: direction"
             numbers |= {f"direction.{x}": Fraction(v) for x, v in way["direction"].items()}
         escape = None if wanted.escape is None else self.polynomial(wanted.escape)
-        return proved(self.attempt(KERNEL.get(wanted.theorem, "attracts"), numbers), top, escape)
+        attempt = self.attempt(KERNEL.get(wanted.theorem, "attracts"), numbers)
+        attempt.given = given
+        return proved(attempt, top, escape)
+
+    def inner(self) -> dict[str, Any] | str:
+        """Return the claim of the core alone, or why there is no evidence of it."""
+        alone = replace(self.wanted, V=self.wanted.core, core=None, level=None)
+        return _Proof(alone, candidate(self.what.system, alone)).proof()
 
     def avoided(self) -> dict[str, Any] | str:
         """Return the claim that one set avoids another with its evidence: of all states, or else in the box."""
