@@ -1,6 +1,8 @@
 """The theorems on invariant sets: what is proved, what is refuted and by which state, what stays undecided."""
 
+import json
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from starhold.certification.invariant.search import Values
 from starhold.certification.invariant.wording import OBLIGATIONS, evidence, limit, sentence, size
 from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, proved, system
 
+STORED = json.loads((Path(__file__).parents[2] / "docs" / "generators" / "sets.json").read_text(encoding="utf-8"))
 ORIGIN = (0, 0)
 ROUND = "x**2 + y**2"
 TURNS, DAMPED, SPIRALS = ("y", "-x"), ("y", "-x - y"), ("y", "-x + y/10")
@@ -313,8 +316,9 @@ def test_sliding_to_rest():
 def test_examples_are_proved(name):
     problem, certificate = proved(name)
     assert certificate.outcome == "proved"
-    for wanted, one in zip(problem.claims, certificate.claims, strict=True):
+    for wanted, one, level in zip(problem.claims, certificate.claims, STORED[name]["levels"], strict=True):
         assert sentence(one)
+        assert one.numbers.get("level") == pytest.approx(level, rel=2e-3)
         assert wanted.published is None or one.numbers["level"] >= 0.98 * wanted.published
         assert {o.name for o in one.obligations} <= set(OBLIGATIONS)
 
