@@ -20,7 +20,15 @@ PAGES = {
     **laws.pages(),
     **parts.pages(),
 }
-FILLED = ("../README.md", "index.md", "kernel.md", "law-authors.md", "not-claimed.md", "part-authors.md")
+FILLED = (
+    "../README.md",
+    "index.md",
+    "invariant-sets.md",
+    "kernel.md",
+    "law-authors.md",
+    "not-claimed.md",
+    "part-authors.md",
+)
 
 
 if __name__ == "__main__":

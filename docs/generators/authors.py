@@ -16,6 +16,7 @@ import typer
 
 from generators.kernel import files_table
 from generators.laws import POINT, laws_table
+from generators.sets import sets_table
 from generators.tables import fields_table, first_sentence, signature, table
 from starhold.algebra import quaternion, scalar, several, structured
 from starhold.algebra import vector as vectors
@@ -150,6 +151,7 @@ TABLES = {
     "roles": roles_text,
     "limits of models": limits_table,
     "kernel files": files_table,
+    "invariant sets": sets_table,
     "dice": lambda: methods_table(Dice),
 }
 MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -5,6 +5,7 @@ from functools import cache
 
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.invariant import System, WantedSet, certify, load, prove
+from starhold.certification.invariant.system import TURNED, turned
 from starhold.certification.invariant.text import read
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
@@ -29,26 +30,30 @@ V = {V}
 """
 
 
-def names(variables):
-    return {name: Polynomial.variable(name) for name in variables.split()}
+def names(variables, angles=""):
+    every = [*variables.split(), *(turned(f, x) for x in angles.split() for f in TURNED)]
+    return {name: Polynomial.variable(name) for name in every}
 
 
-def system(rates, variables="x y", parameters=""):
+def system(rates, variables="x y", parameters="", angles=""):
     """A system from texts."""
-    known = names(f"{variables} {parameters}")
-    return System(tuple(variables.split()), tuple(read(rate, known) for rate in rates), tuple(parameters.split()))
+    known = names(f"{variables} {parameters}", angles)
+    found = tuple(read(rate, known) for rate in rates)
+    return System(tuple(variables.split()), found, tuple(parameters.split()), tuple(angles.split()))
 
 
-def expression(text, variables="x y"):
-    return read(text, names(variables))
+def expression(text, variables="x y", angles=""):
+    return read(text, names(variables, angles))
 
 
-def claim(rates, theorem, V, box=SQUARE, equilibrium=None, level=None, escape=None, variables="x y", parameters="", **more):
+def claim(rates, theorem, V, box=SQUARE, equilibrium=None, level=None, escape=None, variables="x y", parameters="",
+          angles="", **more):  # fmt: skip
     """What is shown of a claim that is written as texts."""
     every = f"{variables} {parameters}"
-    indicator = tuple(expression(v, every) for v in V) if isinstance(V, (tuple, list)) else expression(V, every)
+    indicator = tuple(expression(v, every) for v in V) if isinstance(V, (tuple, list)) else expression(V, every, angles)
     tool = None if escape is None else expression(escape, every)
-    return prove(system(rates, variables, parameters), WantedSet(theorem, indicator, box, equilibrium, level, tool, **more))
+    wanted = WantedSet(theorem, indicator, box, equilibrium, level, tool, **more)
+    return prove(system(rates, variables, parameters, angles), wanted)
 
 
 def outcomes(found):

@@ -1,15 +1,20 @@
 """The theorems on invariant sets: what is proved, what is refuted and by which state, what stays undecided."""
 
+import json
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from starhold.algebra.scalar import clip, less, maximum, where
 from starhold.certification.invariant import InvariantProblem, System, WantedSet, builtin_names, certify, prove
+from starhold.certification.invariant.candidate import Candidate
+from starhold.certification.invariant.search import Values
 from starhold.certification.invariant.wording import OBLIGATIONS, evidence, limit, sentence, size
-from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, proved
+from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, proved, system
 
+STORED = json.loads((Path(__file__).parents[2] / "docs" / "generators" / "sets.json").read_text(encoding="utf-8"))
 ORIGIN = (0, 0)
 ROUND = "x**2 + y**2"
 TURNS, DAMPED, SPIRALS = ("y", "-x"), ("y", "-x - y"), ("y", "-x + y/10")
@@ -139,6 +144,74 @@ def test_parameters_take_all_their_values():
     assert some.outcome != "proved"
 
 
+PENDULUM = ("v", "-sin(x) - v")
+ENERGY = "2*(1 - cos(x)) + x*v/2 + v**2"
+
+
+def test_sine_and_cosine_of_an_angle():
+    box = ((-2.0, 2.0), (-4.0, 4.0))
+    found = claim(PENDULUM, "attracts", ENERGY, box, (0, 0), 1.0, variables="x v", angles="x")
+    assert found.outcome == "proved"
+    negative = claim(PENDULUM, "attracts", "2*(1 - cos(x)) - v**2", box, (0, 0), 1.0, variables="x v", angles="x")
+    assert outcomes(negative) == {"positive": "undecided"}
+    for theorem, point, said in (("unstable", (0, 0), "no exact values"), ("region", (1, 0), "not zero")):
+        with pytest.raises(ValueError, match=said):
+            claim(PENDULUM, theorem, ENERGY, box, point, variables="x v", angles="x")
+
+
+def test_v_along_an_angle_is_what_differences_say():
+    what = Candidate(system(PENDULUM, "x v", angles="x"), expression(ENERGY, "x v", "x"), ((-2.0, 2.0), (-4.0, 4.0)))
+    state, step = np.array([[0.7], [-0.3]]), 1e-6
+    ahead = state + step * np.array([state[1], -np.sin(state[0]) - state[1]])
+    now, then = (Values(what, points) for points in (state, ahead))
+    assert now.V[0] == pytest.approx(2 * (1 - np.cos(0.7)) - 0.105 + 0.09)
+    assert now.slope[0] == pytest.approx((then.V[0] - now.V[0]) / step, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "rates",
+    [("-x + x*y", "-y"), ("4*x**3 - x**2*y - 6*x*y**2 - y**3", "x**3 + 4*x**2*y + x*y**2 - 6*y**3")],
+)
+def test_what_no_polynomial_shows_is_not_proved(rates):
+    """All motions come to rest, but V' of no polynomial V is negative everywhere (Ahmadi, Krstic, Parrilo 2011)."""
+    assert claim(rates, "region", ROUND, ((-9.0, 9.0), (-9.0, 9.0)), (0, 0), level=80.0).outcome != "proved"
+
+
+def nested(V, core=ROUND, rates=("-x + x**3", "-y"), **more):
+    return claim(rates, "region", V, core=expression(core), equilibrium=ORIGIN, **more)
+
+
+def test_v_that_has_no_least_value_at_the_equilibrium_leads_into_a_proved_set():
+    V = f"{ROUND} + x/50 - 1/5"
+    alone = claim(("-x + x**3", "-y"), "region", V.removesuffix(" - 1/5"), equilibrium=ORIGIN)
+    assert alone.outcome != "proved"
+    found = nested(V)
+    assert found.outcome == "proved"
+    # V is 1/5 less than about x^2 + y^2, which falls up to 1.
+    assert 0.75 < found.numbers["level"] < 0.83
+    assert 0.99 < found.numbers["core"] < 1.0
+    assert "come to the equilibrium" in sentence(found)
+    assert claim(("-x + x**3", "-y"), "region", V, core=expression(f"{ROUND} - 1/10")).outcome == "proved"
+
+
+@pytest.mark.parametrize(
+    ("V", "core", "rates"),
+    [
+        # V does not fall up to its zero; the core holds less than that; the core does not attract.
+        (f"{ROUND} - 2", ROUND, ("-x + x**3", "-y")),
+        (f"{ROUND} - 1/2", f"({ROUND})*(1 - 4*({ROUND}))", ("-x", "-y")),
+        (f"{ROUND} - 1", ROUND, (f"-x*({ROUND} - 1/2)", f"-y*({ROUND} - 1/2)")),
+    ],
+)
+def test_what_does_not_lead_into_a_proved_set_is_not_proved(V, core, rates):
+    assert nested(V, core, rates).outcome != "proved"
+
+
+def test_a_core_is_told_of_what_attracts():
+    with pytest.raises(ValueError, match="a core"):
+        claim(("-x", "-y"), "stable", ROUND, core=expression(ROUND), equilibrium=ORIGIN)
+
+
 # --- theorem 3 ------------------------------------------------------------------------------------------------------------
 
 
@@ -186,6 +259,45 @@ def test_intersection_where_one_function_stands_still_is_undecided():
     assert found.outcome == "undecided"
 
 
+# --- barriers -------------------------------------------------------------------------------------------------------------
+
+
+def between(rates, V, unsafe=("x + y - 3",), **more):
+    sets = {"start": ("1 - x**2", "1 - y**2"), "unsafe": unsafe}
+    return claim(rates, "avoids", V, **{name: tuple(map(expression, own)) for name, own in sets.items()}, **more)
+
+
+def test_a_barrier_parts_what_starts_from_what_is_unsafe():
+    found = between(("-x", "-y"), f"{ROUND} - 3")
+    assert (found.outcome, found.numbers["within"]) == ("proved", False)
+    assert sentence(found) == "no motion from the start set comes to the unsafe set"
+    # Where only the box holds motions back from x^2 + y^2 > 8.
+    boxed = between(("-x*(8 - x**2 - y**2)", "-y*(8 - x**2 - y**2)"), f"({ROUND} - 3)*(9 - x**2 - y**2)")
+    assert (boxed.outcome, boxed.numbers["within"]) == ("proved", True)
+    assert "while it stays in the box" in sentence(boxed)
+
+
+@pytest.mark.parametrize(
+    ("rates", "V", "name"),
+    [
+        (("-x", "-y"), f"{ROUND} - 1.5", "start"),
+        (("-x", "-y"), f"{ROUND} - 6", "unsafe"),
+        (("x", "y"), f"{ROUND} - 3", "barrier"),
+        (("1", "0"), f"{ROUND} - 3", "barrier"),
+    ],
+)
+def test_a_false_barrier_is_not_proved(rates, V, name):
+    found = between(rates, V)
+    assert (found.outcome, found.obligations[0].name) == ("undecided", name)
+
+
+def test_sets_of_a_barrier_hold_a_state():
+    with pytest.raises(ValueError, match="empty"):
+        between(("-x", "-y"), f"{ROUND} - 3", ("-1 - x**2",))
+    with pytest.raises(ValueError, match="no equilibrium"):
+        between(("-x", "-y"), f"{ROUND} - 3", equilibrium=ORIGIN)
+
+
 # --- right-hand sides that jump ------------------------------------------------------------------------------------------
 
 
@@ -202,10 +314,12 @@ def test_sliding_to_rest():
 
 @pytest.mark.parametrize("name", builtin_names())
 def test_examples_are_proved(name):
-    _, certificate = proved(name)
+    problem, certificate = proved(name)
     assert certificate.outcome == "proved"
-    for one in certificate.claims:
+    for wanted, one, level in zip(problem.claims, certificate.claims, STORED[name]["levels"], strict=True):
         assert sentence(one)
+        assert level is None or one.numbers["level"] == pytest.approx(level, rel=2e-3)
+        assert wanted.published is None or one.numbers["level"] >= 0.98 * wanted.published
         assert {o.name for o in one.obligations} <= set(OBLIGATIONS)
 
 

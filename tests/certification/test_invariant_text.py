@@ -17,7 +17,7 @@ from starhold.errors import InputError
 from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, var
 from starhold.kernel.programs import Exactly, Program, known
-from tests.certification.invariants import file
+from tests.certification.invariants import ORIGIN, file
 from tests.refusals import refused
 
 NAMES = {name: Polynomial.variable(name) for name in "xy"}
@@ -115,7 +115,10 @@ def test_numbers_are_taken_as_written():
         ("x.real", '"x.real"', "numbers, variables"),
         ("(lambda: 1)()", "lambda", "numbers"),
         ("[x for x in y]", "for", "numbers"),
-        ("sin(x)", 'function "sin"', "one of where"),
+        ("tan(x)", 'function "tan"', "one of where"),
+        ("sin(2*x)", 'sin of "2*x"', "sin of a variable"),
+        ("cos(w)", 'cos of "w"', "cos of a variable"),
+        ("sin(x, y)", 'function "sin"', "one of where"),
         ("z + 1", 'name "z"', "one of x, y"),
         ("1/x", 'division by "x"', "a number"),
         ("x/0", "division", "a number"),
@@ -158,6 +161,7 @@ def test_what_is_not_allowed_is_said(text, found, allowed):
 
 
 SIX = [" + ".join(f"abs(x - {k + 6 * j}*y)" for k in range(6)) for j in range(2)]
+PARAMETERS = "[parameters]\n" + "".join(f"p{k} = [0, 1]\n" for k in range(8))
 GOOD = file(name="small", half=1)
 
 
@@ -188,8 +192,9 @@ def test_a_small_file_is_read():
         ("equilibrium = { x = 0, y = 0 }", 'escape = "abs(x)"', "claim[1].escape", "one polynomial"),
         ('["x", "y"]', '["x", "max"]', "variables", "a name of letters"),
         ('["x", "y"]', '["x", "x"]', "variables", "a name that is not taken"),
-        ('["x", "y"]', "[]", "variables", "a list of 1 to 6 names"),
-        ('["x", "y"]', '["a","b","c","d","e","f","g"]', "variables", "at most 6"),
+        ('["x", "y"]', "[]", "variables", "a list of 1 to 7 names"),
+        ('["x", "y"]', '["a","b","c","d","e","f","g","h"]', "variables", "at most 7"),
+        ("[rates]", PARAMETERS + "[rates]", "variables", "10 with parameters"),
         ('name = "small"', 'nane = "small"', "nane", "did you mean name?"),
         ('name = "small"', 'name = "../up"', "name", "letters, digits"),
         ("[rates]", "[rates", "", "not TOML"),
@@ -210,6 +215,49 @@ def test_what_is_wrong_with_a_file_is_one_line(old, new, key, said):
     assert old in GOOD
     with refused(said, start=f"small.toml: {key}"):
         parse(GOOD.replace(old, new, 1), "small.toml")
+
+
+@pytest.mark.parametrize(
+    ("theorem", "more", "key", "said"),
+    [
+        ("unstable", ORIGIN, "theorem", "another theorem"),
+        ("avoids", 'start = ["x"]\nunsafe = ["y"]', "theorem", "another theorem"),
+        ("region", "", "equilibrium", "an equilibrium, as the system has sin or cos"),
+        ("region", f'core = "x**2"\n{ORIGIN}', "core", "V alone"),
+        ("region", "equilibrium = { x = 1, y = 0 }", "equilibrium.x", "found an angle"),
+    ],
+)
+def test_what_is_not_said_of_angles_is_one_line(theorem, more, key, said):
+    with refused(said, start=f"a.toml: claim[1].{key}"):
+        parse(file("y", "-sin(x) - y", '"1 - cos(x) + y**2"', theorem, more), "a.toml")
+
+
+SETS = 'start = ["1 - x**2", "1 - y**2"]\nunsafe = ["x + y - 3"]'
+
+
+@pytest.mark.parametrize(
+    ("theorem", "more", "key", "said"),
+    [
+        ("avoids", 'start = ["1 - x**2"]', "unsafe", "this key is required"),
+        ("avoids", SETS.replace("1 - y**2", "x - 1.5"), "start", "found a set that is empty"),
+        ("avoids", SETS.replace('["x + y - 3"]', "[]"), "unsafe", "found a set that is empty"),
+        ("avoids", SETS.replace("x + y - 3", "-1 - x**2"), "unsafe", "found a set that is empty"),
+        ("avoids", SETS.replace("x + y - 3", "abs(x) - 1"), "unsafe[1]", "one polynomial"),
+        ("avoids", f"{SETS}\n{ORIGIN}", "equilibrium", "alone"),
+        ("region", f"{SETS}\n{ORIGIN}", "start", 'theorem = "avoids"'),
+        ("stable", f'core = "x**2"\n{ORIGIN}', "core", "theorem attracts or region"),
+    ],
+)
+def test_sets_of_a_barrier_are_told_and_not_empty(theorem, more, key, said):
+    assert len(parse(file(theorem="avoids", more=SETS), "b.toml").claims[0].start) == 2
+    with refused(said, start=f"b.toml: claim[1].{key}"):
+        parse(file(theorem=theorem, more=more), "b.toml")
+
+
+def test_angles_are_the_variables_whose_sine_or_cosine_occurs():
+    assert parse(file("y", "-sin(x) - y"), "a.toml").system.angles == ("x",)
+    assert parse(file("y", "-x - y", V='"2*(1 - cos(y)) + x**2"'), "a.toml").system.angles == ("y",)
+    assert parse(file("y", "-x - y"), "a.toml").system.angles == ()
 
 
 def test_missing_files_name_the_nearest(tmp_path):

@@ -66,6 +66,8 @@ def _panel(axis: Any, item: Portrait) -> None:
         floor = (1e-4 if item.u is not None else 2e-3) * (level or top)
         axis.contourf(item.x, item.y, item.V, levels=[-np.inf, floor], colors=[SET], alpha=0.5)
         axis.contour(item.x, item.y, item.V, levels=[floor], colors=[SET], linewidths=0.9)
+    for values, colour in zip(item.sets, (TRUE, AGAINST), strict=False):
+        axis.contourf(item.x, item.y, values, levels=[0.0, np.inf], colors=[colour], alpha=0.6)
     if item.u is not None:
         axis.streamplot(item.x, item.y, item.u, item.v, density=1.25, color="0.45", linewidth=0.6, arrowsize=0.7)
     if item.equilibrium is not None:
@@ -97,7 +99,10 @@ def _handles(drawn: Sequence[Portrait]) -> list[Any]:
     handles: list[Any] = []
     if any(item.claim.numbers.get("level") for item in drawn):
         handles.append(Patch(facecolor=INSIDE, alpha=0.6, edgecolor=SET, label="{V ≤ level}"))
-    if any(item.equilibrium is None and item.claim.numbers["theorem"] != "unstable" for item in drawn):
+    if "avoids" in theorems:
+        parts = (SET, "V ≤ 0"), (TRUE, "start"), (AGAINST, "unsafe")
+        handles += [Patch(facecolor=colour, alpha=0.6, label=label) for colour, label in parts]
+    if any(item.equilibrium is None and item.claim.numbers["theorem"] not in ("unstable", "avoids") for item in drawn):
         handles.append(Patch(facecolor=SET, alpha=0.6, label="M"))
     if any(item.equilibrium is not None for item in drawn):
         handles.append(Line2D([], [], color=SET, marker="o", linestyle="", label="M, an equilibrium"))

@@ -13,7 +13,7 @@ from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.invariant import InvariantProblem, System, WantedSet
 from starhold.certification.invariant.candidate import Candidate, Floats
 from starhold.certification.invariant.search import Values
-from starhold.certification.invariant.theorems import indicator
+from starhold.certification.invariant.theorems import common, indicator
 
 POINTS = 400
 """Along each side of a portrait."""
@@ -30,8 +30,8 @@ class Portrait:
     """The plane of the first two variables with what a claim says there, parameters in the middle of their intervals.
 
     x, y: (n,); V: (n, n), by y, then x, with more variables the least (unstable: greatest) over them; u, v: the same shape,
-    None with more; orbit: (2, points), the border of the true region, with its area; marks: states that refute. One
-    variable: no arrays."""
+    None with more; orbit: (2, points), the border of the true region, with its area; marks: states that refute; sets:
+    functions (n, n) that are not negative in the start and unsafe sets. One variable: no arrays."""
 
     claim: Claim
     names: tuple[str, ...]
@@ -44,6 +44,7 @@ class Portrait:
     orbit_area: float | None = None
     marks: tuple[tuple[float, float], ...] = ()
     equilibrium: tuple[float, float] | None = None
+    sets: tuple[Any, ...] = ()
 
 
 def portraits(problem: InvariantProblem, certificate: Certificate) -> list[Portrait]:
@@ -99,7 +100,9 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
     marked = tuple((mark[names[0]], mark[names[1]]) for mark in marks)
     equilibrium = None if wanted.equilibrium is None else (float(wanted.equilibrium[0]), float(wanted.equilibrium[1]))
     area = None if orbit is None else _area(orbit)
-    return Portrait(claim, names, x, y, V, u, v, orbit, area, marked, equilibrium)
+    least = (common(functions) for functions in (wanted.start, wanted.unsafe) if flat and functions)
+    sets = tuple(Values(Candidate(problem.system, f, wanted.box), points).V.reshape(shape) for f in least)
+    return Portrait(claim, names, x, y, V, u, v, orbit, area, marked, equilibrium, sets)
 
 
 def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
@@ -108,7 +111,7 @@ def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
     width = np.array([0.5 * (high - low) for low, high in what.box[2:moving]])
     for step in range(STEPS):
         centre = best.copy()
-        side = np.linspace(-1.0, 1.0, 9 if step == 0 else 3)
+        side = np.linspace(-1.0, 1.0, 9 if step == 0 and len(width) < 4 else 3)
         for offset in np.array(np.meshgrid(*[side] * len(width))).reshape(len(width), -1).T:
             tried = centre.copy()
             tried[2:moving] += (offset * width)[:, None]
@@ -124,11 +127,12 @@ class _Rates:
 
     def __init__(self, what: Candidate, moving: int) -> None:
         pieces = what.pieces
-        self._moving = moving
+        self._moving, self._system = moving, what.system
         self._surfaces = [Floats(surface) for surface in pieces.surfaces]
         self._cells = [(cell.signs, [Floats(rate) for rate in cell.rates[:moving]]) for cell in pieces.cells]
 
     def __call__(self, points: Any) -> Any:
+        points = self._system.with_angles(points)
         speeds = np.full((self._moving, points.shape[1]), np.nan)
         sides, free = [surface.at(points) for surface in self._surfaces], np.ones(points.shape[1], dtype=bool)
         for signs, rates in self._cells:

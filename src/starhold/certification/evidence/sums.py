@@ -80,6 +80,7 @@ class Guess:
         self.p = self.p * (1 / self.size)
         # Where all that is asked vanishes with some variables, whatever the others (parameters) are.
         moving = {x for q in o.strict for x in q.names}
+        moving |= {f"{f}.{x}" for f in ("sin", "cos") for x in moving}
         self.moving = moving if all(moving.intersection(m) for q in (o.p, *o.strict) for m in q.terms) else set[str]()
         used = [k for k, q in enumerate(self.known) if degree(q) > (basis is not None) and degree(q) <= top]
         chosen = [(), *((k,) for k in used), *(p for p in pairs if p[0] in used and p[1] in used)]

@@ -16,17 +16,18 @@ from typing import Any, cast
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.certificate import Certificate
 from starhold.certification.evidence.finding import certificate as kernel_certificate
-from starhold.certification.invariant.system import System, split
+from starhold.certification.invariant.system import TURNED, System, split, turned
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
-from starhold.certification.invariant.theorems import THEOREMS, Shown, WantedSet, indicator, show
+from starhold.certification.invariant.theorems import THEOREMS, Shown, WantedSet, a_state, indicator, show
 from starhold.errors import InputError
 from starhold.files import read_text
 
-MOST, LARGEST, LONGEST = 6, 1e100, 100
-"""Variables and parameters together, beyond which branch and bound would not end; numbers of a box, of which floats hold
-the powers; characters of a name."""
+MOVING, MOST, LARGEST, LONGEST = 7, 9, 1e100, 100
+"""Variables, and with parameters, beyond which no evidence would be found; numbers of a box, of which floats hold the
+powers; characters of a name."""
 _KEYS = ("name", "description", "variables", "parameters", "define", "rates", "box", "claim")
-_CLAIM = ("name", "theorem", "V", "box", "equilibrium", "level", "escape", "squares", "known", "orbit")
+_NUMBERS = ("level", "known", "published")
+_CLAIM = ("name", "theorem", "V", "box", "equilibrium", "escape", "squares", "core", "start", "unsafe", "orbit", *_NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -123,12 +124,17 @@ class _File:
         rates = self._table(self._required(self.data, "rates", ""), "rates")
         self._exactly(rates, self.variables, "rates")
         read_rates = tuple(self._expression(rates[name], f"rates.{name}") for name in self.variables)
-        system = System(self.variables, read_rates, tuple(self.parameters))
         claims = self._required(self.data, "claim", "")
         if not isinstance(claims, list) or not claims:
             raise InputError(self.where, "claim", _show(claims), "at least one [[claim]] table")
         tables = [self._table(item, f"claim[{k}]") for k, item in enumerate(cast(list[Any], claims), 1)]
-        wanted = [self._claim(table, f"claim[{k}]", system) for k, table in enumerate(tables, 1)]
+        wanted = [self._claim(table, f"claim[{k}]") for k, table in enumerate(tables, 1)]
+        functions = [f for item, _ in wanted for f in (indicator(item), item.core or 0, *item.start, *item.unsafe)]
+        held = {x for value in (*read_rates, *functions) for x in _names(value)}
+        angles = (x for x in self.variables if held.intersection(turned(f, x) for f in TURNED))
+        system = System(self.variables, read_rates, tuple(self.parameters), tuple(angles))
+        for k, (item, _) in enumerate(wanted, 1):
+            self._fits(system, item, f"claim[{k}]")
         written: dict[str, Any] = {name: self.data[name] for name in ("define", "rates") if name in self.data}
         written["V"] = [table["V"] for table in tables]
         # Whatever a claim is made of, so that it can be checked from the certificate alone.
@@ -136,7 +142,7 @@ class _File:
         if any(point is not None for point in points):
             names = self.variables
             written["equilibrium"] = [at and {n: str(x) for n, x in zip(names, at, strict=True)} for at in points]
-        for key in ("escape", "squares"):
+        for key in ("escape", "squares", "core", "start", "unsafe"):
             if any(key in table for table in tables):
                 written[key] = [table.get(key) for table in tables]
         return InvariantProblem(
@@ -150,19 +156,21 @@ class _File:
 
     def _variables(self) -> None:
         names = self._required(self.data, "variables", "")
-        allowed = f"a list of 1 to {MOST} names"
+        allowed = f"a list of 1 to {MOVING} names"
         if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in cast(list[Any], names)):
             raise InputError(self.where, "variables", _show(names), allowed)
         parameters = self._table(self.data.get("parameters", {}), "parameters")
         for name in (*cast(list[str], names), *parameters):
             self._fresh(name, "parameters" if name in parameters else "variables")
             self.names[name] = Polynomial.variable(name)
-        if len(self.names) > MOST:
-            raise InputError(self.where, "variables", f"{len(self.names)} with parameters", f"at most {MOST}")
         self.variables = tuple(cast(list[str], names))
+        for count, most, what in ((len(self.variables), MOVING, "variables"), (len(self.names), MOST, "with parameters")):
+            if count > most:
+                raise InputError(self.where, "variables", f"{count} {what}", f"at most {most}")
+        self.names |= {own: Polynomial.variable(own) for x in self.variables for own in (turned(f, x) for f in TURNED)}
         self.parameters = {name: self._interval(value, f"parameters.{name}") for name, value in parameters.items()}
 
-    def _claim(self, table: dict[str, Any], key: str, system: System) -> tuple[WantedSet, tuple[float, ...] | None]:
+    def _claim(self, table: dict[str, Any], key: str) -> tuple[WantedSet, tuple[float, ...] | None]:
         if "rest" in table:
             raise InputError(self.where, f"{key}.rest", "an unknown key", "it is called equilibrium")
         self._known(table, _CLAIM, key)
@@ -172,18 +180,47 @@ class _File:
         V = self._indicator(self._required(table, "V", key), theorem, f"{key}.V")
         at = self._state(table["equilibrium"], f"{key}.equilibrium") if "equilibrium" in table else None
         escape = self._polynomial(table["escape"], f"{key}.escape") if "escape" in table else None
-        listed = self._list(table.get("squares", []), f"{key}.squares")
-        squares = tuple(self._polynomial(h, f"{key}.squares[{k}]") for k, h in enumerate(listed, 1))
-        level, known = (self._positive(table, name, key) for name in ("level", "known"))
+        squares = self._polynomials(table.get("squares", []), f"{key}.squares")
+        core = self._expression(table["core"], f"{key}.core") if "core" in table else None
+        if core is not None and theorem not in ("attracts", "region"):
+            raise InputError(self.where, f"{key}.core", f'a core with theorem "{theorem}"', "theorem attracts or region")
+        sets = dict[str, tuple[Any, ...]]()
+        for name in ("start", "unsafe"):
+            if theorem == "avoids":
+                self._required(table, name, key)
+            elif name in table:
+                raise InputError(self.where, f"{key}.{name}", f'a set with theorem "{theorem}"', 'theorem = "avoids"')
+            sets[name] = self._polynomials(table.get(name, []), f"{key}.{name}")
+        if theorem == "avoids" and at is not None:
+            raise InputError(self.where, f"{key}.equilibrium", "a point", "a start and an unsafe set alone")
+        numbers = {name: self._positive(table, name, key) for name in _NUMBERS}
         orbit = tuple(float(x) for x in self._state(table["orbit"], f"{key}.orbit")) if "orbit" in table else None
         exactly = None if at is None else tuple(exact(x) for x in at)
         name = self._text(table, "name", key, "")
-        wanted = WantedSet(theorem, V, self._box(table, key), exactly, level, escape, squares, known, name)
+        more: dict[str, Any] = {"escape": escape, "squares": squares, "core": core, **numbers, **sets}
+        return WantedSet(theorem, V, self._box(table, key), exactly, name=name, **more), orbit
+
+    def _fits(self, system: System, wanted: WantedSet, key: str) -> None:
+        if system.angles and wanted.theorem in ("unstable", "avoids"):
+            found = f'"{wanted.theorem}" of a system with sin or cos'
+            raise InputError(self.where, f"{key}.theorem", found, "another theorem")
+        if system.angles and wanted.core is not None:
+            raise InputError(self.where, f"{key}.core", "a core of a system with sin or cos", "V alone")
+        if system.angles and wanted.equilibrium is None:
+            raise InputError(self.where, f"{key}.equilibrium", "nothing", "an equilibrium, as the system has sin or cos")
+        for x in system.angles:
+            if wanted.equilibrium and wanted.equilibrium[system.variables.index(x)]:
+                raise InputError(self.where, f"{key}.equilibrium.{x}", "an angle at an equilibrium", "zero")
         try:
-            split(system, indicator(wanted))
+            for V in (indicator(wanted), wanted.core):
+                split(system, 0 if V is None else V)
         except ValueError as error:
             raise InputError(self.where, f"{key}.V", str(error), "fewer comparisons, or lower powers") from None
-        return wanted, orbit
+        for name in ("start", "unsafe") if wanted.theorem == "avoids" else ():
+            try:
+                a_state(system, wanted, getattr(wanted, name))
+            except ValueError as error:
+                raise InputError(self.where, f"{key}.{name}", str(error), "one that holds a state of the box") from None
 
     def _indicator(self, value: Any, theorem: str, key: str) -> Any:
         if theorem != "intersection":
@@ -196,6 +233,9 @@ class _File:
         if not isinstance(value, list):
             raise InputError(self.where, key, _show(value), "a list of expressions")
         return cast(list[Any], value)
+
+    def _polynomials(self, value: Any, key: str) -> tuple[Any, ...]:
+        return tuple(self._polynomial(h, f"{key}[{k}]") for k, h in enumerate(self._list(value, key), 1))
 
     def _polynomial(self, value: Any, key: str) -> Any:
         found = self._expression(value, key)
@@ -277,6 +317,12 @@ class _File:
             allowed = f"at most {LONGEST} characters" + ("" if key else ": letters, digits, '-', '_', '.' and spaces")
             raise InputError(self.where, f"{key}.{name}".lstrip("."), _show(value), allowed)
         return value
+
+
+def _names(value: Any) -> set[str]:
+    """The names that a piecewise polynomial depends on."""
+    every = (part for case in pieces(value) for part in (case.value, *(c.positive for c, _ in case.truths)))
+    return {name for part in every for name in part.variables()}
 
 
 def _file_name(text: str) -> bool:

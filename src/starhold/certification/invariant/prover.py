@@ -28,13 +28,16 @@ LESS = (1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1)
 HALVINGS = 18
 CLOSE, FAR = 1e-5, 5e-4
 """How close floats come to the largest level, of one cell and of more."""
+DEGREES = {False: (0, 2), True: (0, 2, 4)}
+"""Degrees above that of what is to be shown. Angles want more, by their series, and a core that holds {V <= 0}, by V."""
 SLOPES = (0, 1, -1, 8, -8, 64, -64)
 """Multiples of a surface by which V is bent where it is crossed."""
 
 
 @dataclass
 class Attempt:
-    """A claim for the kernel without its evidence: `programs` by role, `numbers` and `subject` as the kernel reads them."""
+    """A claim for the kernel without its evidence: `programs` by role, `numbers` and `subject` as the kernel reads them;
+    `given`: hints about other functions than V."""
 
     theorem: str
     programs: dict[str, dict[str, Any]]
@@ -42,6 +45,7 @@ class Attempt:
     numbers: dict[str, str]
     scales: dict[str, float]
     basis: list[Poly] | None = None
+    given: dict[str, Any] = field(default_factory=dict[str, Any])
     hints: dict[str, Any] = field(default_factory=dict[str, Any])
     taken: tuple[str, ...] = ()
     _done: dict[Any, Any] = field(default_factory=dict[Any, Any])
@@ -92,7 +96,8 @@ class Attempt:
 
     def shown(self, o: Sum, exact: bool = True, name: str = "") -> dict[str, Any] | None:
         """Return evidence for a sum, None where none was found."""
-        return find(o, self.scales, self.basis if name.startswith("changes") else None, exact=exact)
+        basis = self.basis if name.startswith("changes") else None
+        return find(o, self.scales, basis, DEGREES[bool(self.system.angles) or name.startswith("inside")], exact)
 
 
 def proved(attempt: Attempt, top: float, escape: Poly | None) -> dict[str, Any] | str:
@@ -149,15 +154,15 @@ def largest(attempt: Attempt, low: float, top: float) -> float:
 
 def hinted(attempt: Attempt, escape: Poly | None) -> str:
     """Find hints with which floats have evidence for all obligations; return why there are none, or nothing."""
-    system, role = attempt.system, list(attempt.programs)[-1]
-    V = Function(system, len(system.roles) - 1, None)
+    system, role = attempt.system, "V"
+    V = Function(system, system.roles.index(role), None)
     never = [i for i in system.cells if not V.on(i).terms]
     if attempt.theorem in ("avoids", "fails"):
         lacking, _ = attempt.missing()
         return f"no evidence was found: {lacking[0]}" if lacking else ""
     if not V.at_point or attempt.theorem == "is unstable":
         never += [i for i in system.cells if i not in never and attempt.shown(system.sum(-V.on(i), (i,)))]
-    given = {f"never of {role}": never} if never else {}
+    given = attempt.given | ({f"never of {role}": never} if never else {})
     if V.at_point and attempt.theorem != "is unstable":
         given[f"shape of {role}"] = shape([V.on(i) for i in system.cells], system.names)
     reason = ""

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.invariant.candidate import Candidate, Floats
-from starhold.certification.invariant.system import Cell, Poly, solve
+from starhold.certification.invariant.system import Cell, Poly, along, solve
 from starhold.certification.matrices import number
 
 Array = NDArray[np.float64]
-POINTS = {1: 4001, 2: 301, 3: 61, 4: 23}
+POINTS = {1: 4001, 2: 301, 3: 61, 4: 23, 7: 5, 8: 3, 9: 3}
 """Points of a grid along each side, by the number of sides."""
 TRIES = 40
 """States that are verified exactly before one gives up."""
@@ -31,6 +31,7 @@ class Values:
         self.points = points
         self.V, self.slope = np.full(count, np.nan), np.full(count, np.nan)
         self.cell = np.full(count, -1)
+        points = what.system.with_angles(points)
         surfaces = [Floats(s).at(points) for s in what.pieces.surfaces]
         for place, cell in enumerate(what.pieces.cells):
             here = self.cell < 0
@@ -63,7 +64,7 @@ def wrong(what: Candidate, sense: int, count: int = 8) -> list[Array]:
             starts.append(point)
         if len(starts) == count:
             break
-    points_each = max(5, round(4_000 ** (1.0 / len(what.box))))
+    points_each = max(5 if len(what.box) < 7 else 3, round(4_000 ** (1.0 / len(what.box))))
     found = [_refined(what, start, sense, spread, points_each, (floor, tolerance)) for start in starts]
     return sorted(found, key=lambda x: float(Values(what, x[:, None]).V[0]))
 
@@ -83,20 +84,23 @@ def _refined(what: Candidate, start: Array, sense: int, spread: Array, count: in
 def stuck(what: Candidate) -> list[Array]:
     """Rests of single cells with V > 0, by Newton's method from a coarse grid."""
     found: list[Array] = []
-    moving = what.pieces.moving
+    moving, ring = what.pieces.moving, what.pieces.context
+    units = ([ring.constant(int(j == k)) for j in range(len(what.box))] for k in range(moving))
+    ways = [what.system.rates_with_angles(unit, ring) for unit in units]
     for place, cell in enumerate(what.pieces.cells):
         rates = [Floats(rate) for rate in cell.rates[:moving]]
-        slopes = [[Floats(rate.derivative(k)) for k in range(moving)] for rate in cell.rates[:moving]]
-        points = grid(what.box, 7)
+        slopes = [[Floats(along(rate, way)) for way in ways] for rate in cell.rates[:moving]]
+        points = grid(what.box, 7 if len(what.box) < 6 else 3)
         for _ in range(12):
-            f = np.array([rate.at(points) for rate in rates])
-            jacobian = np.moveaxis(np.array([[s.at(points) for s in row] for row in slopes]), -1, 0)
+            turned = what.system.with_angles(points)
+            f = np.array([rate.at(turned) for rate in rates])
+            jacobian = np.moveaxis(np.array([[s.at(turned) for s in row] for row in slopes]), -1, 0)
             with np.errstate(all="ignore"):
                 steps = np.linalg.pinv(np.nan_to_num(jacobian, posinf=0.0, neginf=0.0)) @ np.nan_to_num(f.T)[:, :, None]
             points[:moving] -= steps[:, :, 0].T
             points = np.clip(points, *np.array(what.box).T[:, :, None])
         values = Values(what, points)
-        size = np.max(np.abs([rate.at(points) for rate in rates]), axis=0)
+        size = np.max(np.abs([rate.at(what.system.with_angles(points)) for rate in rates]), axis=0)
         for k in np.flatnonzero((size < 1e-9) & (values.cell == place) & (values.V > 1e-9)):
             if all(np.max(np.abs(points[:, k] - other)) > 1e-6 for other in found):
                 found.append(points[:, k])

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
+import numpy as np
 from flint import Ordering, fmpq_mpoly_ctx
 
 from starhold.algebra.polynomial import Condition, Polynomial, jointly
@@ -25,37 +26,69 @@ Poly: TypeAlias = Any
 @dataclass(frozen=True)
 class System:
     """x' = rates(x). `variables` move, `parameters` stay: whatever is shown holds for each of their values in the box.
-    Rates: polynomials over the names, or piecewise ones."""
+    `angles`: those variables whose sines and cosines occur. Rates: polynomials over all of these, or piecewise ones."""
 
     variables: tuple[str, ...]
     rates: tuple[Any, ...]
     parameters: tuple[str, ...] = ()
+    angles: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
         """Variables, then parameters."""
         return self.variables + self.parameters
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names, then sine and cosine of each angle."""
+        return self.names + tuple(turned(f, x) for x in self.angles for f in TURNED)
+
     @classmethod
-    def of(cls, variables: Sequence[str], rates: Callable[..., Sequence[Any]], parameters: Sequence[str] = ()) -> System:
-        """From an equation: a function of all variables and parameters that gives the derivative of every variable. It may
-        use + - *, division by numbers, and `starhold.algebra.scalar`, whose `where` and `less` make pieces."""
-        names = (*variables, *parameters)
-        found = tuple(rates(*(Polynomial.variable(name) for name in names)))
+    def of(
+        cls, variables: Sequence[str], rates: Callable[..., Sequence[Any]], parameters: Sequence[str] = (),
+        angles: Sequence[str] = (),
+    ) -> System:  # fmt: skip
+        """From an equation: a function of all variables, parameters, and sine and cosine of each angle that gives the
+        derivative of every variable. It may use + - *, division by numbers, and `starhold.algebra.scalar`, whose `where`
+        and `less` make pieces."""
+        system = cls(tuple(variables), (), tuple(parameters), tuple(angles))
+        found = tuple(system.function(rates))
         if len(found) != len(variables):
             raise ValueError(f"{len(found)} derivatives for {len(variables)} variables")
-        return cls(tuple(variables), found, tuple(parameters))
+        return replace(system, rates=found)
 
     def function(self, equation: Callable[..., Any]) -> Any:
-        """An equation over the same names, as polynomials."""
-        return equation(*(Polynomial.variable(name) for name in self.names))
+        """An equation over the same inputs, as polynomials."""
+        return equation(*(Polynomial.variable(name) for name in self.inputs))
+
+    def with_angles(self, points: Any) -> Any:
+        """Points (n, N) of the names as points of the inputs."""
+        turns = [points[self.variables.index(x)] for x in self.angles]
+        return np.array([*points, *(f(turn) for turn in turns for f in (np.sin, np.cos))])
+
+    def rates_with_angles(self, rates: Sequence[Poly], ring: Any) -> list[Poly]:
+        """The derivatives of all inputs, of those of the names."""
+        of, found = dict(zip(self.inputs, ring.gens(), strict=True)), list(rates)
+        for x in self.angles:
+            sine, cosine = (of[turned(f, x)] for f in TURNED)
+            rate = rates[self.variables.index(x)]
+            found += [cosine * rate, -sine * rate]
+        return found
+
+
+TURNED = ("sin", "cos")
+
+
+def turned(f: str, name: str) -> str:
+    """The input that is the sine or cosine of a variable."""
+    return f"{f}.{name}"
 
 
 @dataclass(frozen=True)
 class Cell:
     """`signs`: which side of each surface, 0 where it does not matter. The closed cell is where surfaces times signs are
-    not negative; rates (of parameters too, zero) and V are polynomials on it, `slope` is V'. `on`: surfaces in which it
-    lies, if it is a thin one."""
+    not negative; rates of all inputs (of parameters zero) and V are polynomials on it, `slope` is V'. `on`: surfaces in
+    which it lies, if it is a thin one."""
 
     signs: tuple[int, ...]
     rates: tuple[Poly, ...]
@@ -166,7 +199,7 @@ def solve(surface: Poly) -> tuple[int, Poly] | None:
 
 def split(system: System, V: Any) -> Cells:
     """The cells of a system and a function, polynomial or piecewise. ValueError where they are too many or too large."""
-    names = system.names
+    names = system.inputs
     ring = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
     zero = Polynomial({})
     surfaces: list[Poly] = []
@@ -178,7 +211,7 @@ def split(system: System, V: Any) -> Cells:
     cells = [
         Cell(
             tuple(sides.get(k, 0) for k in range(len(surfaces))),
-            tuple(polys[:-1]),
+            tuple(system.rates_with_angles(polys[:-1], ring)),
             polys[-1],
             tuple(k for k, side in sides.items() if side == 0),
         )
@@ -223,4 +256,4 @@ def plain(system: System, function: Any) -> Poly:
     found = jointly([function])
     if len(found) != 1:
         raise ValueError("the function has to be one polynomial")
-    return _poly(found[0][1][0], fmpq_mpoly_ctx.get(system.names, Ordering.degrevlex), system.names)
+    return _poly(found[0][1][0], fmpq_mpoly_ctx.get(system.inputs, Ordering.degrevlex), system.inputs)

@@ -15,6 +15,7 @@ from typing import Any
 
 from starhold.algebra.polynomial import Cases, Polynomial, pieces
 from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, where
+from starhold.certification.invariant.system import TURNED, turned
 
 LONGEST = 2_000
 """Characters of an expression."""
@@ -25,7 +26,7 @@ MOST_DIGITS = 1_000
 MOST_TERMS, MOST_CASES, HIGHEST, WORK, COMPARED = 600, 64, 24, 2_000_000, 10
 """Terms of a polynomial, cases of a piecewise one, the degree, and pairs of terms that are multiplied on the way to an
 expression, a pair of cases that are compared counted as so many: beyond these a proof would not end anyway."""
-ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and where, min, max, abs, clip, sat, sign"
+ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and where, min, max, abs, clip, sat, sign, sin, cos"
 
 
 class ExpressionError(ValueError):
@@ -97,7 +98,8 @@ class _Reader:
                 return Polynomial.constant(as_written(ast.get_source_segment(self._text, node) or str(node.value)))
             case ast.Name(id=name):
                 if name not in self._names:
-                    raise ExpressionError(f'the name "{name}"', f"one of {', '.join(self._names)}")
+                    known = ", ".join(x for x in self._names if x.isidentifier())
+                    raise ExpressionError(f'the name "{name}"', f"one of {known}")
                 return self._names[name]
             case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=operand):
                 value = self.number(operand)
@@ -164,8 +166,13 @@ class _Reader:
     def _call(self, name: str, arguments: list[ast.expr]) -> Any:
         if name == "where" and len(arguments) == 3:
             return self._choose(arguments[0], self.number(arguments[1]), self.number(arguments[2]))
+        if name in TURNED and len(arguments) == 1:
+            angle = arguments[0].id if isinstance(arguments[0], ast.Name) else ""
+            if turned(name, angle) not in self._names:
+                raise ExpressionError(f"{name} of {self._shown(arguments[0])}", f"{name} of a variable")
+            return self._names[turned(name, angle)]
         if name not in _FUNCTIONS:
-            raise ExpressionError(f'the function "{name}"', f"one of where, {', '.join(_FUNCTIONS)}")
+            raise ExpressionError(f'the function "{name}"', f"one of where, {', '.join((*_FUNCTIONS, *TURNED))}")
         function, least, most = _FUNCTIONS[name]
         if not least <= len(arguments) <= most:
             raise ExpressionError(f"{name} with {len(arguments)} arguments", f"{least} to {most}")
@@ -226,5 +233,5 @@ def _short(text: str) -> str:
     return f'"{text}"' if len(text) <= 60 else f'"{text[:57]}..."'
 
 
-RESERVED = frozenset({"where", *_FUNCTIONS})
+RESERVED = frozenset({"where", *_FUNCTIONS, *TURNED})
 """Names that no variable may have."""

@@ -7,40 +7,42 @@ M is a compact set, V its indicator: continuous, zero on M and positive elsewher
 * `region` (its corollary): all motions that start in {V <= level} stay there and come to M.
 * `unstable` (theorem 3): V' > 0 wherever V > 0 in a neighbourhood; V need be positive somewhere in every neighbourhood only.
 * `intersection` (theorem 4): M is where none of several V_k is positive, and each falls outside. Their maximum is a V.
+* `avoids`: no motion from one set comes to another. V <= 0 on the one, V > 0 on the other, V' <= c V with a polynomial c.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import reduce
 from typing import Any
 
 from starhold.algebra.polynomial import exact
-from starhold.algebra.scalar import maximum
+from starhold.algebra.scalar import maximum, minimum
 from starhold.certification.certificate import Claim, Obligation
 from starhold.certification.evidence.finding import certificate
 from starhold.certification.invariant import search
 from starhold.certification.invariant.candidate import Candidate
 from starhold.certification.invariant.prover import Attempt, proved, scales
 from starhold.certification.invariant.recording import program
-from starhold.certification.invariant.system import System, plain
+from starhold.certification.invariant.system import System, plain, turned
 from starhold.kernel.check import prove as kernel_proves
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import Poly as Exact
+from starhold.kernel.polynomials import var
 from starhold.kernel.reading import Claim as KernelClaim
 from starhold.kernel.reading import read_certificate
 
 SQUARES, VERIFIED = "sums of squares", "exact inequality"
-KERNEL = {"stable": "is stable", "unstable": "is unstable"}
+KERNEL = {"stable": "is stable", "unstable": "is unstable", "avoids": "avoids"}
 """The kernel's theorems; the others are about what attracts."""
-THEOREMS = ("stable", "attracts", "region", "unstable", "intersection")
+THEOREMS = ("stable", "attracts", "region", "unstable", "intersection", "avoids")
 STEPS = {
     "positive": "positive", "border": "bounded", "changes": "falls", "agree": "switching", "continuous": "continuous",
-    "never": "falls",
+    "never": "falls", "start": "start", "unsafe": "unsafe", "barrier": "barrier",
 }  # fmt: skip
 """What the kernel's obligations are about."""
 ASSUMPTIONS = "equations-as-given", "filippov"
@@ -53,8 +55,10 @@ class WantedSet:
     """One claim to be shown. `V`: a polynomial or piecewise one, for `intersection` several; `box`: where, in the order of
     variables and parameters; `equilibrium`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
-    of M; `squares`: functions that vanish on M, of whose multiples squares are made; `known`: the area (or
-    volume) of the true region, if somebody knows it."""
+    of M; `squares`: functions that vanish on M, of whose multiples squares are made; `core`: in place of V an indicator of
+    M, which is shown to attract from a set that holds {V <= 0}; `start` and `unsafe`, for `avoids`: functions of which none
+    is negative in these sets; `known`: the area (or volume) of the true region, if somebody knows it; `published`: the
+    largest level that somebody has shown."""
 
     theorem: str
     V: Any
@@ -63,7 +67,11 @@ class WantedSet:
     level: float | None = None
     escape: Any = None
     squares: tuple[Any, ...] = ()
+    core: Any = None
+    start: tuple[Any, ...] = ()
+    unsafe: tuple[Any, ...] = ()
     known: float | None = None
+    published: float | None = None
     name: str = ""
 
 
@@ -81,6 +89,19 @@ def indicator(wanted: WantedSet) -> Any:
     return reduce(maximum, (*wanted.V, 0)) if wanted.theorem == "intersection" else wanted.V
 
 
+def common(functions: Sequence[Any]) -> Any:
+    """Return the function that is not negative where none of several is."""
+    return reduce(minimum, functions)
+
+
+def a_state(system: System, wanted: WantedSet, functions: Sequence[Any]) -> tuple[Any, ...]:
+    """Return an exact state at which none of these functions is negative; ValueError where none is found in the box."""
+    state = search.member(Candidate(system, 0 - common(functions), wanted.box), 0.0) if functions else None
+    if state is None:
+        raise ValueError("a set that is empty, as far as states of the box tell")
+    return state
+
+
 def prove(system: System, wanted: WantedSet) -> Claim:
     """Return the claim with what was shown of it."""
     return show(system, wanted).claim
@@ -94,9 +115,24 @@ def show(system: System, wanted: WantedSet) -> Shown:
         raise ValueError(f"a box of {len(wanted.box)} sides for {len(system.names)} variables and parameters")
     if wanted.equilibrium is not None and len(wanted.equilibrium) != len(system.variables):
         raise ValueError(f"an equilibrium of {len(wanted.equilibrium)} numbers for {len(system.variables)} variables")
-    point = None if wanted.equilibrium is None else (*map(exact, wanted.equilibrium), *(None for _ in system.parameters))
-    what = Candidate(system, indicator(wanted), wanted.box, point)
-    return _Proof(wanted, what).shown()
+    if system.angles and (wanted.equilibrium is None or wanted.theorem == "unstable"):
+        raise ValueError(f"{wanted.theorem} with angles: sets and states with a sine or cosine have no exact values")
+    if wanted.theorem == "avoids" and wanted.equilibrium is not None:
+        raise ValueError("what avoids a set has no equilibrium")
+    if any(wanted.equilibrium[system.variables.index(x)] for x in system.angles if wanted.equilibrium):
+        raise ValueError("an equilibrium at which an angle is not zero")
+    if wanted.core is not None and (system.angles or wanted.theorem not in ("attracts", "region")):
+        raise ValueError("a core is told of what attracts, in a system without angles")
+    return _Proof(wanted, candidate(system, wanted)).shown()
+
+
+def candidate(system: System, wanted: WantedSet) -> Candidate:
+    """Return the function V of a claim with its box; of the point that M is if no core is about that."""
+    point = None
+    if wanted.core is None and wanted.equilibrium is not None:
+        others = (*(None for _ in system.parameters), *map(exact, (0, 1) * len(system.angles)))
+        point = (*map(exact, wanted.equilibrium), *others)
+    return Candidate(system, indicator(wanted), wanted.box, point)
 
 
 class _Proof:
@@ -105,7 +141,14 @@ class _Proof:
     def __init__(self, wanted: WantedSet, what: Candidate) -> None:
         self.wanted, self.what = wanted, what
         system = what.system
-        self.programs = {"rates": program(system.rates, system.names), "V": program([what.V], system.names)}
+        self.programs = {"rates": program(system.rates, system.inputs)}
+        self.states: dict[str, tuple[Any, ...]] = {}
+        for role in ("start", "unsafe") if wanted.theorem == "avoids" else ():
+            self.states[role] = a_state(system, wanted, getattr(wanted, role))
+            self.programs[role] = program([common(getattr(wanted, role))], system.inputs)
+        self.programs["V"] = program([what.V], system.inputs)
+        if wanted.core is not None:
+            self.programs["core"] = program([wanted.core], system.inputs)
         self.unstable = wanted.theorem == "unstable"
         self.numbers: dict[str, Any] = {"theorem": wanted.theorem}
         if wanted.level is not None and not self.unstable:
@@ -115,13 +158,14 @@ class _Proof:
 
     def shown(self) -> Shown:
         """Return the claim with its outcome."""
-        kernel = self.proof()
+        kernel = self.avoided() if self.states else self.proof()
         if not isinstance(kernel, str):
             statement = kernel_proves(claim_of(kernel, self.programs)).statement
             if "level" in kernel["numbers"]:
                 self.numbers["level"] = float(Fraction(kernel["numbers"]["level"]))
             self.tell()
             return self.made(Obligation("proof", SQUARES, "proved"), kernel, "filippov" in statement.assumptions)
+        self.programs.pop("core", None)
         for name, word, find in self.refutations():
             state = find()
             if state is not None:
@@ -136,25 +180,35 @@ class _Proof:
         claim = Claim(f"invariant-{self.wanted.theorem}", self.numbers, self.witness, assumptions, (obligation,))
         return Shown(claim, kernel, tuple(self.programs.values()))
 
-    def attempt(self, theorem: str, numbers: dict[str, Fraction], taken: tuple[str, ...] = ()) -> Attempt:
-        """Return a claim for the kernel without evidence."""
+    def attempt(
+        self, theorem: str, numbers: dict[str, Fraction], taken: tuple[str, ...] = (), within: bool = True
+    ) -> Attempt:
+        """Return a claim for the kernel without evidence, of the box, or of all states."""
         wanted, system = self.wanted, self.what.system
         box = dict(zip(system.names, wanted.box, strict=True))
         subject = {f"box.{x}.{k}": str(Fraction(end)) for x, ends in box.items() for k, end in enumerate(ends)}
+        if not within:
+            subject = {f"box.{x}.{k}": subject[f"box.{x}.{k}"] for x in system.parameters for k in (0, 1)}
         point: dict[str, Any] = {}
         if wanted.equilibrium is not None:
             point = dict(zip(system.variables, (fraction(exact(x)) for x in wanted.equilibrium), strict=True))
         told = {f"equilibrium.{x}": v for x, v in point.items()} | numbers
         sizes = scales(box, {x: float(v) for x, v in point.items()})
+        for x in system.angles:
+            sizes |= {turned("sin", x): min(sizes[x], 1.0), turned("cos", x): min(sizes[x] ** 2 / 2.0, 2.0)}
         basis = [self.polynomial(h) for h in wanted.squares] or None
         return Attempt(theorem, self.programs, subject, {x: str(v) for x, v in told.items()}, sizes, basis, taken=taken)
 
     def polynomial(self, function: Any) -> Exact:
-        """Return a function that is not piecewise as the kernel has it."""
-        found = plain(self.what.system, function).to_dict().items()
-        names = self.what.system.names
+        """Return a function that is not piecewise as the kernel has it: from the equilibrium, of a cosine what it lacks."""
+        system = self.what.system
+        found = plain(system, function).to_dict().items()
+        names = system.inputs
         terms = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in found}
-        return Exact({tuple(sorted(m)): Fraction(int(c.p), int(c.q)) for m, c in terms.items()})
+        point = zip(system.variables, self.wanted.equilibrium or (), strict=False)
+        about = {x: var(x) + fraction(exact(at)) for x, at in point}
+        about |= {cosine: 1 - var(cosine) for cosine in (turned("cos", x) for x in system.angles)}
+        return Exact({tuple(sorted(m)): Fraction(int(c.p), int(c.q)) for m, c in terms.items()}).at(about)
 
     def proof(self) -> dict[str, Any] | str:
         """Return the claim with evidence that the kernel accepts, or why there is none."""
@@ -165,23 +219,51 @@ class _Proof:
             return "V is not positive on the border of the box, or V rises however small it is: border"
         if levelled:
             numbers["level"] = Fraction(wanted.level or 0.0)
-        if what.equilibrium is None:
+        given = dict[str, Any]()
+        if wanted.core is not None:
+            inner = self.inner()
+            if isinstance(inner, str):
+                return inner
+            told = {"core.level" if name == "level" else name: Fraction(x) for name, x in inner["numbers"].items()}
+            numbers |= {name: x for name, x in told.items() if not name.startswith("equilibrium")}
+            given = {f"{name[:-1]}core": hint for name, hint in inner["evidence"].items() if name.endswith(" of V")}
+            self.numbers["core"] = float(numbers["core.level"])
+        if what.equilibrium is None and not any(name.startswith("member") for name in numbers):
             falls = wanted.theorem not in ("stable", "unstable")
             member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if falls else 0.0)
             if member is None:
                 return "no state with V <= 0 was found in the box: member"
             numbers |= {f"member.{x}": fraction(v) for x, v in zip(what.pieces.names, member, strict=True)}
-        elif self.unstable:
+        elif self.unstable and what.equilibrium is not None:
             way = search.ray(what, lambda V, slope: V)
             if way is None:
                 return "no direction was found in which V > 0: direction"
             numbers |= {f"direction.{x}": Fraction(v) for x, v in way["direction"].items()}
         escape = None if wanted.escape is None else self.polynomial(wanted.escape)
-        return proved(self.attempt(KERNEL.get(wanted.theorem, "attracts"), numbers), top, escape)
+        attempt = self.attempt(KERNEL.get(wanted.theorem, "attracts"), numbers)
+        attempt.given = given
+        return proved(attempt, top, escape)
+
+    def inner(self) -> dict[str, Any] | str:
+        """Return the claim of the core alone, or why there is no evidence of it."""
+        alone = replace(self.wanted, V=self.wanted.core, core=None, level=None)
+        return _Proof(alone, candidate(self.what.system, alone)).proof()
+
+    def avoided(self) -> dict[str, Any] | str:
+        """Return the claim that one set avoids another with its evidence: of all states, or else in the box."""
+        names = self.what.system.names
+        numbers = {f"{role}.{x}": fraction(v) for role, at in self.states.items() for x, v in zip(names, at, strict=True)}
+        for self.numbers["within"] in (False, True):
+            found = proved(self.attempt("avoids", numbers, within=self.numbers["within"]), math.inf, None)
+            if not isinstance(found, str):
+                break
+        return found
 
     def refutations(self) -> list[tuple[str, str, Callable[[], dict[str, Any] | None]]]:
         """Return what may refute the claim: the names of what is needed and of how V fails, and a search for a state."""
         what, level = self.what, self.wanted.level
+        if what.system.angles or self.states:
+            return []
         sense, word = (-1, "does not grow") if self.unstable else (1, "does not fall")
         found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
         found.append(("continuous", "jumps", lambda: search.jump(what)))
@@ -218,7 +300,7 @@ class _Proof:
     def tell(self) -> None:
         """Say how near the level is to what refutes, and about how large the set."""
         what, numbers = self.what, self.numbers
-        if self.wanted.theorem in ("region", "intersection") and self.wanted.level is None:
+        if self.wanted.theorem in ("region", "intersection") and self.wanted.level is None and not what.system.angles:
             rising, border = (find(what, math.inf, digits=search.NEAR) for find in (search.rising, search.reaching))
             kinds = {"V rises": rising, "border": border}
             above = {kind: float(found["V"]) for kind, found in kinds.items() if found}

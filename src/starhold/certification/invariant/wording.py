@@ -13,6 +13,7 @@ HEADINGS = {
     "region": "region of attraction (theorem 2)",
     "unstable": "unstable (theorem 3)",
     "intersection": "region of attraction (theorem 4)",
+    "avoids": "avoids an unsafe set",
 }
 
 OBLIGATIONS = {
@@ -22,6 +23,9 @@ OBLIGATIONS = {
     "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
     "falls": "V never rises on the set, and falls but where a function is told that grows there",
     "grows": "V grows wherever it is positive in the box",
+    "start": "V is not positive in the start set",
+    "unsafe": "V is positive in the unsafe set",
+    "barrier": "V' is at most V times a polynomial",
     "switching": "where the right-hand side jumps, V changes as it must for every mean there",
 }
 
@@ -33,6 +37,8 @@ def sentence(claim: Claim) -> str:
     where = "a level set of V" if level is None else f"{{V < {down(level)}}}"
     M = "the equilibrium" if claim.witness["equilibrium"] else "M"
     sense = ", in Filippov's sense," if len(claim.assumptions) > 1 else ""
+    if theorem == "avoids":
+        return f"no motion{sense} from the start set comes to the unsafe set" + " while it stays in the box" * n["within"]
     if theorem == "unstable":
         return f"{M} is unstable: every motion{sense} that starts in the box where V > 0 leaves the box"
     if theorem == "stable":
