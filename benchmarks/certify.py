@@ -23,6 +23,7 @@ import numpy as np
 import sympy
 from flint import fmpq
 from scipy.linalg import solve_continuous_are
+from starhold.certification.motion import ATTITUDE, RATE, Motion
 from sympy.core.cache import clear_cache
 
 from common import header, interleaved, show
@@ -31,7 +32,6 @@ from starhold.algebra.quaternion import derivative
 from starhold.algebra.vector import add
 from starhold.certification.certificate import Certificate, write
 from starhold.certification.certify import certify
-from starhold.certification.motion import ATTITUDE, RATE, Motion
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
