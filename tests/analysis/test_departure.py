@@ -64,7 +64,7 @@ def test_a_flight_that_keeps_to_the_assumptions_leaves_nothing():
         "rate = [0.04, 0.03", "rate = [0.004, 0.003"
     )
     _, certificate, flight, left = flown(text.replace("gravity_gradient = true", "gravity_gradient = false") + LAW)
-    kinds = {"convergence", "torque-limit", "inertia", "sampling", "pointing"}
+    kinds = {"convergence", "torque-limit", "inertia", "sampling"}
     assert {claim.kind for claim in certificate.claims} == kinds
     assert left == {"convergence": (), "torque-limit": (), "inertia": ()}
     assert "leaves the claim" not in section([flight])

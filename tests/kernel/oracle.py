@@ -58,7 +58,7 @@ class Oracle:
             self.J = half @ half.T + np.eye(3)
         else:
             self.J = np.array([[self.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in range(3)] for i in range(3)])
-        if "near" in claim["theorem"]:
+        if "near the inertia" in claim["theorem"]:
             self.J = self.near(self.J)
         self.words = claim["taken"]
 

@@ -96,6 +96,11 @@ BROKEN = {
         {"draws_in_its_range"},
     ),
     "an estimate of two numbers": ("estimator", {"Estimate(rate),": "Estimate(rate[:2]),"}, {"measures_what_it_says"}),
+    "an exceeded bound": (
+        "environment",
+        {"def torque": "def bound(params):\n    return 0.0\n\n\ndef torque"},
+        {"keeps_what_it_says"},
+    ),
     "a unit without the period": ("environment", {"def torque": PREPARED}, {"keeps_units"}),
 }  # fmt: skip
 
