@@ -58,12 +58,13 @@ def test_every_claim_of_today_is_proved_by_the_kernel_alone(scenario, law, bundl
     assert done.stdout.count("proved: ") == len(content["claims"])
     claims = {kind(claim): claim for claim in reversed(content["claims"])}
     for own in today.claims:
-        if own.outcome != "proved":
+        # How near a loop comes has tests of its own.
+        if own.outcome != "proved" or own.kind == "pointing":
             continue
         numbers = {name: number(x) for name, x in claims[own.kind]["numbers"].items()}
         for name, mine in (("level", "level"), ("slew_angle", "angle"), ("rate", "rate"), ("longest", "longest")):
             old = own.numbers.get(name)
-            if own.kind not in ("sliding", "pointing") and old and mine in numbers:
+            if own.kind != "sliding" and old and mine in numbers:
                 assert numbers[mine] >= 0.98 * old, (own.kind, name)
         if own.kind == "sliding" and own.numbers["angle"]:
             assert numbers["angle"] <= own.numbers["angle"] / 0.98
