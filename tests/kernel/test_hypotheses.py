@@ -5,7 +5,7 @@ import pytest
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.scalar import less, sign, where
 from starhold.algebra.vector import add, apply, cross, dot, gyroscopic_torque, scale, subtract
-from starhold.certification.evidence.attitude import ASKED, FULL, Q4, V3
+from starhold.certification.evidence.recorded import ASKED, FULL, Q4, V3
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.programs import digest
 from starhold.parts.bodies.rigid_body import angular_acceleration, kinetic_energy

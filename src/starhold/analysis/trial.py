@@ -15,8 +15,8 @@ from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO
 from starhold.analysis.departure import proved_by, shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.evidence.attitude import TURNS
 from starhold.certification.evidence.claims import settles
+from starhold.certification.evidence.recorded import TURNS
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import ROWS, angular_acceleration

@@ -8,8 +8,9 @@ from math import inf, isfinite
 from typing import Any
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop, sign_words
+from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop
 from starhold.certification.evidence.pointing import POINTS
+from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends

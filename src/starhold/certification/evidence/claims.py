@@ -9,20 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.certification.evidence.attitude import (
-    ANY_ANGLE,
-    ASKED,
-    CONVERGES,
-    EVENLY,
-    SAMPLED,
-    SLIDING,
-    STRICTLY,
-    Loop,
-    sign_words,
-)
+from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, EVENLY, SAMPLED, SLIDING, STRICTLY, Loop
 from starhold.certification.evidence.finding import floats, obligations
 from starhold.certification.evidence.inertia import find_near
 from starhold.certification.evidence.isotropic import find_isotropic
+from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.refuted import against_sampling
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.subject import Subject

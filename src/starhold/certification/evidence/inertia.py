@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from starhold.certification.evidence.attitude import ANY_ANGLE, NEARBY, Loop, fall, sign_words
+from starhold.certification.evidence.attitude import ANY_ANGLE, NEARBY, Loop, fall
 from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, settled, solved
 from starhold.kernel.loops import HYSTERESIS, WHEELS
 from starhold.kernel.numbers import RefusedError

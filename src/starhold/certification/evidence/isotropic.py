@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.scalar import Scalar
-from starhold.certification.evidence.attitude import ASKED, Loop, sign_words
+from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import obligations
+from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.mixed import SIGNED, Shape, near

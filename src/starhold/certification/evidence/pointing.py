@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.evidence.attitude import Loop, sign_words
+from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
+from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.openness import Pushes, pushes
 from starhold.certification.subject import above
 from starhold.kernel.held import RATE, STATE, TURN, Held, Region

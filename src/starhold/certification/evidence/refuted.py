@@ -10,8 +10,9 @@ from math import isfinite, isinf, pi, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.certification.evidence.attitude import ASKED, CONVERGES, SAMPLED, SLIDING, Loop
+from starhold.certification.evidence.attitude import CONVERGES, SAMPLED, SLIDING, Loop
 from starhold.certification.evidence.finding import read
+from starhold.certification.evidence.recorded import ASKED
 from starhold.certification.matrices import number
 from starhold.certification.subject import perigee
 from starhold.kernel.loops import AttitudeLoop, around
