@@ -125,7 +125,7 @@ REFUSED = {
     "invariant": [
         ("none.toml", "no such file"),
         ("van-der-pole", "did you mean van-der-pol?"),
-        ("bad.toml", 'bad.toml: rates.y: found the function "sin"; allowed: one of where, min'),
+        ("bad.toml", 'bad.toml: rates.y: found the function "sinh"; allowed: one of where, min'),
     ],
     "sail": [
         ("-o " + 5000 * "x", "File name too long"),
@@ -149,7 +149,7 @@ REFUSED = {
 @pytest.mark.parametrize("command", REFUSED)
 def test_user_errors_are_one_line_and_exit_code_2(command, short):
     (short / "tight.toml").write_text(builtin_text("landing-limits").replace('"50 deg/s^2"', '"5 deg/s^2"'))
-    (short / "bad.toml").write_text(invariant_file(y="sin(x)"))
+    (short / "bad.toml").write_text(invariant_file(y="sinh(x)"))
     for words, said in REFUSED[command]:
         done = starhold(command, *(word.replace("_", " ") for word in words.split()), cwd=short)
         complains(done, said)

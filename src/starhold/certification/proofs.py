@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from math import pi, sqrt
 from typing import Any
@@ -69,7 +70,7 @@ def proved_claims(
     if pointing and not subject.loop.remembers:
         find_pointed(found)
     find_refuted(found, turn, rate)
-    claims = checked(found)
+    claims = met(checked(found))
     # What is refuted is what was asked for, where less may be proved.
     against = [claim for claim in claims if claim.outcome == "refuted"]
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
@@ -89,6 +90,20 @@ def checked(found: Loop) -> list[Claim]:
         return []
     content = certificate(found.programs, found.claims)
     return [made(proved, given, found) for proved, given in zip(check(json.dumps(content)), found.claims, strict=True)]
+
+
+def met(claims: list[Claim]) -> list[Claim]:
+    """Return claims without the assumption that the torque has no limit, where one of them shows that the law keeps within
+    it in every state; what that one assumes of pushes they assume then."""
+    kept = next((c for c in claims if c.kind == "torque-limit" and c.outcome == "proved" and c.numbers["everything"]), None)
+    if kept is None:
+        return claims
+    bounds = tuple(name for name in kept.assumptions if name.startswith("bounded-"))
+    own = [tuple(name for name in claim.assumptions if name != UNLIMITED) for claim in claims]
+    return [
+        claim if names == claim.assumptions else replace(claim, assumptions=tuple(dict.fromkeys(names + bounds)))
+        for claim, names in zip(claims, own, strict=True)
+    ]
 
 
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:

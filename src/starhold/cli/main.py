@@ -122,11 +122,16 @@ def _fly(
                 studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
                 for loop, flight in zip(loops, flights, strict=True)
             ]
-        if certify:
-            flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         with painter.paused():
             flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
         print_outcome(flights)
+        if certify:
+            # What was flown is not kept waiting by proofs.
+            flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
+        if any(flight.certificates for flight in flights):
+            from starhold.cli.show_certificates import print_proved
+
+            print_proved(flights)
         page = write_results(scenario, flights, folder)
         unpainted = painter.finish()
     console.print(f"Report: {page}", soft_wrap=True)

@@ -44,7 +44,7 @@ def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, i
 
 
 def print_outcome(flights: Sequence[Flight]) -> None:
-    """The table, warnings and proved claims."""
+    """The table and warnings."""
     from starhold.report.text import lost_text, unknown_text
 
     print_table(flights)
@@ -63,10 +63,6 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
             said, kept = transient_text(flight), flight.metrics["limits_kept"]
             console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False, highlight=False)
-    if any(flight.certificates for flight in flights):
-        from starhold.cli.show_certificates import print_proved
-
-        print_proved(flights)
 
 
 def _step_text(flight: Flight) -> str:

@@ -36,6 +36,7 @@ def check(text: str) -> list[Proved]:
 
 def prove(claim: Claim) -> Proved:
     """Check each obligation of a claim's theorem; RefusedError where one is not shown."""
+    Account.open()
     demand(claim.theorem in THEOREMS, "there is no such theorem")
     needed, shown = THEOREMS[claim.theorem](claim), list[tuple[str, Obligation]]()
     while True:

@@ -35,7 +35,7 @@ class Account:
 
     @classmethod
     def open(cls) -> None:
-        """Begin a check."""
+        """Begin a claim."""
         cls.left = WORK
 
     @classmethod

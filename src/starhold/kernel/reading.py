@@ -14,7 +14,7 @@ from .programs import Program
 FORMAT = "starhold certificate 3"
 ASIDE = {"certificates", "note", "scenario", "versions"}
 """What a certificate may hold beside proofs, and the kernel does not read."""
-BYTES, CLAIMS, NUMBERS = 8_000_000, 500, 2_000
+BYTES, CLAIMS, NUMBERS = 8_000_000, 100, 2_000
 _T = TypeVar("_T")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import acos, asin, inf, isfinite, sqrt
+from math import acos, asin, inf, isfinite, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,8 @@ BISECTIONS = 6
 """Of a level, between it and four times it."""
 NEAR = 1.1
 """How many times the least level those of other limits may be, to be looked at again."""
+LEAST_TURN = 1e-12
+"""The turn (rad) that a set holds if it is to hold a smaller one: no sum of squares tells those from none."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
 """Shares of a largest level that are given away, for at the largest the matrices are singular."""
 
@@ -67,10 +69,8 @@ class Loop(RecordedLoop):
                 more = {name: x for name, x in more.items() if name != "rate"}
                 self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
                 return
-        if signs:
+        if signs or not self.show_strictly(turn):
             self.show_bounded([*(w for w in self.words if w != OUTSIDE), *signs], widths, turn)
-        else:
-            self.show_strictly(turn)
 
     def show_any_inertia(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> None:
         """Find the claim for every inertia, by the law's own V or by the kinetic energy and its stiffness."""
@@ -82,14 +82,14 @@ class Loop(RecordedLoop):
         energy = self.lyapunov(-float(rest.given[0].terms.get(("q1",), 0)))
         self.try_to_show(self.claim(every, words, energy, **more), self.scales(energy))
 
-    def show_strictly(self, turn: float | None = None) -> None:
+    def show_strictly(self, turn: float | None = None) -> bool:
         """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that falls strictly: V' is linear in s and epsilon."""
         words = [w for w in self.words if w != OUTSIDE]
         try:
             base, *own = (self.falling(words, *pair) for pair in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
         except RefusedError as reason:
             self.failed[STRICTLY] = str(reason)
-            return
+            return False
         steps = [o.p - base.p for o in own]
         others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, 18), strict=True) for c in parts]
         unit = (
@@ -98,14 +98,18 @@ class Loop(RecordedLoop):
         found = solved(posed(base.p, [-p for p in steps], others, base.z[:18]), {f"w{k}": unit for k in (1, 2, 3)})
         if found is None:
             self.failed[STRICTLY] = "no V was found"
-            return
+            return False
         V = self.crossed(*(float(f"{x:.4g}") for x in found[:2]))
-        self.try_to_show(self.claim(STRICTLY, words, V), self.scales(V))
+        shown = self.try_to_show(self.claim(STRICTLY, words, V), self.scales(V))
         # The law's own V falls where the body is not too fast, and has the larger sets within the limits.
         self.show_limits(STRICTLY, words, self.leaning(LEANS), {"fastest": 1}, turn)
+        return shown
 
     def show_bounded(self, words: list[str], widths: dict[str, Any], turn: float | None) -> None:
         """Find a set in which the law's own V falls, for the rate is bounded there, and a set within limits."""
+        own = self.form(self.lyapunov())
+        if not (np.linalg.eigvalsh(curvature(own, "w"))[0] > 0.0 > own.terms.get(("q0",), 0)):
+            return
         for theorem, V in ((CONVERGES, self.lyapunov()), (STRICTLY, self.leaning(LEANS))):
             level = self.highest_falling(theorem, words, V, widths)
             if level is None:
@@ -179,13 +183,14 @@ class Loop(RecordedLoop):
             self.failed[f"{theorem}, limits"] = "no level was found"
             return False
         form, scales = self.form(V), self.scales(V, float(level))
-        for share in GIVEN_AWAY:
+        # With a unit vector the first of them are too near to singular, and cost the most.
+        for share in GIVEN_AWAY[2:] if "limit.norm" in numbers else GIVEN_AWAY:
             lower = Fraction(float(level * (1 - share)))
             held = self.contents(form, lower)
             if turn is not None and held["angle"] < turn:
                 self.failed[f"{theorem}, limits"] = "the set that was found does not hold the turn"
                 break
-            told = numbers | held | ({} if turn is None else {"angle": turn})
+            told = numbers | held | ({} if turn is None else {"angle": max(turn, LEAST_TURN)})
             if "fastest" in numbers:
                 told |= self.slowly(V, lower)
             if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
@@ -196,7 +201,7 @@ class Loop(RecordedLoop):
         """Return a level below V where other rests are, or where the sign of the quaternion changes."""
         p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
         values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        return min(values[1:]) if theorem == EVENLY or SHORTEST in words else inf
+        return min(values[1:]) if SHORTEST in words else inf
 
     def largest_level(self, claim: dict[str, Any], V: str, cap: float) -> Fraction | None:
         """Return the largest level that keeps all limits of a claim, and stays below the cap."""
@@ -230,18 +235,17 @@ class Loop(RecordedLoop):
         rate it holds every attitude, all a little less."""
         P, N = (curvature(form, x) for x in "wq")
         less, s = 1.0 - 1e-7, -float(form.terms.get(("q0",), 0))
-        if s > 0.0:
-            angle = 2.0 * acos(max(1.0 - float(level) / s, -1.0))
-        else:
-            angle = 2.0 * asin(min(sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(N)[-1])), 1.0))
+        top = 2.0 * s if s > 0.0 else 0.5 * float(np.linalg.eigvalsh(N)[-1])
+        half = acos(max(1.0 - float(level) / s, -1.0)) if s > 0.0 else asin(min(sqrt(float(level) / top), 1.0))
+        angle = 2.0 * half
         rate = sqrt(2.0 * float(level) / float(np.linalg.eigvalsh(P)[-1]))
-        if not float(level) > 2.0 * s > 0.0:
+        if not float(level) > top:
             return {"angle": angle * less, "rate": rate * less}
         # Above V at the other rest every turn is in the set. A mixed term is at most 2 lean sqrt(s T), T being the energy.
         lean = 0.5 * LEANS * any({"q", "w"} == {name[0] for name in m} for m in form.terms)
-        energy = (sqrt(lean * lean * s + float(level) - 2.0 * s) - lean * sqrt(s)) ** 2
+        energy = (sqrt(lean * lean * s + float(level) - top) - lean * sqrt(s)) ** 2
         fastest = sqrt(2.0 * energy / float(np.linalg.eigvalsh(P)[-1])) * less
-        return {"angle": angle, "rate": rate * less, "start.angle": ANY_ANGLE, "start.rate": fastest}
+        return {"angle": 2.0 * pi, "rate": rate * less, "start.angle": ANY_ANGLE, "start.rate": fastest}
 
 
 def fall(wanted: Mapping[str, Obligation]) -> Squares:

@@ -28,7 +28,8 @@ class NotFoundError(Exception):
 
 
 def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
-    """Return a claim as the kernel has it, with the evidence that theorems ask for themselves."""
+    """Return a claim as the kernel has it, with the evidence that theorems ask for themselves, and no limit on work."""
+    Account.left = 10**12
     return Claim(
         claim["theorem"],
         Told("words", dict.fromkeys(claim["taken"], True)),
@@ -42,7 +43,6 @@ def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
 def obligations(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> tuple[dict[str, rules.Obligation], Claim]:
     """Return what has to be shown of a claim, and the claim, which knows what of it was read."""
     known = read(claim, programs)
-    Account.left = 10**12
     return dict(THEOREMS[known.theorem](known)), known
 
 
@@ -51,7 +51,6 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
     obligation does not hold, or no evidence for it was found."""
     try:
         wanted, known = obligations(claim, programs)
-        Account.left = 10**12
         with warnings.catch_warnings():
             # The kernel decides of what an ill-conditioned matrix gives.
             warnings.simplefilter("ignore", linalg.LinAlgWarning)

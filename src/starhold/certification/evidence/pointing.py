@@ -20,7 +20,7 @@ from starhold.certification.openness import Pushes, pushes
 from starhold.certification.subject import above
 from starhold.kernel.held import RATE, STATE, TURN, Held, Region
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop, slopes
-from starhold.kernel.numbers import Account, RefusedError, Rows, demand, norm
+from starhold.kernel.numbers import RefusedError, Rows, demand, norm
 from starhold.kernel.theorems.pointing import image, periods, points
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
@@ -203,7 +203,6 @@ class Pushed:
     def held(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
         V = self.loop.crossed(self.stiffness, epsilon)
-        Account.left = 10**12
         return V, Held(AttitudeLoop(read(self.loop.claim(POINTS, self.words, V, **self.told), self.loop.by_digest)))
 
     def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
@@ -216,7 +215,6 @@ class Pushed:
             lean = epsilon * sin(min(angle, pi) / 2.0)
             level = 4.0 * self.stiffness * sin(angle / 4.0) ** 2 + J * rate * (rate / 2.0 + lean)
             begun.append(Chain(held, V, level * (1.0 + 1e-6)))
-        Account.left = 10**12
         # The best in the small is tried first, and taken if it comes down from the whole set.
         begun.sort(key=Chain.aim)
         if begun[0].asks_more(limits or {}):

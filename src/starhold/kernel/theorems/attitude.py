@@ -50,7 +50,8 @@ def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
     demand(not at_half_turns.terms, "the torque at rest is not zero at every half turn")
     yield "rests at half turns only", Squares(horner(pull, loop.q[0]), own, 3, modulo=[loop.sphere])
     demand(all(len(m) == 2 and "q0" not in m for m in resting.terms), "V at rest is no form of q1, q2, q3")
-    if level is None:
+    at_axes = [resting.terms.get((name, name), 0) for name in ("q1", "q2", "q3")]
+    if level is None or level >= min(at_axes):
         said.append("comes to rest on target or at a half turn, each of which is unstable")
     else:
         yield "half turns are outside", Squares(resting - level, [poly(1), *own], 1, modulo=[dot(own, own) - 1])

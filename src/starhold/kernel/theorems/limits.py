@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from ..loops import AXES, NONE, AttitudeLoop
 from ..numbers import Rows, definite, demand, inverse, times, transpose
-from ..polynomials import Poly, apply, dot, poly, variables
+from ..polynomials import Poly, apply, dot, poly, var, variables
 from ..programs import joined
 from ..rules import Obligation, Squares
 from ..sentences import Statement, above, below, enumerated
@@ -30,10 +30,13 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Generator
     unlimited = ["unlimited-wheels"] * (loop.wheels and (not told or len(told) < 2 * count))
     if limit is None and norm is None and not told:
         return Statement("", ("unlimited-torque", *unlimited))
-    known, bounded, bounds, assumed = list[Poly](), list[list[Poly]](), list[str](), list[str]()
+    known, squared, bounded = list[Poly](), list[Poly](), list[list[Poly]]()
+    bounds, assumed = list[str](), list[str]()
     if loop.outside:
         outside = [numbers[f"outside.{k}"] for k in range(3)]
         known += [most - sign * e for most, e in zip(outside, loop.e, strict=True) for sign in (1, -1)]
+        # A norm multiplies them by the unit vector, which needs their squares.
+        squared = [most * most - e * e for most, e in zip(outside, loop.e, strict=True)]
         bounds.append(f"a torque from outside of up to {', '.join(map(below, outside))} N m about the axes")
         assumed.append("bounded-outside-torque")
     vectors = [("target.rate", loop.r, "a target that turns at up to {} rad/s")] * loop.moving
@@ -72,10 +75,12 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Generator
             load = rest + dot([row[k] for k in used], case.value)
             # Of what is bounded from outside only what the load depends on.
             felt = [vector for vector in bounded if any(x.names <= load.names for x in vector)]
+            turned = bool(squared) and row is UNIT
+            felt += [loop.e] * turned
             z = [poly(1), *q, *w, *(x for vector in felt for x in vector)]
             if load.terms:
                 full = name if len(cases) == 1 else f"{name} {n}"
-                yield full, within(bound, load, z, w, [*case.known, *known], [loop.sphere])
+                yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
     with_ = f"with {enumerated(bounds)} " if bounds else ""
     return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if told else TORQUE)
 
@@ -96,6 +101,10 @@ def within(
     if not UNIT[0].names <= load.names:
         return Squares(bound - load, z, 0, known, modulo)
     more = [*UNIT, *(d * x for d in UNIT for x in paired)]
+    # A torque with products of attitudes in it needs their squares.
+    own = [x for x in z if x.names & {"q1", "q2", "q3"}]
+    if any(sum(name[0] == "q" for name in m) == 2 for m in load.terms):
+        more += [a * b for k, a in enumerate(own) for b in [var("q0"), *own[k:]]]
     return Squares(bound - load, [*z, *more], 0, known, [*modulo, dot(UNIT, UNIT) - 1])
 
 
