@@ -116,4 +116,5 @@ def described_station(loop: ClosedLoop) -> dict[str, Any]:
         "lag": 0.0 if lag is None else lag.params.lag,
         "control_period": loop.period,
         "assumed_away": assumed_away(loop),
+        "parts": len(loop.parts),
     }

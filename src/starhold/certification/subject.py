@@ -108,6 +108,7 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
         "disturbance": number(subject.disturbance) if "sliding" in kinds else 0.0,
         "control_period": loop.period,
         "assumed_away": assumed_away(loop),
+        "parts": len(loop.parts),
         "wheels": None if loop.wheels is None else _described_wheels(subject, loop.wheels),
     }
 

@@ -54,15 +54,35 @@ def speed(rate: float, up: bool = False) -> str:
 def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
     """The claim in a sentence, whether or not it is proved, with the assumption about the loop's limits that decides it.
     Numbers that are refuted are rounded to say no less."""
-    told = _SENTENCES[claim.kind]({**claim.numbers, "refuted": claim.outcome == "refuted"}, subject)
-    return f"{_unlimited(claim, subject)}{told}"
-
-
-def _unlimited(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """The parts and limits that a claim takes away from the loop; empty where it has none."""
-    absent = [name.removeprefix(WITHOUT) for name in claim.assumptions if name.startswith(WITHOUT)]
     # What a loop has and a claim leaves out decides what the claim is worth.
-    return (f"without {enumerated(absent)}, " if absent else "") + _unbounded(claim, subject)
+    absent = left_out(claim)
+    return (f"without {enumerated(absent)}, " if absent else "") + told(claim, subject)
+
+
+def told(claim: Claim, subject: Mapping[str, Any]) -> str:
+    """The claim in a sentence without the parts that it leaves out."""
+    numbers = {**claim.numbers, "refuted": claim.outcome == "refuted"}
+    return _unbounded(claim, subject) + _SENTENCES[claim.kind](numbers, subject)
+
+
+def left_out(claim: Claim) -> list[str]:
+    """The parts of the loop that a claim is not about, each as role and name."""
+    return [name.removeprefix(WITHOUT) for name in claim.assumptions if name.startswith(WITHOUT)]
+
+
+def ranked(certificate: Certificate) -> list[Claim]:
+    """The claims, those that leave out the fewest parts of the loop first."""
+    return sorted(certificate.claims, key=lambda claim: len(left_out(claim)))
+
+
+def coverage(claim: Claim, subject: Mapping[str, Any]) -> str:
+    """How many of the loop's parts a claim takes in; empty where that is not told of the loop."""
+    count, absent = subject.get("parts"), len(left_out(claim))
+    if not count:
+        return ""
+    return (
+        f"{count - absent} of the loop's {count} parts are in it" if absent else f"all {count} parts of the loop are in it"
+    )
 
 
 def enumerated(names: Sequence[str]) -> str:

@@ -160,6 +160,7 @@ SUBJECT: dict[str, Test] = {
     "disturbance": _number,
     "control_period": _number,
     "assumed_away": _list(_text),
+    "parts": lambda x: type(x) is int and x >= 0,
     "wheels": _or_none(_within(_WHEELS)),
 }
 UNKNOWN_BODY: dict[str, Test] = {"body": _text, "law": _text}
@@ -174,5 +175,6 @@ STATION: dict[str, Test] = {
     "lag": _number,
     "control_period": _number,
     "assumed_away": _list(_text),
+    "parts": lambda x: type(x) is int and x >= 0,
 }
 """The subject where a loop keeps a craft near a libration point."""

@@ -17,6 +17,7 @@ from starhold.cli.arguments import (
     Rocq,
     ScenarioFile,
     Unstable,
+    Why,
 )
 
 
@@ -26,6 +27,7 @@ def certify(
     output: CertifyOutput = None,
     force: Force = False,
     rocq: Rocq = False,
+    why: Why = False,
     allow_unstable: Unstable = False,
 ) -> None:
     """Prove what each law guarantees on this spacecraft: a table and certificate.json.
@@ -43,7 +45,7 @@ def certify(
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
     tried = certify_scenario(scenario, law)
     for one in tried:
-        print_certificate(one)
+        print_certificate(one, why)
     certificates = [one.certificate for one in tried]
     path = write_proofs(certificates, scenario.name, folder)
     console.print(f"Certificate: {path}. Re-check it: {recheck(certificates, path)}", soft_wrap=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -11,7 +11,18 @@ from rich.table import Table
 from starhold.certification.assumptions import texts
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.obligations import OBLIGATIONS
-from starhold.certification.wording import HEADINGS, eigenvalues, evidence, methods, sentence, unclaimed
+from starhold.certification.wording import (
+    HEADINGS,
+    coverage,
+    eigenvalues,
+    enumerated,
+    evidence,
+    left_out,
+    methods,
+    ranked,
+    told,
+    unclaimed,
+)
 from starhold.cli.console import console
 from starhold.cli.show import print_rows
 from starhold.report.commands import Column
@@ -36,24 +47,32 @@ COLOURS = {
 }
 
 
-def print_certificate(tried: Tried) -> None:
-    """Claims with their outcomes, why those that are not proved are not, the assumptions, and the flights."""
+def print_certificate(tried: Tried, why: bool = False) -> None:
+    """Claims with their outcomes, those that leave out the fewest parts of the loop first, each list of such parts once, and
+    why claims that are not proved are not. why: how each was shown, too, and all assumptions."""
     certificate, trial, inside = tried
+    subject = certificate.subject
     console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
     if not certificate.claims:
-        console.print(f"  no claim: {_safe(unclaimed(certificate.subject))}", highlight=False)
-    table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
-    for _ in range(3):
-        table.add_column(overflow="fold")
-    for claim in certificate.claims:
-        statement = _safe(sentence(claim, certificate.subject))
-        table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], f"{statement} [dim]({methods(claim)})[/dim]")
-        if "eigenvalues" in claim.numbers:
-            table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
-        for line in reasons(claim):
-            table.add_row("", "", _safe(line))
-    if certificate.claims:
+        console.print(f"  no claim: {_safe(unclaimed(subject))}", highlight=False)
+    groups: dict[tuple[str, ...], list[Claim]] = {}
+    for claim in ranked(certificate):
+        groups.setdefault(tuple(left_out(claim)), []).append(claim)
+    for absent, claims in groups.items():
+        without = f", without {enumerated(absent)}" if absent else ""
+        if heading := coverage(claims[0], subject):
+            console.print(f"  [dim]{_safe(heading + without)}:[/dim]", highlight=False)
+        table = _grid()
+        for claim in claims:
+            how = f" [dim]({methods(claim)})[/dim]" if why else ""
+            statement = _safe(told(claim, subject))
+            table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], statement + how)
+            if why and "eigenvalues" in claim.numbers:
+                table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
+            for line in reasons(claim):
+                table.add_row("", "", _safe(line))
         console.print(table, highlight=False)
+    if why and certificate.claims:
         console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]", highlight=False)
     outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
     if outside:
@@ -66,24 +85,47 @@ def print_certificate(tried: Tried) -> None:
 
 
 def print_proved(flights: Sequence[Flight]) -> None:
-    """One line for each claim of several laws, and how their flights leave what is proved."""
-    console.print("\nCertified on this spacecraft (starhold certify tells how):", highlight=False)
+    """The claim of each law that leaves out the least, the names of the others, and until when they cover a flight."""
+    console.print("\nCertified on this spacecraft (starhold certify --why tells how):", highlight=False)
+    table = _grid()
+    for flight in flights:
+        for place, certificate in enumerate(flight.certificates):
+            for left, outcome, text in _summary(flight, place, certificate):
+                table.add_row(f"  {_safe(left)}", outcome, _safe(text))
+    console.print(table, highlight=False)
+
+
+def _grid() -> Table:
+    """A table of three columns without lines."""
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
     for _ in range(3):
         table.add_column(overflow="fold")
-    for flight in flights:
-        for place, certificate in enumerate(flight.certificates):
-            name, texts = _safe(certificate.name), dict[str, list[str]]()
-            for claim in certificate.claims:
-                table.add_row(f"  {name}", _coloured(claim.outcome), _safe(sentence(claim, certificate.subject)))
-                name = ""
-                texts.setdefault(left_text(flight, place, claim.kind), []).append(HEADINGS[claim.kind])
-            if not certificate.claims:
-                table.add_row(f"  {name}", _coloured("undecided"), "no claim")
-            for text, kinds in texts.items():
-                if text:
-                    table.add_row("", "[yellow]left[/yellow]", f"by this flight, {', '.join(kinds)}: {text}")
-    console.print(table, highlight=False)
+    return table
+
+
+def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[tuple[str, str, str]]:
+    """At most three rows about a certificate: its first claim, the others by their names, and what a flight keeps to."""
+    claims, name = ranked(certificate), certificate.name
+    if not claims:
+        yield name, _coloured("undecided"), "no claim"
+        return
+    first, *others = sorted(claims, key=lambda claim: claim.outcome != "proved")
+    covered = coverage(first, certificate.subject)
+    yield name, _coloured(first.outcome), told(first, certificate.subject) + (f" ({covered})" if covered else "")
+    named: dict[str, list[str]] = {}
+    for claim in others:
+        named.setdefault(claim.outcome, []).append(HEADINGS[claim.kind])
+    if others:
+        yield "", "[dim]and[/dim]", "; ".join(f"{outcome}: {', '.join(kinds)}" for outcome, kinds in named.items())
+    proved = {claim.kind for claim in claims if claim.outcome == "proved"}
+    begins = {kind: left for kind, left in (flight.departures[place] if flight.departures else {}).items() if kind in proved}
+    if begins and all(begins.values()):
+        last = max(begins, key=lambda kind: begins[kind][0].time)
+        yield (
+            "",
+            "[yellow]left[/yellow]",
+            f"nothing proved covers this flight {left_text(flight, place, last).partition(';')[0]}",
+        )
 
 
 def reasons(claim: Claim) -> list[str]:
