@@ -80,9 +80,8 @@ def coverage(claim: Claim, subject: Mapping[str, Any]) -> str:
     count, absent = subject.get("parts"), len(left_out(claim))
     if not count:
         return ""
-    return (
-        f"{count - absent} of the loop's {count} parts are in it" if absent else f"all {count} parts of the loop are in it"
-    )
+    share = f"{count - absent} of the loop's {count} parts" if absent else f"all {count} parts of the loop"
+    return f"{share} are in it"
 
 
 def enumerated(names: Sequence[str]) -> str:

@@ -121,11 +121,8 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
     begins = {kind: left for kind, left in (flight.departures[place] if flight.departures else {}).items() if kind in proved}
     if begins and all(begins.values()):
         last = max(begins, key=lambda kind: begins[kind][0].time)
-        yield (
-            "",
-            "[yellow]left[/yellow]",
-            f"nothing proved covers this flight {left_text(flight, place, last).partition(';')[0]}",
-        )
+        when = left_text(flight, place, last).partition(";")[0]
+        yield "", "[yellow]left[/yellow]", f"nothing proved covers this flight {when}"
 
 
 def reasons(claim: Claim) -> list[str]:
