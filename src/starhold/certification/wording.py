@@ -56,10 +56,10 @@ def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
     Numbers that are refuted are rounded to say no less."""
     # What a loop has and a claim leaves out decides what the claim is worth.
     absent = left_out(claim)
-    return (f"without {enumerated(absent)}, " if absent else "") + told(claim, subject)
+    return (f"without {enumerated(absent)}, " if absent else "") + statement(claim, subject)
 
 
-def told(claim: Claim, subject: Mapping[str, Any]) -> str:
+def statement(claim: Claim, subject: Mapping[str, Any]) -> str:
     """The claim in a sentence without the parts that it leaves out."""
     numbers = {**claim.numbers, "refuted": claim.outcome == "refuted"}
     return _unbounded(claim, subject) + _SENTENCES[claim.kind](numbers, subject)

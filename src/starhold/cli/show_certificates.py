@@ -20,7 +20,7 @@ from starhold.certification.wording import (
     left_out,
     methods,
     ranked,
-    told,
+    statement,
     unclaimed,
 )
 from starhold.cli.console import console
@@ -65,8 +65,8 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
         table = _grid()
         for claim in claims:
             how = f" [dim]({methods(claim)})[/dim]" if why else ""
-            statement = _safe(told(claim, subject))
-            table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], statement + how)
+            text = _safe(statement(claim, subject))
+            table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], text + how)
             if why and "eigenvalues" in claim.numbers:
                 table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
             for line in reasons(claim):
@@ -111,7 +111,7 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
         return
     first, *others = sorted(claims, key=lambda claim: claim.outcome != "proved")
     covered = coverage(first, certificate.subject)
-    yield name, _coloured(first.outcome), told(first, certificate.subject) + (f" ({covered})" if covered else "")
+    yield name, _coloured(first.outcome), statement(first, certificate.subject) + (f" ({covered})" if covered else "")
     named: dict[str, list[str]] = {}
     for claim in others:
         named.setdefault(claim.outcome, []).append(HEADINGS[claim.kind])
