@@ -26,11 +26,7 @@ class Poly:
         demand(len(self.terms) <= TERMS, "a polynomial is too long")
 
     def __add__(self, other: Poly | Fraction | int) -> Poly:
-        found, more = dict(self.terms), poly(other).terms
-        Account.spend(len(found) + len(more) + 1, longest(more.values()))
-        for m, c in more.items():
-            found[m] = found.get(m, Fraction(0)) + c
-        return Poly(found)
+        return total((self, poly(other)))
 
     def __mul__(self, other: Poly | Fraction | int) -> Poly:
         found: dict[Monomial, Fraction] = {}
@@ -85,14 +81,13 @@ class Poly:
 
     def at(self, values: Mapping[str, Poly | Fraction | int]) -> Poly:
         """Return the polynomial with numbers or polynomials in place of variables, all at once."""
-        total = Poly({})
+        terms = list[Poly]()
         for m, c in self.terms.items():
-            term = Poly({tuple(name for name in m if name not in values): c})
+            terms.append(Poly({tuple(name for name in m if name not in values): c}))
             for name in m:
                 if name in values:
-                    term = term * values[name]
-            total = total + term
-        return total
+                    terms[-1] = terms[-1] * values[name]
+        return total(terms)
 
 
 def poly(value: Poly | Fraction | int) -> Poly:
@@ -112,7 +107,12 @@ def variables(letter: str, first: int = 1, last: int = 3) -> list[Poly]:
 
 def total(parts: Iterable[Poly]) -> Poly:
     """Return a sum."""
-    return sum(parts, Poly({}))
+    found: dict[Monomial, Fraction] = {}
+    for part in parts:
+        Account.spend(len(part.terms) + 1, longest(part.terms.values()))
+        for m, c in part.terms.items():
+            found[m] = found.get(m, Fraction(0)) + c
+    return Poly(found)
 
 
 def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) -> Poly:

@@ -40,7 +40,9 @@ GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
 
 @dataclass
 class Loop(RecordedLoop):
-    """A recorded loop whose claims are searched for."""
+    """A recorded loop whose claims are searched for; `alone`: of those nothing but where motions end."""
+
+    alone: bool = False
 
     def show_end(self, turn: float | None = None) -> None:
         """Find where motions end, by the law's own V or by the kinetic energy in its place. turn: what the set within the
@@ -74,6 +76,8 @@ class Loop(RecordedLoop):
 
     def show_any_inertia(self, theorem: str, words: list[str], V: str, more: dict[str, Any]) -> None:
         """Find the claim for every inertia, by the law's own V or by the kinetic energy and its stiffness."""
+        if self.alone:
+            return
         every = f"{theorem} whatever the inertia"
         if self.try_to_show(self.claim(every, words, V, **more), self.scales(V)) or theorem != CONVERGES:
             return
@@ -83,10 +87,10 @@ class Loop(RecordedLoop):
         self.try_to_show(self.claim(every, words, energy, **more), self.scales(energy))
 
     def show_strictly(self, turn: float | None = None) -> bool:
-        """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that falls strictly: V' is linear in s and epsilon."""
+        """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that decreases strictly: V' is linear in s and epsilon."""
         words = [w for w in self.words if w != OUTSIDE]
         try:
-            base, *own = (self.falling(words, *pair) for pair in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+            base, *own = (self.descent_of(words, *pair) for pair in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
         except RefusedError as reason:
             self.failed[STRICTLY] = str(reason)
             return False
@@ -101,17 +105,17 @@ class Loop(RecordedLoop):
             return False
         V = self.crossed(*(float(f"{x:.4g}") for x in found[:2]))
         shown = self.try_to_show(self.claim(STRICTLY, words, V), self.scales(V))
-        # The law's own V falls where the body is not too fast, and has the larger sets within the limits.
+        # The law's own V decreases where the body is not too fast, and has the larger sets within the limits.
         self.show_limits(STRICTLY, words, self.leaning(LEANS), {"fastest": 1}, turn)
         return shown
 
     def show_bounded(self, words: list[str], widths: dict[str, Any], turn: float | None) -> None:
-        """Find a set in which the law's own V falls, for the rate is bounded there, and a set within limits."""
+        """Find a set in which the law's own V decreases, for the rate is bounded there, and a set within limits."""
         own = self.form(self.lyapunov())
         if not (np.linalg.eigvalsh(curvature(own, "w"))[0] > 0.0 > own.terms.get(("q0",), 0)):
             return
         for theorem, V in ((CONVERGES, self.lyapunov()), (STRICTLY, self.leaning(LEANS))):
-            level = self.highest_falling(theorem, words, V, widths)
+            level = self.highest_decreasing(theorem, words, V, widths)
             if level is None:
                 continue
             told = widths | self.slowly(V, level) | self.contents(self.form(V), level)
@@ -119,10 +123,10 @@ class Loop(RecordedLoop):
                 self.show_limits(theorem, words, V, widths | {"fastest": 1}, turn)
                 return
 
-    def highest_falling(self, theorem: str, words: list[str], V: str, widths: dict[str, Any]) -> Fraction | None:
-        """Return about the largest level up to which V falls, where the quaternion's sign changes too."""
+    def highest_decreasing(self, theorem: str, words: list[str], V: str, widths: dict[str, Any]) -> Fraction | None:
+        """Return about the largest level up to which V decreases, where the quaternion's sign changes too."""
 
-        def falls(level: float) -> bool:
+        def decreases(level: float) -> bool:
             told = widths | self.slowly(V, Fraction(level))
             try:
                 wanted, _ = obligations(self.claim(theorem, words, V, level=level, **told), self.by_digest)
@@ -133,19 +137,19 @@ class Loop(RecordedLoop):
             return all(isinstance(o, Squares) and squares(o, self.scales(V, level)) is not None for o in needed)
 
         cap = self.cap(theorem, words, V) * (1.0 - float(GIVEN_AWAY[0]) - LEANS**2 * (theorem == STRICTLY))
-        if isfinite(cap) and falls(cap):
+        if isfinite(cap) and decreases(cap):
             return Fraction(cap)
         tried = [min(cap, self.potential(V) * 4.0**k) for k in range(-5, 16)]
-        held = [falls(tried[0])]
+        held = [decreases(tried[0])]
         while held[-1] and len(held) < len(tried):
-            held.append(falls(tried[len(held)]))
+            held.append(decreases(tried[len(held)]))
         if not held[0]:
-            self.failed.setdefault(theorem, "V falls on no set that was tried")
+            self.failed.setdefault(theorem, "V decreases on no set that was tried")
             return None
         low, high = (tried[-1],) * 2 if held[-1] else tried[len(held) - 2 : len(held)]
         for _ in range(BISECTIONS if high > low else 0):
             middle = sqrt(low * high)
-            low, high = (middle, high) if falls(middle) else (low, middle)
+            low, high = (middle, high) if decreases(middle) else (low, middle)
         return Fraction(low)
 
     def slowly(self, V: str, level: Fraction) -> dict[str, Any]:
@@ -153,13 +157,15 @@ class Loop(RecordedLoop):
         slowest = float(np.linalg.eigvalsh(curvature(self.form(V), "w"))[0])
         return {"fastest": sqrt(2.0 * float(level) / slowest) * FASTER}
 
-    def falling(self, words: list[str], s: float, epsilon: float) -> Squares:
+    def descent_of(self, words: list[str], s: float, epsilon: float) -> Squares:
         """Return what has to be shown of V'."""
         claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
-        return fall(obligations(claim, self.by_digest)[0])
+        return descent(obligations(claim, self.by_digest)[0])
 
     def show_limits(self, theorem: str, words: list[str], V: str, more: dict[str, Any], turn: float | None) -> bool:
         """Find the largest level on which everything is within its limits; False where that does not hold the turn."""
+        if self.alone:
+            return False
         numbers: dict[str, Any] = dict(more) | self.bounds(words) | self.limits
         if WHEELS in words and self.too_little_momentum():
             self.failed[f"{theorem}, limits"] = "nothing at rest on target has so little momentum"
@@ -248,7 +254,7 @@ class Loop(RecordedLoop):
         return {"angle": 2.0 * pi, "rate": rate * less, "start.angle": ANY_ANGLE, "start.rate": fastest}
 
 
-def fall(wanted: Mapping[str, Obligation]) -> Squares:
+def descent(wanted: Mapping[str, Obligation]) -> Squares:
     """Return what has to be shown of V'. RefusedError for a law that has cases."""
     found = wanted.get("V is non-increasing")
     if not isinstance(found, Squares):

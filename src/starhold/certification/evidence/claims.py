@@ -47,7 +47,7 @@ def find_claims(subject: Subject, turn: float | None = None, tolerance: float | 
 def find_taken_over(subject: Subject, rate: float | None, angle: float | None) -> Loop | None:
     """Find the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) end on target,
     and the one between samples; None where it is not known from where motions end, or no rate is told that this needs."""
-    loop = Loop(subject)
+    loop = Loop(subject, alone=True)
     loop.show_end()
     found = next((c for c in loop.claims if c["theorem"] in ENDING and not LIMITS & c["numbers"].keys()), None)
     if found is None or (rate is None and "level" in found["numbers"]):

@@ -73,7 +73,9 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
         found = plainly(o) or squares(o, scales)
         if found is None:
             raise NotFoundError(f"{name}: no sum of squares was found")
-    elif isinstance(o, rules.Sum):
+        # It was checked as it was found.
+        return found
+    if isinstance(o, rules.Sum):
         found = Reduced(o, scales).evidence()
     elif isinstance(o, rules.Solves):
         found = in_proportion(o) or solves(o)

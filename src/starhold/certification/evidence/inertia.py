@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from starhold.certification.evidence.attitude import ANY_ANGLE, NEARBY, Loop, fall
+from starhold.certification.evidence.attitude import ANY_ANGLE, NEARBY, Loop, descent
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, settled, solved
@@ -74,7 +74,7 @@ def falling(loop: Loop, words: list[str], s: float, epsilon: float, tolerance: f
     """Return what has to be shown of V', less what is known of the inertia."""
     more = {"tolerance": tolerance, "lean": epsilon, "inertia.most": 1}
     claim = loop.claim(NEARBY, words, loop.crossed(s, epsilon), **more)
-    found = fall(obligations(claim, loop.by_digest)[0])
+    found = descent(obligations(claim, loop.by_digest)[0])
     return replace(found, p=settled(found)[0], known=())
 
 
