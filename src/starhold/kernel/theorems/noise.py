@@ -31,6 +31,7 @@ def within_radii(claim: Claim) -> Proof:
     carried = [linear(claim, CARRIED)] * (int(every) - 1) if every > 1 else []
     steps = [*carried, linear(claim, CORRECTED)]
     size = len(steps[0][0][0])
+    demand(len(steps[-1][0][0]) == size, "the errors are not those of one estimate")
     shapes = [matrix(shape, size, size) for shape in read_list(claim.evidence["covariances"], int(every))]
     widths = dict(zip(TOLD, map(rational, read_list(claim.evidence["deviations"], len(TOLD))), strict=True))
     # The last sample before those of the list is like their last.
@@ -45,8 +46,8 @@ def within_radii(claim: Claim) -> Proof:
     missed = samples * sum(tail(numbers[f"noise.{name}"], width) for name, width in widths.items())
     yield "share", Exceeds(share, missed)
     text = (
-        f", and errors that noise drives of up to {below(numbers['noise.attitude'])} rad and"
-        f" {below(numbers['noise.rate'])} rad/s: all this at {samples} samples on end with a probability of at least"
+        f", of these errors up to {below(numbers['noise.attitude'])} rad and {below(numbers['noise.rate'])} rad/s driven by"
+        f" noise: all this at {samples} samples on end with a probability of at least"
         f" {below(1 - share)}"
     )
     return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate"))
