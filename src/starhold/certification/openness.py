@@ -59,12 +59,13 @@ def pushes(loop: ClosedLoop) -> Pushes:
 
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
-    """The errors that noise drives, of an estimate, or of readings that the law is told as they are; None without noise, or
-    where parts do not say all about it."""
+    """The errors that noise drives, of an estimate, or of readings that the law is told as they are; None without noise,
+    where parts do not say all about it, and where the target depends on the law's mode."""
     estimators = loop.used("estimator")
     wanted = {name for f in estimators for name in f.part.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
-    if not sensors or not all(f.part.hook("noise") is not None and _bounded(f) is not None for f in sensors):
+    told = all(f.part.hook("noise") is not None and _bounded(f) is not None for f in sensors)
+    if not sensors or not told or loop.target.part.flag("BY_MODE"):
         return None
     noise = Noise()
     for f in sensors:
