@@ -12,6 +12,8 @@ from starhold.conformance.bench import sample_loop
 from starhold.laws import lqr, matrix_pd
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import fields
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.contract import Noise
 from starhold.parts.craft import bare_inertia, make_craft, tensor
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.wheels import axial_inertia, make_wheels
@@ -114,6 +116,9 @@ def is_pointing(claim):
 
 
 def says(fitted):
-    """Whether a part tells a bound of its torque, or finite ones of its errors."""
-    bound, error = (fitted.part.hook(name) for name in ("bound", "error"))
-    return bound is not None or (error is not None and np.isfinite(error(fitted.params)).all())
+    """Whether a part tells a bound of its torque, or finite ones of its errors and no noise; or shows what is not read."""
+    if fitted.part.role == "sensor" and not {*fitted.part.module.Reading._fields} & {*State._fields}:
+        return True
+    bound, error, noise = (fitted.part.hook(name) for name in ("bound", "error", "noise"))
+    quiet = noise is None or noise(fitted.params, 0.1) == Noise()
+    return bound is not None or (quiet and error is not None and np.isfinite(error(fitted.params)).all())

@@ -9,7 +9,8 @@ import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations
-from starhold.certification.evidence.pointing import Pushed
+from starhold.certification.evidence.noise import find_radii
+from starhold.certification.evidence.pointing import POINTS, Pushed
 from starhold.certification.openness import Pushes
 from starhold.certification.subject import make_subject
 from starhold.kernel.programs import digest
@@ -48,8 +49,18 @@ POINTING = {
     "cubesat": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(29))),
     "calm": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(3))),
     "skew": ((SKEW, K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(10))),
+    "noisy": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, 0.0, math.radians(10))),
 }
 """Inertia, gains and period; outside torque, error of the command, and the start."""
+KALMAN = {"noise": 2e-5, "bias_walk": 1e-5, "cross": "10 arcsec", "roll": "60 arcsec", "boresight": [0, -1, 0]}
+NOISY = {
+    "noisy": [
+        {"type": "gyro", "noise": 2e-5, "bias_walk": 1e-5},
+        {"type": "star-tracker", "cross": "10 arcsec", "roll": "60 arcsec", "boresight": [0, -1, 0], "interval": 1.0},
+        {"type": "mekf", "bias": 1e-3, **KALMAN},
+    ]
+}
+"""The parts that noise comes with."""
 
 
 @cache
@@ -58,10 +69,10 @@ def flying(name):
     (inertia, k_rate, k_attitude, period), told = POINTING[name]
     law = {"type": "lyapunov", "k_rate": k_rate, "k_attitude": k_attitude}
     kept = {"simulation": {"duration": "1 min", "control_period": period}, "name": name, "law": [law]}
-    given = sh.scenario({"spacecraft": {"inertia": inertia}} | kept)
+    given = sh.scenario({"spacecraft": {"inertia": inertia}, "part": NOISY.get(name, [])} | kept)
     loop = Loop(make_subject(build(given, given.laws[0])))
     outside, error, *start = told
-    assert Pushed(loop, Pushes(outside, command=error)).find(*start), loop.failed
+    assert Pushed(loop, Pushes(outside, command=error), find_radii(loop, POINTS)).find(*start), loop.failed
     return loop
 
 

@@ -298,6 +298,11 @@ class Oracle:
         """Whether nothing leaves what is claimed in flights under pushes that are chosen against it."""
         n, zero = self.numbers, np.zeros(3)
         V0, level = self.lyapunov(np.eye(4)[0], zero), n["level"]
+        if "share" in n:
+            most = self.largest_errors(500, int(min(n["samples"], 2500)))
+            radii = np.array([[n["noise.attitude"]], [n["noise.rate"]]])
+            if (most > radii).any(axis=0).mean() > n["share"] + 4 * math.sqrt(n["share"] / 500):
+                return False
 
         def law(q, w, *around):
             return run(self.programs["law"], self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0])
@@ -307,7 +312,8 @@ class Oracle:
         fleet = Fleet(self.J, law, n["period"], n["outside"], n["error"], slow, int(self.rng.integers(1000)), 2 * tries)
         fleet.around = Surroundings(
             [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
-            n.get("momentum") if "wheels" in self.words else None, n.get("error.attitude", 0.0), n.get("error.rate", 0.0),
+            n.get("momentum") if "wheels" in self.words else None,
+            *(n.get(f"error.{told}", 0.0) + n.get(f"noise.{told}", 0.0) for told in ("attitude", "rate")),
         )  # fmt: skip
         states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
         states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]
@@ -322,6 +328,26 @@ class Oracle:
             if k * n["period"] > n["settling"] and off.any():
                 return False
         return self.contents(V0, level)
+
+    def errors(self, role):
+        """The matrix by which a program multiplies errors and noise."""
+        program, zero = self.programs[role], dict.fromkeys(self.programs[role]["inputs"], 0.0)
+        names = [f"errors.{k // 3}.{k % 3}" for k in range(len(program["outputs"]) - 6)]
+        names += [name for name in zero if name.startswith("noise")]
+        return np.array([run(program, zero | {name: 1.0} if name in zero else zero) for name in names]).T
+
+    def largest_errors(self, lanes, samples, begun=2500):
+        """The largest errors of attitude and rate in spans of so many samples, once the errors have settled."""
+        every, most = int(self.numbers["every"]), np.zeros((2, lanes))
+        corrected = self.errors("errors corrected")
+        carried, size = self.errors("errors carried") if every > 1 else corrected, len(corrected) - 6
+        x, rng = np.zeros((size, lanes)), np.random.default_rng(2)
+        for k in range(-begun, samples):
+            step = carried if (k + 1) % every else corrected
+            y = step @ np.concatenate([x, rng.normal(size=(step.shape[1] - size, lanes))])
+            x, told = y[:size], np.linalg.norm(y[size:].reshape(2, 3, lanes), axis=1)
+            most = np.maximum(most, told) if k >= 0 else most
+        return most
 
     def border(self, V0, rest):
         """A state of the set's border, of which rest is the part of V that it has at rest."""

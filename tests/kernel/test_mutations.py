@@ -33,6 +33,7 @@ SUITES = {
     "layer": ("cubesat-slew", "sliding", 0),
     "norm": ("by hand", "norm", 1),
     "points": ("flying", "cubesat", 0),
+    "points in noise": ("flying", "noisy", 0),
     "evenly": ("wheels-orbital", "wheel", 0),
     "evenly whatever the inertia": ("wheels-orbital", "wheel", 2),
     "wheels": ("wheels-orbital", "wheel", 1),

@@ -158,6 +158,16 @@ def diagonal(a: Vector) -> Matrix:
     return ((a[0], 0.0, 0.0), (0.0, a[1], 0.0), (0.0, 0.0, a[2]))
 
 
+def along_axis(axis: Vector, along: Scalar, across: Scalar) -> Matrix:
+    """The symmetric matrix that multiplies vectors along an axis, a unit vector, and across it."""
+    more = along - across
+    return (
+        add((across, 0.0, 0.0), scale(more * axis[0], axis)),
+        add((0.0, across, 0.0), scale(more * axis[1], axis)),
+        add((0.0, 0.0, across), scale(more * axis[2], axis)),
+    )
+
+
 def determinant(m: Matrix) -> Scalar:
     """Return the determinant."""
     return dot(m[0], cross(m[1], m[2]))

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quaternion import relative
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, subtract
 from starhold.analysis.metrics import ALMOST, on_limit
+from starhold.analysis.rigid_body import error_angle
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.subject import make_subject
@@ -150,7 +152,7 @@ def _left(certificate: Certificate) -> list[Claim]:
 
 def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
     """Tell whether a flight starts outside of the claim's set, and when it leaves that."""
-    found = _away(claim, span)
+    found = [*_away(claim, span), *_misled(claim, span)]
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
@@ -175,6 +177,19 @@ def _away(claim: Claim, span: Span) -> list[Departure]:
     sine = np.linalg.norm(span["attitude_error"][:, 1:], axis=1)
     far = sine > math.sin(min(claim.numbers["angle"], math.pi) / 2.0) * (1.0 + 1e-6)
     return span.first(far & (span["time"] - span.begun > settling), "it is farther from the target than in the end")
+
+
+def _misled(claim: Claim, span: Span) -> list[Departure]:
+    """Tell when an estimate errs by more than is claimed for a share of flights, as it does before the estimator settles."""
+    if not claim.numbers.get("share"):
+        return []
+    found = list[Departure]()
+    for name in (fitted.called.replace("-", "_") for fitted in span.loop.used("estimator")):
+        turned: Any = relative(tuple(span["attitude"].T), tuple(span[f"{name}_attitude"].T))
+        off = np.linalg.norm(span[f"{name}_rate"] - span["rate"], axis=1)
+        far = error_angle(np.transpose(turned)) > claim.numbers["attitude_error"]
+        found += span.first(far | (off > claim.numbers["rate_error"]), "the estimate errs by more than is told")
+    return found
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:

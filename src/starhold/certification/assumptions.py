@@ -137,6 +137,10 @@ ASSUMPTIONS = {
     for name in (
         "bounded-push",
         "held-torque",
+        # Of one flight nobody knows of what distribution its noise is.
+        "gaussian-noise",
+        "linear-estimate",
+        "settled-estimate",
         "linear-field",
         "whole-field",
         "circling-bodies",

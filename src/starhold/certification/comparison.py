@@ -14,7 +14,7 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
-from starhold.certification.openness import pushes
+from starhold.certification.openness import driven_errors, pushes, samples_of
 from starhold.certification.subject import make_subject
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
@@ -62,6 +62,8 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     exactly = {"period": loop.period, "hysteresis": loop.hysteresis_width}
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
+    if "share" in told and (driven := driven_errors(loop)) is not None:
+        exactly |= {"samples": samples_of(loop), "every": driven.recursion.every}
     if claim["theorem"] == POINTS:
         own_torque, *errors = map(exact, pushes(loop))
         least["outside"] = own_torque + (0 if OUTSIDE in claim["taken"] else known.modelled_norm)

@@ -211,14 +211,21 @@ def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     angle, rate = (below(_exact(numbers.get(f"start.{name}", numbers.get(name, Fraction(0))))) for name in ("angle", "rate"))
-    most = {"torque": "outside", "error": "error", "attitude_error": "error.attitude", "rate_error": "error.rate"}
+    most = {"torque": "outside", "error": "error"}
+    errors = {
+        f"{name}_error": sum(float(numbers.get(f"{kind}.{name}", 0)) for kind in ("error", "noise"))
+        for name in ("attitude", "rate")
+    }
     ends = {"start": "level", "level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
     return {
         "period": float(numbers["period"]),
         "slew_angle": angle,
         "rate_start": rate,
         **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
+        **errors,
         "told": "outside.0" in numbers,
+        "share": below(1 - _exact(numbers["share"])) if "share" in numbers else None,
+        "samples": int(numbers.get("samples", 0)),
         **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
         **{name: above(_exact(numbers[key])) for name, key in ends.items()},
     }

@@ -233,11 +233,10 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds = [f"torques from outside of up to {shown(n['torque'], ' N m')}{beside}"]
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
     bounds += [f"errors of the command of up to {shown(n['error'], ' N m')}"] if n["error"] else []
-    return (
-        f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times, from "
-        f"{start}, torque held for {n['period']:.12g} s, with "
-        f"{listed(bounds)}{_followed(subject)}"
-    )
+    span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
+    share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
+    near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"
+    return f"{near}{share}, from {start}, torque held for {n['period']:.12g} s, with {listed(bounds)}{_followed(subject)}"
 
 
 def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:

@@ -227,7 +227,7 @@ def draws_in_its_range(part: Part) -> None:
 
 
 def keeps_what_it_says(part: Part) -> None:
-    """No torque is larger than its `bound`, and no error than its `error`."""
+    """No torque is larger than its `bound`, and no error than its `error`, beside its `noise`."""
     tell_torque, tell_errors = part.hook("bound"), part.hook("error")
     if tell_torque is None and tell_errors is None:
         raise NotApplicableError("it says no bound of its torque or of its errors")
@@ -240,7 +240,13 @@ def keeps_what_it_says(part: Part) -> None:
 
 def _pushes(part: Part, loop: ClosedLoop, bounds: tuple[float, ...]) -> Iterator[tuple[str, float, float]]:
     """Yield torques and errors of a part at states of a flight and at other attitudes, and their bounds."""
-    fitted, module, dice = next(f for f in loop.parts if f.part == part), part.module, Dice((1, 2), 3, 0)
+
+    class Silent(Dice):
+        def vector(self, place: int, deviation: Any) -> Any:
+            return ZERO
+
+    dice = (Silent if part.hook("noise") else Dice)((1, 2), 3, 0)
+    fitted, module = next(f for f in loop.parts if f.part == part), part.module
     numbers, random = fitted.prepared(loop.period), np.random.default_rng(1)
     attitude, rate, command, torque = bounds
     memory = fitted.remembered(numbers, *([loop.start] if part.role == "sensor" else []))

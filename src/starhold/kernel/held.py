@@ -73,7 +73,10 @@ class Held:
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h, self.outside, self.error = loop, numbers["period"], numbers["outside"], numbers["error"]
-        self.turned, self.rated = (numbers.get(f"error.{name}") or Fraction(0) for name in ("attitude", "rate"))
+        self.turned, self.rated = (
+            sum((numbers.get(f"{kind}.{name}") or Fraction(0) for kind in ("error", "noise")), Fraction(0))
+            for name in ("attitude", "rate")
+        )
         demand(self.h > 0, "a period is not positive")
         told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
         names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}

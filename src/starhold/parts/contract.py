@@ -8,12 +8,14 @@ declarations, stand in `roles`. All of them are pure functions of tuples of numb
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from starhold.algebra.vector import Matrix, Vector
 from starhold.parts.craft import compact
 
 
@@ -26,8 +28,8 @@ class NoParams(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """The largest errors that a sensor, estimator, actuator or effector makes: of the attitude (rad) and of the rate (rad/s)
-    that it gives, and of the command that it passes on (N m), in norm; `inf` for one without a bound."""
+    """The largest errors that a sensor, actuator or effector makes, beside its noise: of the attitude (rad) and of the rate
+    (rad/s) that it gives, and of the command that it passes on (N m), in norm; `inf` for one without a bound."""
 
     attitude: float = 0.0
     rate: float = 0.0
@@ -35,6 +37,30 @@ class Errors(NamedTuple):
 
 
 NO_ERRORS, UNBOUNDED = Errors(), Errors(math.inf, math.inf, math.inf)
+
+
+class Noise(NamedTuple):
+    """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), which
+    is new every so many control periods, and at each control step of the rate (rad/s) and of the change of a gyro's bias
+    until the next (rad/s)."""
+
+    attitude: Matrix = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    every: int = 1
+    rate: float = 0.0
+    walk: float = 0.0
+
+
+class Recursion(NamedTuple):
+    """How noise drives small errors of what a law is told, linearly. At a control step an equation takes `errors` and the
+    standard normal `noise` of rate, bias and attitude, tuples of vectors, to the errors that are kept for the next step and
+    to those of attitude (rad) and rate (rad/s) that the law is told: `corrected` at every `every`-th step, at which an
+    attitude is new, and `carried` at the others."""
+
+    corrected: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
+    carried: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
+    every: int
+    size: int
+    """How many vectors of errors are kept."""
 
 
 @dataclass(frozen=True)

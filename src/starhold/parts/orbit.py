@@ -89,6 +89,12 @@ def lowest(position: Vector, velocity: Vector, gravity: float) -> float:
     return min(distance, parameter / (1.0 + eccentricity))
 
 
+def period_of(position: Vector, velocity: Vector, gravity: float) -> float:
+    """How long (s) an orbit takes; infinity for one that does not come back."""
+    energy = _invariants(position, velocity, gravity)[1]
+    return math.tau * gravity / math.sqrt((-2.0 * energy) ** 3) if energy < 0.0 else math.inf
+
+
 def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) -> float:
     """When (s) the motion first comes down to this distance (m) from the centre, infinity for never. The start is beyond."""
     distance, energy, radial, _ = _invariants(position, velocity, gravity)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
+from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.openness import Pushes, pushes
 from starhold.certification.subject import above
@@ -171,8 +172,11 @@ def find_pointed(loop: Loop) -> bool:
     own = pushes(loop.loop)
     tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
     try:
-        pushed = Pushed(loop, own._replace(outside=own.outside + float(loop.known.disturbance)))
-        return any(pushed.find(*one) for one in tried)
+        against = own._replace(outside=own.outside + float(loop.known.disturbance))
+        noise = find_radii(loop, POINTS)
+        # Against more noise than can be shown, without it.
+        with_and_without = [noise] * (noise is not None) + [None]
+        return any(pushed.find(*one) for pushed in (Pushed(loop, against, own) for own in with_and_without) for one in tried)
     except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
         # Floats may be too far apart in size, or too large.
         loop.failed[POINTS] = str(reason)
@@ -182,7 +186,7 @@ def find_pointed(loop: Loop) -> bool:
 class Pushed:
     """A loop against torques that no law is told, and errors. RefusedError for a law that the theorem does not take."""
 
-    def __init__(self, loop: Loop, against: Pushes) -> None:
+    def __init__(self, loop: Loop, against: Pushes, noise: tuple[dict[str, Any], dict[str, Any]] | None = None) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
         if OUTSIDE in loop.words and loop.is_told("measurement.external_torque"):
             words.append(OUTSIDE)
@@ -194,7 +198,8 @@ class Pushed:
         outside = max(outside, LEAST * self.stiffness)
         self.told: dict[str, Any] = {"period": loop.loop.period, "outside": outside, "error": against.command}
         self.told |= {f"error.{name}": x for name, x in (("attitude", against.attitude), ("rate", against.rate)) if x}
-        self.told |= loop.bounds(words)
+        more, self.evidence = noise or ({}, {})
+        self.told |= loop.bounds(words) | more
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
@@ -203,12 +208,16 @@ class Pushed:
     def held(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
         V = self.loop.crossed(self.stiffness, epsilon)
-        return V, Held(AttitudeLoop(read(self.loop.claim(POINTS, self.words, V, **self.told), self.loop.by_digest)))
+        return V, Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
+
+    def claim(self, V: str, told: dict[str, Any], **evidence: Any) -> dict[str, Any]:
+        """Return the claim with what is told, and evidence beside that about noise."""
+        return self.loop.claim(POINTS, self.words, V, **told) | {"evidence": self.evidence | evidence}
 
     def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
         """Find the claim of how near to its target the loop comes, and add it. The set holds turns of up to `angle` (rad) at
         up to `rate` (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
-        loop, words, J, begun = self.loop, self.words, self.J, list[Chain]()
+        loop, J, begun = self.loop, self.J, list[Chain]()
         told = self.told | (limits or {})
         told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
         for epsilon, V, held in self.leans:
@@ -220,7 +229,7 @@ class Pushed:
         if begun[0].asks_more(limits or {}):
             loop.failed[POINTS] = "the torque exceeds its limit"
             return False
-        if not begins(loop, loop.claim(POINTS, words, begun[0].V, **told | {"level": begun[0].level}), self.scales):
+        if not begins(loop, self.claim(begun[0].V, told | {"level": begun[0].level}), self.scales):
             return False
         for chain in begun:
             if chain.descend() < 4.0 * chain.aim():
@@ -238,8 +247,7 @@ class Pushed:
         if not isfinite(angle):
             loop.failed[POINTS] = "motions do not come near the target"
             return False
-        claim = loop.claim(POINTS, words, chain.V, **told)
-        claim["evidence"] = {"levels": chain.levels, "ellipsoids": chain.ellipsoids}
+        claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids)
         return loop.try_to_show(claim, self.scales)
 
 

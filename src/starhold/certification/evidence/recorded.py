@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, read
+from starhold.certification.openness import driven_errors
 from starhold.certification.subject import Subject, above
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import Program, digest
+from starhold.kernel.theorems.noise import CARRIED, CORRECTED
 from starhold.laws import program
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -63,13 +65,18 @@ class RecordedLoop:
     @cached_property
     def roles(self) -> dict[str, str]:
         """The digests of the programs that every claim is about."""
-        loop = self.loop
+        loop, driven = self.loop, driven_errors(self.loop)
         plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
-        return {
+        found = {
             "law": self.keep(program.law_program(loop.law, loop.gains, loop.known, loop.period)),
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
+        if driven is not None:
+            told, noise = (V3,) * driven.recursion.size, (V3,) * 3
+            found[CARRIED] = self.add(driven.recursion.carried, errors=told, noise=noise)
+            found[CORRECTED] = self.add(driven.recursion.corrected, errors=told, noise=noise)
+        return found
 
     def add(self, equation: Callable[..., Any], **given: Any) -> str:
         """Record a program, and return its digest."""

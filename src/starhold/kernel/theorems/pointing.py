@@ -14,15 +14,18 @@ from ..rules import Definite, Exceeds
 from ..sentences import Statement, above, below, enumerated
 from .attitude import Proof, contents
 from .limits import within_limits
+from .noise import SHARE, within_radii
 
 
 def points(claim: Claim) -> Proof:
     """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
     by no more than end.angle and turns no faster than end.rate. The torque is what the law asks for at the last sample and
     an error, |error| <= error; it is told the attitude turned by error.attitude at most and the rate off by error.rate;
-    torques from outside that it is not told are no more than `outside`."""
+    torques from outside that it is not told are no more than `outside`. With a `share` all holds at so many `samples` on
+    end but with this probability: errors that noise drives are no more than noise.attitude and noise.rate beside."""
     loop = AttitudeLoop(claim)
     yield from loop.sound()
+    noise = (yield from within_radii(claim)) if SHARE in claim.numbers else Statement("", ())
     held, numbers, samples = Held(loop), claim.numbers, 0
     c, h = numbers["level"], held.h
     start = yield from contents(loop, loop.lyapunov)
@@ -73,13 +76,21 @@ def points(claim: Claim) -> Proof:
         f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside of up to"
         f" {below(held.outside)} N m and {enumerated(told)}"
     )
-    text += "".join(f", {name} of up to {below(x)}" for name, x in held.told.items())
+    text += "".join(f", {name} of up to {below(x)}" for name, x in held.told.items()) + noise.text
     taken = (
         *(["bounded-outside-torque"] if loop.outside else []),
         "bounded-target" if loop.moving else "target-at-rest",
         *(["frictionless-wheels", "bounded-momentum"] if loop.wheels else ["no-wheels"]),
     )
-    assumptions = ("rigid-body", "inertia-as-given", "bounded-push", "held-torque", *limited.assumptions, *taken)
+    assumptions = (
+        "rigid-body",
+        "inertia-as-given",
+        "bounded-push",
+        "held-torque",
+        *noise.assumptions,
+        *limited.assumptions,
+        *taken,
+    )
     sign = "sign-at-once" if signs else "quaternion-as-fed"
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
     return Statement(text + said, tuple(dict.fromkeys((*assumptions, sign))), "pointing")

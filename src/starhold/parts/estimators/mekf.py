@@ -4,7 +4,10 @@ attitude of the star tracker corrects both, by gains that follow from their cova
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Annotated, Any, NamedTuple
+
+import numpy as np
 
 from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quantity import Quantity
@@ -19,6 +22,7 @@ from starhold.algebra.vector import (
     Matrix,
     Vector,
     add,
+    along_axis,
     apply,
     combine,
     diagonal,
@@ -28,7 +32,7 @@ from starhold.algebra.vector import (
     transpose,
 )
 from starhold.algebra.vector import multiply as product
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Noise, Parameter, Recursion
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, unit_quaternion
 
@@ -51,6 +55,8 @@ ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO}
 HOUR = 3600.0
+MOST = 100_000
+"""Control periods after which a filter has settled, or does not."""
 UNKNOWN = math.sqrt(math.pi**2 / 9.0 + 2.0 / 3.0)
 """Standard deviation about each axis (rad) of the rotation vector of an attitude that may be any."""
 
@@ -116,6 +122,16 @@ class Memory(NamedTuple):
     stage: Scalar
 
 
+class Gains(NamedTuple):
+    """The gains from the deviation of a new attitude from the one foretold: to the attitude, to the one that is kept, and to
+    the bias (1/s); and the inverse of its covariance (1/rad2)."""
+
+    turn: Matrix
+    ahead: Matrix
+    bias: Matrix
+    sure: Matrix
+
+
 class Instant(NamedTuple):
     """The attitude at a control step, the covariance of its error, the noise of the gyro's reading as far as it is
     known (rad/s), and the memory."""
@@ -132,12 +148,7 @@ def prepare(params: Params, period: float) -> Numbers:
     if not size > 0.0:
         raise ValueError("the boresight needs a direction")
     axis = scale(1.0 / size, params.boresight)
-    cross, roll = params.cross**2, params.roll**2
-    tracker = (
-        add((cross, 0.0, 0.0), scale((roll - cross) * axis[0], axis)),
-        add((0.0, cross, 0.0), scale((roll - cross) * axis[1], axis)),
-        add((0.0, 0.0, cross), scale((roll - cross) * axis[2], axis)),
-    )
+    tracker = along_axis(axis, params.roll**2, params.cross**2)
     # The rate between two readings is their mean: each turns the attitude by its noise for half a period, and so does the
     # step of the bias between them.
     walk = params.bias_walk**2 / HOUR * period
@@ -168,11 +179,16 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
         after = chosen(known, corrected(now, measured, params, period), taken(now, measured, params))
         return (after._replace(memory=after.memory._replace(stage=2.0)),)
 
-    ahead = combine(1.0, before.turn, 3.0 * params.reading, IDENTITY)
-    (now,) = when(new, correct, Instant(before.attitude, before.turn, ZERO, before._replace(turn=ahead)))
+    (now,) = when(new, correct, arrived(before, params))
     after = now.memory
     rate = subtract(subtract(readings.rate, after.bias), now.noise)
     return Estimate(now.attitude, rate, after.bias, deviations(now.turn), deviations(after.walk)), after
+
+
+def arrived(before: Memory, params: Numbers) -> Instant:
+    """The estimate at a control step before it is corrected."""
+    ahead = combine(1.0, before.turn, 3.0 * params.reading, IDENTITY)
+    return Instant(before.attitude, before.turn, ZERO, before._replace(turn=ahead))
 
 
 def taken(now: Instant, measured: Quaternion, params: Numbers) -> Instant:
@@ -187,33 +203,38 @@ def corrected(now: Instant, measured: Quaternion, params: Numbers, period: Scala
     before = now.memory
     error = relative(now.attitude, measured)
     turn = scale(2.0 * side(error[0]), vector_part(error))
-    sure = inverse(summed(now.turn, params.tracker))
-    # Of the attitude that is remembered, whose error has the noise of the reading twice that of the present one.
-    both_turns = combine(1.0, now.turn, params.reading, IDENTITY)
-    gain, ahead_gain = product(now.turn, sure), product(both_turns, sure)
-    bias_gain = product(transpose(before.mixed), sure)
+    gain = gains(now, params)
     memory = before._replace(
-        attitude=turned_by(now.attitude, apply(ahead_gain, turn)),
-        bias=add(before.bias, apply(bias_gain, turn)),
-        turn=symmetric(combine(1.0, before.turn, -1.0, product(ahead_gain, both_turns))),
-        mixed=combine(1.0, before.mixed, -1.0, product(ahead_gain, before.mixed)),
-        walk=symmetric(combine(1.0, before.walk, -1.0, product(bias_gain, before.mixed))),
+        attitude=turned_by(now.attitude, apply(gain.ahead, turn)),
+        bias=add(before.bias, apply(gain.bias, turn)),
+        turn=symmetric(combine(1.0, before.turn, -1.0, product(gain.ahead, twice_read(now, params)))),
+        mixed=combine(1.0, before.mixed, -1.0, product(gain.ahead, before.mixed)),
+        walk=symmetric(combine(1.0, before.walk, -1.0, product(gain.bias, before.mixed))),
     )
     return Instant(
-        turned_by(now.attitude, apply(gain, turn)),
-        symmetric(combine(1.0, now.turn, -1.0, product(gain, now.turn))),
-        scale(-2.0 * params.reading / period, apply(sure, turn)),
+        turned_by(now.attitude, apply(gain.turn, turn)),
+        symmetric(combine(1.0, now.turn, -1.0, product(gain.turn, now.turn))),
+        scale(-2.0 * params.reading / period, apply(gain.sure, turn)),
         memory,
     )
+
+
+def gains(now: Instant, params: Numbers) -> Gains:
+    """The gains for a new attitude."""
+    sure = inverse(summed(now.turn, params.tracker))
+    ahead, bias = product(twice_read(now, params), sure), product(transpose(now.memory.mixed), sure)
+    return Gains(product(now.turn, sure), ahead, bias, sure)
+
+
+def twice_read(now: Instant, params: Numbers) -> Matrix:
+    """The covariance of the attitude that is kept with the present one: it has the noise of the reading twice."""
+    return combine(1.0, now.turn, params.reading, IDENTITY)
 
 
 def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) -> Memory:
     """The estimate a control period on: the rate between the gyro's two readings is their mean."""
     mean = subtract(scale(0.5, add(memory.rate, rate)), memory.bias)
-    turn = short_turn(scale(0.5 * period, mean))
-    axes = from_quaternion(turn)
-    # d(error)/dt = -w x error - error of the bias, over the period.
-    drift = combine(-0.5 * period, axes, -0.5 * period, IDENTITY)
+    turn, axes, drift = turned(mean, period)
     mixed = summed(product(axes, memory.mixed), product(drift, memory.walk))
     spread = summed(
         product(summed(product(axes, memory.turn), product(drift, transpose(memory.mixed))), transpose(axes)),
@@ -225,6 +246,57 @@ def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) ->
         mixed=combine(1.0, mixed, params.mixed, IDENTITY),
         walk=combine(1.0, memory.walk, params.walked, IDENTITY),
     )
+
+
+def turned(rate: Vector, period: Scalar) -> tuple[Quaternion, Matrix, Matrix]:
+    """How a body turns in a control period, and by what errors of attitude and bias are multiplied."""
+    turn = short_turn(scale(0.5 * period, rate))
+    axes = from_quaternion(turn)
+    # d(error)/dt = -w x error - error of the bias, over the period.
+    return turn, axes, combine(-0.5 * period, axes, -0.5 * period, IDENTITY)
+
+
+def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recursion | None:
+    """How noise of gyro and star tracker drives the errors of attitude and bias and that of the gyro's last reading, at a
+    constant rate (rad/s, body axes) of a filter that has settled; None for one that does not."""
+    found = settled(prepare(params, period), noise.every, rate, period)
+    if found is None:
+        return None
+    (axes, drift, gain), (attitude, _, reading, walk) = found, noise
+    known = -2.0 * prepare(params, period).reading / period
+
+    def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+        (turn, bias, last), now, walked = errors, scale(reading, random[0]), scale(walk, random[1])
+        mean = subtract(scale(0.5, add(add(last, now), walked)), bias)
+        ahead, bias = subtract(apply(axes, turn), apply(drift, mean)), subtract(bias, walked)
+        return (ahead, bias, now), ahead, subtract(now, bias)
+
+    def corrected(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+        (ahead, bias, now), *_ = carried(errors, random)
+        deviation = subtract(apply(attitude, random[2]), ahead)
+        bias = add(bias, apply(gain.bias, deviation))
+        rate = subtract(subtract(now, bias), scale(known, apply(gain.sure, deviation)))
+        kept = (add(ahead, apply(gain.ahead, deviation)), bias, now)
+        return kept, add(ahead, apply(gain.turn, deviation)), rate
+
+    return Recursion(corrected, carried, noise.every, 3)
+
+
+@cache
+def settled(params: Numbers, every: int, rate: Vector, period: float) -> tuple[Matrix, Matrix, Gains] | None:
+    """How errors of attitude and mean rate are carried over a control period at a rate, and the gains after many updates;
+    None where they go on changing."""
+    memory, before = remember(params, None)._replace(rate=rate), np.zeros((4, 3, 3))
+    for _ in range(MOST // every):
+        for _ in range(every - 1):
+            memory = arrived(propagated(memory, rate, params, period), params).memory
+        now = arrived(propagated(memory, rate, params, period), params)
+        found, memory = gains(now, params), corrected(now, now.attitude, params, period).memory
+        change, size = (np.abs(np.array(x)).max(axis=(1, 2)) for x in (np.subtract(found, before), found))
+        if (change <= 1e-9 * size).all():
+            return *turned(rate, period)[1:], found
+        before = found
+    return None
 
 
 def turned_by(attitude: Quaternion, turn: Vector) -> Quaternion:

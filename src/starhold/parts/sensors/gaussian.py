@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, multiply, normalise
-from starhold.algebra.vector import Vector, add
-from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, NoMemory, Parameter
+from starhold.algebra.vector import Vector, add, diagonal
+from starhold.parts.contract import NO_ERRORS, Card, Errors, Noise, NoMemory, Parameter
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -44,8 +44,13 @@ def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int)
 
 
 def error(params: Params) -> Errors:
-    """None without noise; noise has no bound."""
-    return UNBOUNDED if params.attitude or params.rate else NO_ERRORS
+    """None but the noise."""
+    return NO_ERRORS
+
+
+def noise(params: Params, period: float) -> Noise:
+    """The Gaussian angles and rates."""
+    return Noise(diagonal((params.attitude, params.attitude, params.attitude)), rate=params.rate)
 
 
 def examples() -> list[Params]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Vector, add, clip_axes, scale
-from starhold.parts.contract import UNBOUNDED, Card, Errors, Parameter
+from starhold.parts.contract import UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -70,9 +70,14 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
 
 
 def error(params: Params) -> Errors:
-    """The bias, of a gyro that does nothing else wrong; noise, and what grows with the rate or with time, has no bound."""
-    grows = params.noise or params.bias_walk or params.scale_error or params.limit < math.inf
-    return UNBOUNDED if grows else Errors(rate=math.hypot(*params.bias))
+    """The bias at the start; what grows with the rate has no bound."""
+    return UNBOUNDED if params.scale_error or params.limit < math.inf else Errors(rate=math.hypot(*params.bias))
+
+
+def noise(params: Params, period: float) -> Noise:
+    """The noise of a reading, and the walk of the bias."""
+    numbers = prepare(params, period)
+    return Noise(rate=numbers.deviation, walk=numbers.walk)
 
 
 def examples() -> list[Params]:

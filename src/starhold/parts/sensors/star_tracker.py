@@ -9,8 +9,8 @@ from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.scalar import Scalar, both, less, opposite, where
 from starhold.algebra.structured import when
-from starhold.algebra.vector import Vector, add, dot, scale, subtract
-from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Parameter
+from starhold.algebra.vector import Vector, add, along_axis, dot, scale, subtract
+from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
 
@@ -115,9 +115,14 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
 
 
 def error(params: Params) -> Errors:
-    """None where it is at once and without noise; noise has no bound, nor has what the craft turns meanwhile."""
-    wrong = params.cross or params.roll or params.interval or params.delay or params.outage != NEVER
-    return UNBOUNDED if wrong else NO_ERRORS
+    """None where an attitude is there as it is; what the craft turns until it comes has no bound."""
+    return UNBOUNDED if params.delay or params.outage != NEVER else NO_ERRORS
+
+
+def noise(params: Params, period: float) -> Noise:
+    """The angles across the boresight and about it."""
+    numbers = prepare(params, period)
+    return Noise(along_axis(numbers.boresight, numbers.roll, numbers.cross), int(numbers.every))
 
 
 def examples() -> list[Params]:

@@ -1,0 +1,72 @@
+"""Finds how large the errors become that noise drives: a covariance that bounds theirs, and radii that they leave rarely."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from importlib import import_module
+from math import log
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.finding import floats, read
+from starhold.certification.openness import driven_errors, samples_of
+from starhold.kernel.theorems.noise import CARRIED, CORRECTED, SHARE, TOLD, linear
+
+linalg: Any = import_module("scipy.linalg")
+optimize: Any = import_module("scipy.optimize")
+Array = NDArray[np.float64]
+
+RARELY = Fraction(27, 10_000)
+"""The share of orbits in which errors may leave their radii."""
+WIDER, LEAST, MORE = 1e-6, 1e-30, 1.0 + 1e-9
+"""By which share of its variances the covariance is given away at each step, and the least that is; what is given away where
+numbers are rounded."""
+
+
+def find_radii(loop: Loop, theorem: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    """Find the numbers that a claim tells of noise, and the evidence for them; None without noise, or where it drives errors
+    without end."""
+    driven = driven_errors(loop.loop)
+    if driven is None:
+        return None
+    claim, every = read(loop.claim(theorem, [], None), loop.by_digest), driven.recursion.every
+    carried, corrected = (tuple(map(floats, linear(claim, role))) for role in (CARRIED, CORRECTED))
+    steps = [carried] * (every - 1) + [corrected]
+    size = 3 * driven.recursion.size
+    (whole, spread), shapes, widths = period(steps, size, 0.0 * np.eye(size)), list[Array](), [0.0, 0.0]
+    if float(np.abs(np.linalg.eigvals(whole)).max()) >= 1.0 - 1e-9:
+        return None
+    more = np.diag(WIDER * np.diag(linalg.solve_discrete_lyapunov(whole, spread)) + LEAST)
+    shape = linalg.solve_discrete_lyapunov(*period(steps, size, more))
+    for A, B in steps:
+        full = A @ shape @ A.T + B @ B.T
+        told = [full[k : k + 3, k : k + 3] for k in (size, size + 3)]
+        widths = [max(width, float(np.linalg.eigvalsh(own)[-1])) for width, own in zip(widths, told, strict=True)]
+        shape = full[:size, :size] + more
+        shapes.append((shape + shape.T) / 2.0)
+    deviations = [(width + LEAST) ** 0.5 * MORE for width in widths]
+    samples = samples_of(loop.loop)
+
+    def missed(k: float) -> float:
+        return log(2.0 * samples * 0.8 * (k + 1.0 / k)) - k * k / 2.0 - log(float(RARELY))
+
+    k = float(optimize.brentq(missed, 1.0, 12.0)) * MORE
+    numbers = {SHARE: RARELY, "samples": samples, "every": every}
+    numbers |= {f"noise.{name}": k * width for name, width in zip(TOLD, deviations, strict=True)}
+    evidence = {
+        "covariances": [[[str(Fraction(x)) for x in row] for row in own.tolist()] for own in shapes],
+        "deviations": [str(Fraction(x)) for x in deviations],
+    }
+    return numbers, evidence
+
+
+def period(steps: list[tuple[Array, ...]], size: int, more: Array) -> tuple[Array, Array]:
+    """Return by what errors are multiplied in the steps together, and the covariance that these add, each with more."""
+    whole, spread = np.eye(size), np.zeros((size, size))
+    for A, B in steps:
+        own, noise = A[:size], B[:size]
+        whole, spread = own @ whole, own @ spread @ own.T + noise @ noise.T + more
+    return whole, spread

@@ -1,0 +1,89 @@
+"""How large errors become that Gaussian noise drives, but for a share of the times. Proof: docs/kernel.md, section 10."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+
+from ..numbers import Rows, demand, matrix, plus, rational, read_list, scalar, times, transpose, up
+from ..polynomials import Poly, var
+from ..programs import Exactly, known, single
+from ..reading import Claim
+from ..rules import Definite, Exceeds
+from ..sentences import Statement, below
+from .attitude import Proof
+
+SHARE = "share"
+CARRIED, CORRECTED = "errors carried", "errors corrected"
+"""The programs of a sample without a new measurement, and with one: from `errors` and standard normal `noise` to the errors
+at the next, and to those of the attitude and the rate that the law is told."""
+TOLD = ("attitude", "rate")
+MOST, TERMS = 64, 80
+"""How many samples there may be from one measurement to the next; terms of the exponential series."""
+
+
+def within_radii(claim: Claim) -> Proof:
+    """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
+    than noise.attitude and noise.rate, but with a probability of `share` at most."""
+    numbers = claim.numbers
+    share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
+    demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
+    carried = [linear(claim, CARRIED)] * (int(every) - 1) if every > 1 else []
+    steps = [*carried, linear(claim, CORRECTED)]
+    size = len(steps[0][0][0])
+    demand(len(steps[-1][0][0]) == size, "the errors are not those of one estimate")
+    shapes = [matrix(shape, size, size) for shape in read_list(claim.evidence["covariances"], int(every))]
+    widths = dict(zip(TOLD, map(rational, read_list(claim.evidence["deviations"], len(TOLD))), strict=True))
+    # The last sample before those of the list is like their last.
+    for k, ((before, after), step) in enumerate(zip(pairwise([shapes[-1], *shapes]), steps, strict=True)):
+        spread = covariance(before, *step)
+        rest = plus(after, [row[:size] for row in spread[:size]], -1)
+        yield f"covariance {k}", Definite(rest)
+        for i, (name, width) in enumerate(widths.items()):
+            part = slice(size + 3 * i, size + 3 * i + 3)
+            told = [row[part] for row in spread[part]]
+            yield f"deviation of the {name} {k}", Definite(plus(scalar(width * width), told, -1))
+    missed = samples * sum(tail(numbers[f"noise.{name}"], width) for name, width in widths.items())
+    yield "share", Exceeds(share, missed)
+    text = (
+        f", of these errors up to {below(numbers['noise.attitude'])} rad and {below(numbers['noise.rate'])} rad/s driven by"
+        f" noise: all this at {samples} samples on end with a probability of at least"
+        f" {below(1 - share)}"
+    )
+    return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate"))
+
+
+def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
+    """Return A and B of a program that takes errors x and noise n to Ax + Bn: the next errors, and those that are told."""
+    program = claim.programs[role]
+    size = len(program.outputs) - 3 * len(TOLD)
+    errors = [f"errors.{k // 3}.{k % 3}" for k in range(size)]
+    noise = sorted(set(program.inputs) - set(errors))
+    demand(size > 0 and all(name.startswith("noise.") for name in noise), f"the {role} are not of errors and noise")
+    given = {name: known(var(name)) for name in program.inputs}
+    outputs = [single(cases) for cases in program.run(given, Exactly(), len(program.outputs))]
+    demand(not any(() in p.terms for p in outputs), f"the {role} do not vanish without noise")
+    return slopes(outputs, errors), slopes(outputs, noise)
+
+
+def slopes(parts: list[Poly], names: list[str]) -> Rows:
+    """Return the derivatives of linear functions."""
+    return [[p.slope(name).number for name in names] for p in parts]
+
+
+def covariance(X: Rows, A: Rows, B: Rows) -> Rows:
+    """Return the covariance of Ax + Bn."""
+    return plus(times(A, times(X, transpose(A))), times(B, transpose(B)))
+
+
+def tail(radius: Fraction, width: Fraction) -> Fraction:
+    """Return a number that the probability of |x| > radius does not exceed, of a Gaussian x of three components with a
+    covariance of no more than width^2: sqrt(2/pi) (k + 1/k) exp(-k^2/2) with k = radius/width."""
+    demand(width > 0, "a deviation is not positive")
+    k = -up(-radius / width)
+    demand(k > 0, "a radius is too small")
+    y = -up(-k * k / 2)
+    total, term = Fraction(0), Fraction(1)
+    for n in range(TERMS):
+        total, term = total + term, -up(-term * y / (n + 1))
+    return up(Fraction(4, 5) * (k + 1 / k) / total)

@@ -1,0 +1,139 @@
+"""Claims for a share of orbits: the parts whose noise they take in, what they are not about, flights that leave them."""
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import starhold as sh
+from starhold.analysis.departure import departures
+from starhold.certification.certificate import Certificate
+from starhold.certification.comparison import differences
+from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.noise import find_radii
+from starhold.certification.openness import named, pushes
+from starhold.certification.proofs import checked
+from starhold.certification.subject import described, make_subject
+from starhold.certification.wording import sentence
+from starhold.parts.catalogue import find
+from starhold.parts.part import Fitted
+from starhold.scenario.building import build
+from tests.certification.loops import certified
+from tests.kernel.certificates import flying
+
+SENSORS = {"sensor gyro", "sensor star-tracker", "estimator mekf"}
+
+
+@cache
+def nadir():
+    given = sh.load("cubesat-nadir")
+    return build(given, given.pick("wheel"))
+
+
+def left_out(loop, share):
+    """The sensors and estimators that a claim of how near to its target a loop comes leaves out."""
+    claim = certified("pd-0", disturbance=1e-4).claim("pointing")
+    (told,) = named([replace(claim, numbers=claim.numbers | {"share": share}, assumptions=())], loop)
+    names = {text.removeprefix("without:") for text in told.assumptions}
+    return {name for name in names if name.startswith(("sensor", "estimator"))}
+
+
+def changed(loop, name, **params):
+    fitted = loop.find(name)
+    return loop.with_parts(replace(fitted, params=fitted.params._replace(**params)))
+
+
+def test_a_claim_for_a_share_takes_in_the_parts_that_say_their_noise():
+    assert left_out(nadir(), 0.9973) == set()
+    assert left_out(nadir(), None) == SENSORS
+
+
+@pytest.mark.parametrize(
+    ("name", "params"),
+    [
+        ("gyro", {"scale_error": 0.01}),
+        ("gyro", {"limit": 1.0}),
+        ("star-tracker", {"delay": 0.5}),
+        ("star-tracker", {"outage": (10.0, 20.0)}),
+        ("mekf", {"bias_walk": 0.0}),
+    ],
+)
+def test_what_is_not_noise_is_left_out(name, params):
+    assert left_out(changed(nadir(), name, **params), 0.9973) == SENSORS
+
+
+def test_what_is_read_by_what_has_no_bound_is_left_out():
+    """The attitude by Sun and field hangs on the magnetometer; unloading alone has a bound, whatever is measured."""
+    triad = find("estimator", "triad")
+    sun = Fitted(find("sensor", "sun-sensor"), find("sensor", "sun-sensor").examples()[0])
+    loop = nadir().without("mekf", "star-tracker").with_parts(sun, Fitted(triad, triad.examples()[0]))
+    assert {"sensor magnetometer", "sensor sun-sensor", "estimator triad"} <= left_out(loop, 0.9973)
+    assert "sensor magnetometer" not in left_out(nadir().without("magnetic-unloading"), 0.9973)
+
+
+def test_a_bias_that_the_estimator_takes_out_is_no_error():
+    loop = nadir()
+    bias = np.linalg.norm(loop.find("gyro").params.bias)
+    alone = changed(loop.without("mekf", "star-tracker"), "gyro", bias_walk=0.0)
+    assert pushes(loop).rate == 0.0
+    assert bias <= pushes(alone).rate <= bias * (1.0 + 1e-9)
+    assert "sensor gyro" not in left_out(alone, 0.9973)
+
+
+def noise_claim(loop):
+    found = Loop(make_subject(loop))
+    numbers, _ = find_radii(found, "points")
+    return found.claim("points", found.words, None, **numbers)
+
+
+@pytest.mark.parametrize(
+    ("name", "params", "told"),
+    [
+        ("gyro", {"noise": 3e-5}, "the program of the errors carried is another one"),
+        ("star-tracker", {"cross": 6e-5}, "the program of the errors corrected is another one"),
+        ("mekf", {"roll": 3e-4}, "the program of the errors corrected is another one"),
+        ("star-tracker", {"interval": 2.0}, "the every is another number"),
+    ],
+)
+def test_a_claim_is_about_the_noise_of_its_loop(name, params, told):
+    claim = noise_claim(nadir())
+    claim["numbers"] |= {"momentum": "1", "target.rate": "1", "target.acceleration": "1", "outside": "1"}
+    claim["numbers"] |= {f"outside.{k}": "1" for k in range(3)}
+    assert differences(claim, nadir()) == []
+    assert told in differences(claim, changed(nadir(), name, **params))
+    claim["numbers"]["samples"] = "22000"
+    assert differences(claim, nadir()) == ["the samples is another number"]
+
+
+def test_a_share_is_told_and_a_flight_before_the_filter_settles_leaves_it():
+    (claim,) = checked(flying("noisy"))
+    assert claim.numbers["share"] == pytest.approx(0.9973)
+    assert {"gaussian-noise", "linear-estimate", "settled-estimate"} <= set(claim.assumptions)
+    loop = flying("noisy").loop
+    subject = described(make_subject(loop))
+    text = sentence(claim, subject)
+    assert "in at least 99.73 % of spans of 3600" in text
+    assert "errors of the attitude of up to 0.02" in text
+    assert "of orbits" in sentence(claim, subject | {"orbit": {"position": [1.0]}})
+    length = 400
+    time = np.arange(length) * loop.period
+    still = {"attitude": np.tile([1.0, 0.0, 0.0, 0.0], (length, 1)), "rate": np.zeros((length, 3))}
+    shown = {f"mekf_{name}": values.copy() for name, values in still.items()}
+    run = {
+        "time": time,
+        **still,
+        **shown,
+        "attitude_error": still["attitude"],
+        "rate_error": still["rate"],
+        "command": still["rate"],
+    }
+    flown = SimpleNamespace(arrays=run, attrs={"record_every": 1})
+    certificate = Certificate("here", subject, (claim,))
+    assert departures(certificate, loop, flown) == {"pointing": ()}
+    run["mekf_rate"][100] = [3e-4, 0.0, 0.0]
+    (left,) = departures(certificate, loop, flown)["pointing"]
+    assert (left.time, left.how) == (time[100], "the estimate errs by more than is told")
+    run["mekf_attitude"][40] = [1.0, 3e-4, 0.0, 0.0]
+    assert departures(certificate, loop, flown)["pointing"][0].time == time[40]

@@ -1,0 +1,201 @@
+"""Errors that noise drives: what is proved of them, simulations of them, flights, and false claims."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.linalg import solve_discrete_lyapunov
+from scipy.spatial.transform import Rotation
+
+import starhold as sh
+from starhold.algebra.quaternion import multiply, relative, vector_part
+from starhold.algebra.vector import scale
+from starhold.certification.evidence import noise
+from starhold.certification.evidence.attitude import Loop
+from starhold.certification.openness import driven_errors, samples_of
+from starhold.certification.subject import make_subject
+from starhold.conformance.bench import CRAFT
+from starhold.kernel.numbers import Account
+from starhold.kernel.theorems.noise import tail
+from starhold.parts.estimators import mekf
+from starhold.scenario.building import build
+from tests.kernel.certificates import contents, failing
+from tests.kernel.oracle import Oracle, number
+
+SIZES = np.repeat([1e-7, 1e-7, 1e-7, 1e-2, 1e-1, 1e-2], 3)
+"""Small errors (rad, rad/s), and small noise as shares of its deviations."""
+
+
+@pytest.fixture(scope="module")
+def nadir():
+    """The CubeSat that points to nadir."""
+    given = sh.load("cubesat-nadir")
+    return build(given, given.pick("wheel"))
+
+
+def oracle_of(loop, **more):
+    """What is claimed of the noise of a loop, as another reader has it."""
+    found = Loop(make_subject(loop))
+    numbers, _ = noise.find_radii(found, "points")
+    claim = found.claim("points", [], None, **numbers | more)
+    return Oracle({"programs": found.by_digest}, claim)
+
+
+@pytest.mark.parametrize("k", [1.5, 3.0, 5.0, 6.04, 8.0])
+def test_the_bound_of_a_tail_is_not_below_it_and_near(k):
+    Account.open()
+    found = float(tail(Fraction(k), Fraction(1)))
+    assert stats.chi(3).sf(k) <= found <= stats.chi(3).sf(k) * (1.0 + 0.7 / k**2)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.02])
+def test_errors_leave_their_radii_no_more_often_than_is_claimed(nadir, share, monkeypatch):
+    """In many spans of 4000 samples; a radius of the quantile itself is at most 1.35 times smaller."""
+    monkeypatch.setattr(noise, "RARELY", Fraction(share))
+    monkeypatch.setattr(noise, "samples_of", lambda loop: 4000)
+    oracle = oracle_of(nadir)
+    most = oracle.largest_errors(2000, 4000)
+    radii = np.array([[oracle.numbers["noise.attitude"]], [oracle.numbers["noise.rate"]]])
+    assert (most > radii).any(axis=0).mean() <= share
+    assert (radii[:, 0] <= 1.35 * np.quantile(most, 1.0 - share / 2.0, axis=1)).all()
+
+
+def test_the_recursion_is_that_of_the_filter_that_flies(nadir):
+    """Each error and each noise, by the filter's own equations at the target's rate, after it has settled."""
+    oracle, period = oracle_of(nadir), nadir.period
+    fitted = next(f for f in nadir.parts if f.part.name == "mekf")
+    params, (tracker, every, gyro, walk) = fitted.prepared(period), sensors(nadir)
+    rate = (0.0, -1.107e-3, 0.0)
+    onward = tuple(Rotation.from_rotvec(np.array(rate) * period).as_quat(scalar_first=True))
+
+    def shown(attitude, random, bias, new):
+        seen = turned(attitude, np.array(tracker) @ random[2])
+        off = np.array(rate) + bias + gyro * np.array(random[0])
+        return SimpleNamespace(attitude=seen, rate=tuple(off.tolist()), attitude_is_new=float(new))
+
+    memory, attitude, none = mekf.remember(params, None), (1.0, 0.0, 0.0, 0.0), np.zeros((3, 3))
+    for step in range(4000 * every):
+        new = step % every == 0
+        _, memory = mekf.estimate(shown(attitude, none, np.zeros(3), new), memory, params, CRAFT, period)
+        attitude = multiply(attitude, onward)
+    before = memory
+    for role, new in (("errors carried", False), ("errors corrected", True)):
+        wanted = oracle.errors(role)
+        found = np.zeros_like(wanted)
+        for place in range(found.shape[1]):
+            errors, random = changed = np.zeros((2, 3, 3))
+            changed.flat[place] = SIZES[place]
+            kept = before._replace(
+                attitude=turned(multiply(attitude, conjugate(onward)), errors[0]),
+                bias=tuple((np.array(before.bias) + errors[1]).tolist()),
+                rate=tuple((np.array(rate) + errors[2]).tolist()),
+            )
+            bias = walk * random[1]
+            told, after = mekf.estimate(shown(attitude, random, bias, new), kept, params, CRAFT, period)
+            parts = (
+                difference(attitude, after.attitude), np.array(after.bias) - bias,
+                np.array(after.rate) - rate - bias,
+                difference(attitude, told.attitude), np.array(told.rate) - rate,
+            )  # fmt: skip
+            found[:, place] = np.concatenate(parts)
+        assert np.abs(found - wanted * SIZES[: len(wanted.T)]).max() < 1e-11, role
+        assert (np.abs(found).max(axis=0) > 1e-9).all()
+
+
+def sensors(loop):
+    """The noise of gyro and star tracker."""
+    known = {f.part.name: f.part.module.noise(f.params, loop.period) for f in loop.used("sensor") if f.part.hook("noise")}
+    gyro, tracker = known["gyro"], known["star-tracker"]
+    return tracker.attitude, tracker.every, gyro.rate, gyro.walk
+
+
+def turned(attitude, angles):
+    """The attitude turned on by small angles."""
+    x = np.concatenate([[1.0], np.array(angles) / 2.0])
+    return tuple((np.array(multiply(attitude, tuple(x.tolist()))) / np.linalg.norm(x)).tolist())
+
+
+def conjugate(q):
+    return (q[0], -q[1], -q[2], -q[3])
+
+
+def difference(true, estimated):
+    """The small angles from one attitude to another."""
+    error = relative(true, estimated)
+    return np.array(scale(math.copysign(2.0, error[0]), vector_part(error)))
+
+
+def test_a_flight_keeps_the_radii_once_the_filter_has_settled(nadir):
+    n, run = oracle_of(nadir).numbers, sh.simulate(sh.load("cubesat-nadir"), "wheel")
+    values = {name: np.squeeze(np.asarray(run[name])) for name in ("time", "attitude", "rate", "mekf_attitude", "mekf_rate")}
+    true, told = (Rotation.from_quat(values[name], scalar_first=True) for name in ("attitude", "mekf_attitude"))
+    late = values["time"] > 300.0
+    off = np.linalg.norm((true.inv() * told).as_rotvec(), axis=1)[late]
+    wrong = np.linalg.norm(values["mekf_rate"] - values["rate"], axis=1)[late]
+    assert 0.4 * n["noise.attitude"] < off.max() < n["noise.attitude"]
+    assert 0.6 * n["noise.rate"] < wrong.max() < n["noise.rate"]
+
+
+def test_an_orbit_has_so_many_samples(nadir):
+    radius = np.linalg.norm(nadir.start.position)
+    orbit = 2.0 * math.pi * math.sqrt(radius**3 / nadir.craft.gravity)
+    assert samples_of(nadir) == math.ceil(orbit / nadir.period)
+    assert samples_of(nadir.without("two-body")) == 3600.0 / nadir.period + 1
+
+
+def test_the_covariance_is_hardly_above_that_of_the_errors(nadir):
+    oracle = oracle_of(nadir)
+    carried, corrected = oracle.errors("errors carried"), oracle.errors("errors corrected")
+    A, Q = np.eye(9), np.zeros((9, 9))
+    for step in (carried, carried, carried, corrected):
+        A, Q = step[:9, :9] @ A, step[:9, :9] @ Q @ step[:9, :9].T + step[:9, 9:] @ step[:9, 9:].T
+    found, exact = Loop(make_subject(nadir)), solve_discrete_lyapunov(A, Q)
+    told = noise.find_radii(found, "points")[1]["covariances"][-1]
+    given = np.array([[float(Fraction(x)) for x in row] for row in told])
+    above = given - exact
+    size = np.sqrt(np.diag(exact))
+    assert np.linalg.eigvalsh(above / np.outer(size, size))[0] > 0.0
+    assert (np.diag(above) < 1e-3 * np.diag(exact)).all()
+
+
+def narrow(claim, covariances=1.0, deviation=1.0):
+    """Make the radius of the attitude smaller, and what bounds it."""
+    told = claim["evidence"]
+    told["deviations"][0] = str(Fraction(told["deviations"][0]) * Fraction(deviation))
+    told["covariances"] = [
+        [[str(Fraction(x) * Fraction(covariances)) for x in row] for row in shape] for shape in told["covariances"]
+    ]
+    claim["numbers"]["noise.attitude"] = str(Fraction(number(claim["numbers"]["noise.attitude"])) * Fraction(0.6))
+
+
+FALSE = {
+    "covariance": {"covariances": 0.2, "deviation": 0.6},
+    "deviation of the attitude": {"deviation": 0.6},
+    "share": {},
+}
+
+
+@pytest.mark.parametrize("hypothesis", FALSE)
+def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis):
+    content = contents("flying", "noisy")
+    (claim,) = content["claims"]
+    narrow(claim, **FALSE[hypothesis])
+    assert failing(claim, content["programs"]) == {hypothesis}
+    assert not Oracle(content, claim).holds()
+
+
+def test_the_claim_that_was_changed_holds():
+    content = contents("flying", "noisy")
+    assert Oracle(content, content["claims"][0]).holds()
+
+
+def test_errors_without_end_are_not_taken_in(nadir):
+    """A gyro whose bias walks has no estimator; a filter that takes the bias for constant does not settle."""
+    assert driven_errors(nadir.without("mekf")) is None
+    fitted = next(f for f in nadir.parts if f.part.name == "mekf")
+    constant = replace(fitted, params=fitted.params._replace(bias_walk=0.0))
+    assert driven_errors(nadir.with_parts(constant)) is None
