@@ -75,6 +75,16 @@ def ranked(certificate: Certificate) -> list[Claim]:
     return sorted(certificate.claims, key=lambda claim: len(left_out(claim)))
 
 
+def grouped(certificate: Certificate) -> dict[str, list[Claim]]:
+    """The claims as they are ranked, those that leave out the same parts under a text that says which."""
+    groups: dict[str, list[Claim]] = {}
+    for claim in ranked(certificate):
+        absent = left_out(claim)
+        without = f"without {enumerated(absent)}" if absent else ""
+        groups.setdefault(", ".join(filter(None, (coverage(claim, certificate.subject), without))), []).append(claim)
+    return groups
+
+
 def coverage(claim: Claim, subject: Mapping[str, Any]) -> str:
     """How many of the loop's parts a claim takes in; empty where that is not told of the loop."""
     count, absent = subject.get("parts"), len(left_out(claim))

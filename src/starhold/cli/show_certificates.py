@@ -15,9 +15,8 @@ from starhold.certification.wording import (
     HEADINGS,
     coverage,
     eigenvalues,
-    enumerated,
     evidence,
-    left_out,
+    grouped,
     methods,
     ranked,
     statement,
@@ -55,13 +54,8 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
     console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
     if not certificate.claims:
         console.print(f"  no claim: {_safe(unclaimed(subject))}", highlight=False)
-    groups: dict[tuple[str, ...], list[Claim]] = {}
-    for claim in ranked(certificate):
-        groups.setdefault(tuple(left_out(claim)), []).append(claim)
-    for absent, claims in groups.items():
-        without = f", without {enumerated(absent)}" if absent else ""
-        if heading := coverage(claims[0], subject):
-            console.print(f"  [dim]{_safe(heading + without)}:[/dim]", highlight=False)
+    for heading, claims in grouped(certificate).items():
+        console.print(f"  [dim]{_safe(heading)}:[/dim]", highlight=False)
         table = _grid()
         for claim in claims:
             how = f" [dim]({methods(claim)})[/dim]" if why else ""
@@ -109,7 +103,7 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
     if not claims:
         yield name, _coloured("undecided"), "no claim"
         return
-    first, *others = sorted(claims, key=lambda claim: claim.outcome != "proved")
+    first, *others = sorted(claims, key=lambda claim: (claim.kind == "sampling", claim.outcome != "proved"))
     covered = coverage(first, certificate.subject)
     yield name, _coloured(first.outcome), statement(first, certificate.subject) + (f" ({covered})" if covered else "")
     named: dict[str, list[str]] = {}

@@ -9,7 +9,7 @@ from typing import Any
 from starhold.certification.assumptions import texts
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
-from starhold.certification.wording import HEADINGS, evidence, methods, recheck, sentence, unclaimed
+from starhold.certification.wording import HEADINGS, evidence, grouped, methods, recheck, statement, unclaimed
 from starhold.report.colours import colour
 from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight
@@ -72,9 +72,15 @@ def section(flights: Sequence[Flight]) -> str:
 def _law(flight: Flight, number: int, place: int) -> str:
     certificate = flight.certificates[place]
     head = f"<h3>{swatch(number)}{escape(certificate.name)}</h3>"
+    marks = {claim.kind: f"{number}:{place}:{i}" for i, claim in enumerate(certificate.claims)}
+    groups = [
+        (heading, [_claim(c, certificate.subject, left_text(flight, place, c.kind), marks[c.kind]) for c in claims])
+        for heading, claims in grouped(certificate).items()
+    ]
+    # What is about less of the loop is there for who looks for it.
     claims = "".join(
-        _claim(claim, certificate.subject, left_text(flight, place, claim.kind), f"{number}:{place}:{i}")
-        for i, claim in enumerate(certificate.claims)
+        f'<details class="share"{opened}><summary>{escape(_sentence_case(heading))}</summary>{"".join(told)}</details>'
+        for opened, (heading, told) in zip([" open", *[""] * len(groups)], groups, strict=False)
     )
     if not claims:
         why = escape(unclaimed(certificate.subject))
@@ -87,7 +93,7 @@ def _law(flight: Flight, number: int, place: int) -> str:
 
 
 def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> str:
-    statement = sentence(claim, subject)
+    text = statement(claim, subject)
     why = "".join(
         f'<span class="why">{escape(f"Needed, but {o.outcome}: {OBLIGATIONS[o.name]}.")} <b>{escape(evidence(o))}</b></span>'
         for o in claim.obligations
@@ -98,7 +104,7 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> st
     rows = "".join(_obligation(o) for o in claim.obligations)
     return (
         f'<details class="claim" data-claim="{mark}"><summary>{_outcome(claim.outcome)}<span class="what">'
-        f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(statement))}. "
+        f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(text))}. "
         f"<small>By {escape(methods(claim))}.</small>{why}</span></summary>\n"
         f'<div class="wide"><table class="text"><tbody>{rows}</tbody></table></div>{_numbers(claim)}'
         f"<p><b>Assuming</b> {escape('; '.join(texts(claim.assumptions)))}.</p></details>\n"
