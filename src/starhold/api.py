@@ -214,8 +214,8 @@ def export_c(
 
     from starhold.export.code import check_name, make_code
     from starhold.export.folder import make_files, write
-    from starhold.export.proof import UNPROVED, proof_of
     from starhold.export.shells import shell_files
+    from starhold.export.source import UNPROVED, proof_of
     from starhold.report.results import open_folder, write_proofs
     from starhold.studies.certificates import certify_scenario
 

@@ -23,8 +23,8 @@ from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
+from starhold.simulation.batched import begin_metered
 from starhold.simulation.lanes import ThreadPool
-from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
 
 if TYPE_CHECKING:

@@ -217,7 +217,7 @@ class Store:
         return merge(parquet.added_up(file.path) for file in self.files(law))
 
     def finish(self, digest: str, totals: Mapping[str, Any]) -> Path:
-        """Write `campaign.json`: the digest (see `starhold.campaign.digest`), how many runs of each law are stored, and the
+        """Write `campaign.json`: the digest (see `campaign.digest`), how many runs of each law are stored, and the
         totals as JSON. Returns its path."""
         runs = {law: sum(file.last - file.first + 1 for file in self.files(law)) for law in self.manifest.laws}
         content = {"digest": digest, "fingerprint": self._fingerprint, "runs": runs, **totals}

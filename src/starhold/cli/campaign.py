@@ -51,7 +51,7 @@ def campaign(
     from starhold.campaign.engines import engine_of
     from starhold.cli.console import console
     from starhold.cli.show_campaign import flying_campaign, print_campaign
-    from starhold.report.campaign_files import write_campaign
+    from starhold.report.campaign_page import write_campaign
     from starhold.scenario.reading import load
 
     engine = engine_of(threads, workers, scheduler)

@@ -24,7 +24,7 @@ def studio(
     from starhold.cli.console import console
     from starhold.files import read_text
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
-    from starhold.scenario.template import template_text
+    from starhold.scenario.writing import template_text
 
     if find_spec("starlette") is None or find_spec("uvicorn") is None:
         raise InputError("studio", "", "no starlette and uvicorn installed", EXTRA)

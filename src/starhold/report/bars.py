@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from starhold.report.colours import COLOURS
 from starhold.report.figures import framed, plain, shortened
+from starhold.report.plots import COLOURS
 
 ACROSS = 4
 """Panels in a row."""

@@ -8,21 +8,25 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from starhold.campaign.again import fly_again
 from starhold.campaign.verdicts import percent
+from starhold.files import atomic_write
 from starhold.report import campaign_tables as tables
 from starhold.report.campaign_drivers import drivers, indices, picture
 from starhold.report.campaign_plots import box, envelopes, histograms
 from starhold.report.campaign_tables import Section
 from starhold.report.campaign_units import Wording, headings_of
 from starhold.report.campaign_words import flown_text, headline, outcome_of
-from starhold.report.colours import colour
 from starhold.report.html_tables import code, note, pill, table_html
 from starhold.report.page_parts import document, versions
+from starhold.report.plots import colour
 from starhold.report.proved import swatch
+from starhold.report.results import PAGE, write_run
 
 if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
     from starhold.scenario.reading import Scenario
+
 
 READING = {
     "verdict": "Met, missed or not decided, for a share of all flights and with a confidence, both set "
@@ -187,3 +191,19 @@ def _store(result: CampaignResult, words: Wording) -> str:
 def _reading() -> str:
     items = "".join(f"<dt>{escape(what)}</dt><dd>{escape(meaning)}</dd>" for what, meaning in READING.items())
     return f'<h2>How to read this page</h2>\n<dl class="reading">{items}</dl>'
+
+
+RECORDED = "recorded"
+"""The folder of recordings."""
+
+
+def write_campaign(scenario: Scenario, result: CampaignResult) -> Path:
+    """Fly again and record the runs of a campaign that are worth looking at, and write its page; returns the page's path."""
+    for law in result.laws:
+        for again in law.again:
+            flown = fly_again(result.folder, again.run, law.law)
+            write_run(flown.flight.recording, result.folder / RECORDED / f"{law.law}-{again.run}.nc")
+    page = result.folder / PAGE
+    with atomic_write(page) as hidden:
+        write_page(hidden, scenario, result)
+    return page

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from starhold.files import atomic_write
-from starhold.report.colours import colour
-from starhold.report.plots import Mark, Plot, back_to_front
+from starhold.report.plots import Mark, Plot, back_to_front, colour
 from starhold.report.text import lost_text
 
 if TYPE_CHECKING:

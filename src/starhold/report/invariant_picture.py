@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from starhold.certification.invariant.wording import down
-from starhold.report.colours import COLOURS
 from starhold.report.figures import framed
+from starhold.report.plots import COLOURS
 from starhold.studies.phase_portraits import Portrait
 
 INSIDE, SET, AGAINST, TRUE = COLOURS[5], COLOURS[0], COLOURS[1], COLOURS[2]

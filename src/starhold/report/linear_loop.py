@@ -12,7 +12,7 @@ import numpy as np
 from starhold.analysis.linear import AXES, Linear
 from starhold.analysis.margins import Margins, Response, margins, response
 from starhold.errors import InputError
-from starhold.report.colours import colour
+from starhold.report.plots import colour
 from starhold.report.proved import swatch
 from starhold.report.text import number_text
 from starhold.studies.linear import linear_of

@@ -14,8 +14,8 @@ from starhold.algebra.structure import flatten
 from starhold.analysis.rigid_body import recorded_meter
 from starhold.certification.standing import standing
 from starhold.laws.interface import Gain
-from starhold.report.colours import colour
 from starhold.report.page_parts import with_units
+from starhold.report.plots import colour
 from starhold.scenario.checking import read_toml
 from starhold.scenario.quantity import LEAST, MOST, declared
 from starhold.studies.questions import NEAR, RANGE

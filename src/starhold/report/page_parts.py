@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from starhold.report.colours import colour
-from starhold.report.plots import Mark, Panel, Plot, back_to_front
+from starhold.report.plots import Mark, Panel, Plot, back_to_front, colour
 from starhold.report.proved import swatch
 from starhold.report.text import lost_text, number_text, unknown_text, value_text
 from starhold.scenario.checking import read_toml

@@ -12,10 +12,21 @@ from numpy.typing import NDArray
 
 from starhold.analysis.libration_point import DAY, YEAR, CircleGoal, EquilibriumGoal, goal_of
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, Sample
-from starhold.report.colours import colour
 from starhold.report.phase_portrait import phase_portrait
 from starhold.report.plane_plots import Guide, Line, Plane, PlanePlot, ring
-from starhold.report.plots import Curve, Panel, Plot, near, positive, recorded_plots, sound, thin, thin_times, thinning
+from starhold.report.plots import (
+    Curve,
+    Panel,
+    Plot,
+    colour,
+    near,
+    positive,
+    recorded_plots,
+    sound,
+    thin,
+    thin_times,
+    thinning,
+)
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.libration_point import EquilibriumGoal, goal_of
-from starhold.report.colours import colour
 from starhold.report.plane_plots import Guide, Line, Plane, PlanePlot
-from starhold.report.plots import Curve
+from starhold.report.plots import Curve, colour
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario

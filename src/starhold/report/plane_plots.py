@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from starhold.report.colours import colour
 from starhold.report.figures import headed, plain, width_of
 from starhold.report.page_parts import plot_box, rounded
-from starhold.report.plots import Curve
+from starhold.report.plots import Curve, colour
 
 if TYPE_CHECKING:
     from starhold.studies.flight import Flight

@@ -10,7 +10,7 @@ from starhold.certification.assumptions import texts
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, evidence, methods, recheck, sentence, unclaimed
-from starhold.report.colours import colour
+from starhold.report.plots import colour
 from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight
 

@@ -23,9 +23,8 @@ from starhold.scenario.checking import (
     validate,
 )
 from starhold.scenario.checking import nearest as nearest
-from starhold.scenario.gains import read_gains
 from starhold.scenario.making import changed, plain
-from starhold.scenario.modes import has_modes, read_modes
+from starhold.scenario.modes import has_modes, read_gains, read_modes
 from starhold.scenario.parts import read_parts
 from starhold.scenario.schema import APART
 from starhold.scenario.writing import toml_text

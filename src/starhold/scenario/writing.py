@@ -97,3 +97,8 @@ def part_table(part: Part, params: Any) -> dict[str, Any]:
 def _own(declared: list[Field], values: Iterable[Any], shared: Collection[str]) -> list[tuple[Field, Any]]:
     """The parameters, with their values, that a table of their own gives."""
     return [(item, value) for item, value in zip(declared, values, strict=True) if item.gain.shared not in shared]
+
+
+def template_text(body: str) -> str:
+    """A commented scenario, of the body of this name, that runs as it is and names every key."""
+    return bodies()[body].template

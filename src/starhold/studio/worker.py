@@ -134,7 +134,7 @@ def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
 def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
-    from starhold.report.campaign_files import write_campaign
+    from starhold.report.campaign_page import write_campaign
 
     scenario = with_campaign(scenario, {})
     total, done = scenario.table.campaign.runs * len(scenario.laws), [0]

@@ -11,13 +11,13 @@ import numpy as np
 
 from starhold.analysis.libration_point import DAY, goal_of
 from starhold.report.body import BodyReport, PageParts
-from starhold.report.colours import colour
 from starhold.report.figures import POINTS, headed, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import rounded, views
 from starhold.report.path_plots import PathPlots, collect
 from starhold.report.plane_plots import GREY, draw_planes, plane_box, plane_data
+from starhold.report.plots import colour
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario

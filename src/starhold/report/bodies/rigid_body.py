@@ -16,12 +16,11 @@ from starhold.parts.craft import EARTH, total_inertia
 from starhold.report import transients
 from starhold.report.attitude_plots import ACCURACIES, AttitudePlots, collect, early, steps_within, until
 from starhold.report.body import BodyReport, PageParts, Sampling
-from starhold.report.colours import colour
 from starhold.report.figures import POINTS, blank, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import panel_data, rounded, views
-from starhold.report.plots import Panel, Plot, thinning
+from starhold.report.plots import Panel, Plot, colour, thinning
 from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
