@@ -88,8 +88,7 @@ def sweep(
     combination is flown; or a list of changes as a scenario's `with_` takes them. law: the one that flies; if None those
     that the keys name, else all. Each row is what `compare` measures of the changed scenario, but for the cost of calls;
     nothing is certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the
-    first flight where one of the scenarios cannot be.
-    """
+    first flight where one of the scenarios cannot be."""
     from starhold.studies.sweep import sweep as fly_sweep
 
     return fly_sweep(_opened(scenario), changes, law, threads, progress)
@@ -126,8 +125,7 @@ def campaign(
     cluster): who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed, `runs`
     at the most. search: look for the worst, too. progress: called with a law and how many more of its runs were flown.
 
-    InputError for whatever is wrong, what was flown until then being kept.
-    """
+    InputError for whatever is wrong, what was flown until then being kept."""
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
 

@@ -23,8 +23,7 @@ _claimed: dict[tuple[int, int], int] = {}
 def claim(folder: Path) -> None:
     """Make this process the only one that writes results into a folder, until it ends.
 
-    Raises BlockingIOError where another one does. The system drops the claim with the process, however that ends.
-    """
+    Raises BlockingIOError where another one does. The system drops the claim with the process, however that ends."""
     try:
         import fcntl
     except ImportError:

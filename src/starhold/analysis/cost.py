@@ -60,8 +60,7 @@ def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS
     """Return median and worst processor time (s) of a call, over chunks of calls that replay the states of a flight in
     order.
 
-    The figures are latencies, see `Replay`.
-    """
+    The figures are latencies, see `Replay`."""
     repeat = Replay(loop, states)
     few = min(1000, len(states))
 

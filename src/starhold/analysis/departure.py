@@ -100,8 +100,7 @@ def departures(
 
     loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not),
     as `change` tells.
-    That torque is held between samples counts unless it is proved that it may be.
-    """
+    That torque is held between samples counts unless it is proved that it may be."""
     span = Span(loop, run, first, last)
     common = [] if span.changes is None else [Departure(span.changes, change)]
     if not len(span["time"]):

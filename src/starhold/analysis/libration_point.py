@@ -113,8 +113,7 @@ def make_meter(
 ) -> Meter:
     """The meter of flights of so many steps of a period (scaled), or of samples at such intervals, in SI.
 
-    limit: how the control is limited; tolerance: scaled distance that counts as near.
-    """
+    limit: how the control is limited; tolerance: scaled distance that counts as near."""
     circle = isinstance(goal, CircleGoal)
     given = Goal(*((goal.radius, ZERO) if circle else (0.0, goal.place)), tolerance, float(steps))
     first = Noted(-1.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0)

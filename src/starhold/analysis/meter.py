@@ -60,8 +60,7 @@ class Metric(NamedTuple):
     over: the count of instants it is a mean over, "samples" or "tail" (changes between those of the last quarter), with a
     factor; since: the rows are of windows, and the largest counts from here on, "start", "half" or "tail"; final: it says
     how a flight ends, so that one that diverges has none; kept: the share of the flight, at its end, in which nothing
-    counts as settled.
-    """
+    counts as settled."""
 
     unit: str
     kind: str

@@ -130,8 +130,7 @@ def of_run(run: Recording, angle_end: float, rate_end: float) -> Transient:
     """The transient of a recorded run, the same bits as a `Watcher` notes where every control step is recorded; of fewer
     samples it knows no more than they tell.
 
-    angle_end: rad; rate_end: rad/s. The time is None too for a run that diverged.
-    """
+    angle_end: rad; rate_end: rad/s. The time is None too for a run that diverged."""
     ends, step = _ends(angle_end, rate_end), run.attrs["control_period"]
     squares = ends.angle * _square(run["attitude_error"][:, 1:]), ends.rate * _square(run["rate_error"])
     over = [_last_above(values) for values in squares]

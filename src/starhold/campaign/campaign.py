@@ -91,8 +91,7 @@ def fly_campaign(
     """Fly the campaign of a scenario's [campaign] table into a folder, for one law or all, and say what it comes to.
 
     InputError for whatever is wrong with it, and where something stands in its way: what was flown until then is kept, and
-    `resume` goes on from there. The results are the same for any engine and any chunk.
-    """
+    `resume` goes on from there. The results are the same for any engine and any chunk."""
     laws = tuple(entry.name for entry in scenario.laws) if law is None else (scenario.pick(law).name,)
     job = begin(scenario, laws)
     table, engine = job.table, options.engine or Threads(os.cpu_count() or 1)

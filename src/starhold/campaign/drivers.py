@@ -83,8 +83,7 @@ class FailureDriver(_Driver):
     """How failed runs differ from passed ones in an input: `distance` between the distributions, from 0 to 1, and `above`,
     the probability that a failed run has the greater value, ties split evenly (None for words). `range` (low, high) has
     nine in ten failed runs; for words it says with which of them runs fail most often. `p`: of a number, which is tested
-    twice, twice the lesser of the two p-values (Bonferroni).
-    """
+    twice, twice the lesser of the two p-values (Bonferroni)."""
 
     input: str
     distance: float
@@ -96,8 +95,7 @@ class FailureDriver(_Driver):
 class PairDriver(_Driver):
     """How two inputs make runs fail together: twice the logarithm of the likelihood ratio against independent causes, which
     by chance is chi-square with `degrees` of freedom; in the cell `where` of their grid the share `failed` of the runs
-    fails. `drawn_together`: the draws of the two depend on each other, so that one may stand for the other.
-    """
+    fails. `drawn_together`: the draws of the two depend on each other, so that one may stand for the other."""
 
     inputs: tuple[str, str]
     statistic: float
@@ -111,8 +109,7 @@ class PairDriver(_Driver):
 class Drivers:
     """Drivers of failures and metrics, the strongest first in each list, everything that was looked at included.
 
-    `skipped` names inputs that are constant or lack values, `remark` says what was left out for too few runs.
-    """
+    `skipped` names inputs that are constant or lack values, `remark` says what was left out for too few runs."""
 
     runs: int
     failures: int
@@ -126,8 +123,7 @@ class Drivers:
 def find_drivers(inputs: Mapping[str, NDArray], failed: NDArray[np.bool_], metrics: Mapping[str, NDArray]) -> Drivers:
     """Find what drives failures and metrics in columns (n,) with a number, or a word, for each run.
 
-    A column a component, for a vector; `failed` (n,) says which runs failed. NaN in a metric: the run does not have it.
-    """
+    A column a component, for a vector; `failed` (n,) says which runs failed. NaN in a metric: the run does not have it."""
     failed = np.asarray(failed, dtype=bool)
     failures, passed = int(failed.sum()), int((~failed).sum())
     columns = {name: Column(name, np.asarray(values)) for name, values in inputs.items()}
@@ -242,8 +238,7 @@ def independent_causes(failures: Array, runs: Array) -> Array:
     """Fit the probability to fail 1 - (1 - a_i)(1 - b_j), by maximum likelihood, to counts on grids (grids, rows, columns).
 
     Returns the probabilities in the same form. By expectation-maximization: a failure is attributed to each cause as its
-    probability has it, and each probability becomes the share of runs so attributed. The likelihood grows in each round.
-    """
+    probability has it, and each probability becomes the share of runs so attributed. The likelihood grows in each round."""
     rows, columns = (runs.sum(axis, keepdims=True).clip(1.0) for axis in (2, 1))
     a = 0.5 * failures.sum(2, keepdims=True) / rows
     b = 0.5 * failures.sum(1, keepdims=True) / columns

@@ -40,8 +40,7 @@ class Plan:
     crossings of pairs of points for Sobol indices (see `sensitivity.saltelli_design`).
 
     InputError where there is no such sampling, or where the number of runs does not fit its design; `where` names the
-    scenario in it.
-    """
+    scenario in it."""
 
     dispersions: tuple[Dispersion, ...]
     sampling: str

@@ -45,8 +45,7 @@ class Morris:
     magnitude `mu_star` with the half-width of its interval of `confidence`, and the standard deviation `sigma`, which is
     not small against mu_star where an input acts unevenly or together with others. All (inputs,).
 
-    Of the `trajectories` flown, `dropped` had a run without a value.
-    """
+    Of the `trajectories` flown, `dropped` had a run without a value."""
 
     names: tuple[str, ...]
     mu: Array

@@ -77,8 +77,7 @@ def _log_evidence(failures: ArrayLike, runs: ArrayLike, rate: float, tail: Any, 
 def bounds(failures: int, runs: int, confidence: float) -> Bounds:
     """Bound the failure probability at all numbers of runs at once: each bound by itself holds with the confidence.
 
-    Both together hold with confidence 2 `confidence` - 1. The interval holds failures/runs; without runs it is (0, 1).
-    """
+    Both together hold with confidence 2 `confidence` - 1. The interval holds failures/runs; without runs it is (0, 1)."""
     require_share("confidence", confidence)
     require_counts(failures, runs)
     enough = -math.log1p(-confidence)
@@ -96,8 +95,7 @@ def decided(failures: int, runs: int, share: float, confidence: float) -> Litera
     ("missed").
 
     None: fly on. Asked after every run, and stopped at the first answer, each answer is wrong with probability 1 -
-    `confidence` at most.
-    """
+    `confidence` at most."""
     require_share("share", share)
     require_share("confidence", confidence)
     require_counts(failures, runs)

@@ -154,8 +154,7 @@ def _undisturbed() -> Generator[None]:
     """Hold requests to end back until processes are started, for one that is half started would complain.
 
     What is started takes no notice of interrupts from the keyboard: they reach all processes of a terminal, of which this
-    one ends the others.
-    """
+    one ends the others."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

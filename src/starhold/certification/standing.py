@@ -16,8 +16,7 @@ class Standing:
     known: whether with any inertia that the law takes the craft for; true: "given" with the true one it was made for,
     "any", or "box" with those whose entries differ by at most `tolerance` sqrt(J_ii J_jj); limit: "given", "any" or
     "above", which is that limit or a larger one; momentum: whether with any angular momentum at the start; start: the
-    level of V that the start is to be below, None for any start.
-    """
+    level of V that the start is to be below, None for any start."""
 
     known: bool
     true: str

@@ -30,8 +30,7 @@ def certify(
 ) -> None:
     """Prove what each law guarantees on this spacecraft: a table and certificate.json.
 
-    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
-    """
+    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided."""
     from starhold.certification.wording import recheck
     from starhold.cli.console import console
     from starhold.cli.show_certificates import print_certificate
@@ -67,8 +66,7 @@ def check(
 ) -> None:
     """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims.
 
-    Proofs are checked by the kernel, which kernel.pyz beside the file holds too; other claims are derived again.
-    """
+    Proofs are checked by the kernel, which kernel.pyz beside the file holds too; other claims are derived again."""
     import hashlib
     from contextlib import ExitStack
 

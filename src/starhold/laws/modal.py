@@ -149,8 +149,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
     """Return the control torque (N m, body).
 
     With x' = (q0', q') the level above gives K_0 x = K_1 x' - phi_0 (K_1 (q0 - 1, q) + J w) beside the known torque, whose
-    Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place.
-    """
+    Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place."""
     q, w = vector_part(measurement.attitude), measurement.rate
     turning = derivative(measurement.attitude, w)
     steered = _upper(q, w, gains, craft, measurement.attitude[0] - 1.0, q)

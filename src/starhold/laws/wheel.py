@@ -109,8 +109,7 @@ def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
     """Return V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
 
     At rest S = 0 also at half turns: about the three axes, or, where weights are equal, about any axis in their plane. V
-    decreases from each of them in some direction, so that they are unstable.
-    """
+    decreases from each of them in some direction, so that they are unstable."""
     q = vector_part(measurement.attitude)
     return 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate)) + 2.0 * dot(q, _twist(gains.k_attitude, q))
 

@@ -42,8 +42,7 @@ def draw_bars(
     """Draw a figure.
 
     note: below the title. rows: their names; hues: the numbers of their colours, which `kinds` names in the legend. dashed:
-    what the dashed lines are. label: of the rows. struck: words in place of the bars of some rows, which `why` explains.
-    """
+    what the dashed lines are. label: of the rows. struck: words in place of the bars of some rows, which `why` explains."""
     from matplotlib.lines import Line2D
 
     struck = struck or {}

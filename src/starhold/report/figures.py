@@ -139,8 +139,7 @@ def headed(
 ) -> tuple[Any, float, float]:
     """A figure with its title and its legend, how high it is (inches), and up to where axes may reach, a gap (inches) below.
 
-    All is placed by fixed distances, for layout engines draw everything twice.
-    """
+    All is placed by fixed distances, for layout engines draw everything twice."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 

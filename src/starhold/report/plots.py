@@ -95,8 +95,7 @@ def thin(values: Curve, factor: int) -> Curve:
     """Two of every `factor` samples, to be drawn over `thin_times`.
 
     Where the samples left out swing further than those kept, the least and the greatest take their places: chatter
-    stays as high as it is, and moves by less than `factor` periods.
-    """
+    stays as high as it is, and moves by less than `factor` periods."""
     if factor == 1 or not len(values):
         return values
     groups = np.pad(values, (0, -len(values) % factor), mode="edge").reshape(-1, factor)

@@ -24,8 +24,7 @@ class StabilityMap(NamedTuple):
     """All that the map shows.
 
     K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: torque asked for over the budget, of the
-    same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given.
-    """
+    same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given."""
 
     K_a: Any
     K_w: Any
@@ -54,8 +53,7 @@ def draw_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> An
     """A figure of the map of eta(K_a, K_w). Equal arguments give equal files.
 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
-    L. ValueError as `optimum` raises it.
-    """
+    L. ValueError as `optimum` raises it."""
     from matplotlib.figure import Figure
 
     what = stability_map(ratios, alpha, omega, budget)

@@ -234,8 +234,7 @@ class CorrelatedNormal(Relative):
 class Rotations(Distribution):
     """An attitude, uniform on the rotation group: both signs of each quaternion are as likely, for laws may tell them apart.
 
-    Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992): the subgroup algorithm.
-    """
+    Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992): the subgroup algorithm."""
 
     BOUNDED = True
     distribution: Literal["rotations"]

@@ -215,8 +215,7 @@ def begin_metered(
     carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on;
     noted: notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless
     it is 0, the last, which takes the last instant in, at the end of the flight or after it; rows: noted numbers that
-    begin anew in each window, at 0.
-    """
+    begin anew in each window, at 0."""
     batch = RunningBatch(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:
         for observer in observers:

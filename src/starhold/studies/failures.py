@@ -63,8 +63,7 @@ class Failure:
     proved to meet its limit on the way to the target; None where that is not proved.
     momentum_share: largest |h| over its limit among working wheels during the flight. flown: length of the flight (s).
     orbit: its period (s), None without one. refused: why the law cannot fly with what is left; then nothing
-    is told of a flight.
-    """
+    is told of a flight."""
 
     lost: tuple[int, ...]
     lacking: tuple[tuple[float, ...], ...]
@@ -101,8 +100,7 @@ def study(
 
     The loss comes at time 0 and is known at once: the torque is shared out among the wheels left and, where the law was
     designed for a degree of stability, its gains are designed for the torque left. `notice` hears the number done, that of
-    all, and the loss that comes next. InputError where the scenario has no wheels.
-    """
+    all, and the loss that comes next. InputError where the scenario has no wheels."""
     wheels = require_wheels(scenario)
     count = len(wheels.axes)
     losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]

@@ -58,8 +58,7 @@ class Reflown:
     the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all as the scenario has them;
     unfollowed: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the
     recorded quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia"
-    or "torque_limit".
-    """
+    or "torque_limit"."""
 
     name: str
     program: Program

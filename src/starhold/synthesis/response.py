@@ -118,8 +118,7 @@ def settle(
     """Return the gains of the least scale x (1/s) that settle in time, and their slew.
 
     gains_of(x): the gains; rate_of(gains): the fastest rate (1/s) of the loop, which the integration must resolve.
-    ValueError names the possible time where the torque or the momentum does not allow the required one.
-    """
+    ValueError names the possible time where the torque or the momentum does not allow the required one."""
     if any(getattr(spec, name, 0) is None for name in Start.__dataclass_fields__ if name != "wheel_momentum"):
         raise ValueError("a design that settles in time needs the start, the tolerances and the torque")
     if not any(spec.attitude):

@@ -22,8 +22,7 @@ class Threads(Llvm):
     """The lanes of this program are the threads of a kernel; threads beyond the number of lanes do nothing.
 
     It is given the memories (a memory of lanes holds a number of each lane for each index), counts and words, and last the
-    number of lanes, which may be started in blocks along x of any size.
-    """
+    number of lanes, which may be started in blocks along x of any size."""
 
     convention = "ptx_kernel "
     passed = ("%.lanes", "%.thread")

@@ -200,8 +200,7 @@ def _box(inertia: Any) -> tuple[Any, Any]:
     """Half edges of the uniform box with this inertia, the longest 0.95, and its axes as columns, in body axes.
 
     For edges 2a, 2b, 2c a moment is proportional to b^2 + c^2, thus a^2 to the other two moments' sum less its own.
-    Edges that would vanish (a flat body has them) are shown as a tenth of the longest.
-    """
+    Edges that would vanish (a flat body has them) are shown as a tenth of the longest."""
     full = np.asarray(inertia, dtype=float)
     if full.ndim == 1:
         moments, axes = full, np.eye(3)

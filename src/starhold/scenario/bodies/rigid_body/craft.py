@@ -43,8 +43,7 @@ def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
     Beside what its role asks for, each has `sure_torque(params, kind)`, the torque (N m) that it surely gives, in norm or
     about each axis at once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`,
     what of the body's inertia (3, 3; kg m2) is that of rotors about their axes; and `shared_as(params, known)`, its numbers
-    with a torque shared out as among those that laws know.
-    """
+    with a torque shared out as among those that laws know."""
     made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
     if made is supposed or len(made) != len(supposed):
         return made

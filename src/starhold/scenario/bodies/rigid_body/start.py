@@ -173,8 +173,7 @@ def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], 
     named may stand in any order; without names they are those of COLUMNS. A file that ends in .aem is an attitude ephemeris
     message, whose first epoch is time 0.
 
-    Raises OSError, or ValueError that names the line and what is wrong with it.
-    """
+    Raises OSError, or ValueError that names the line and what is wrong with it."""
     if path.suffix.lower() == ".aem":
         message = read_aem(path)
         return message.times, message.attitudes, message.frame
