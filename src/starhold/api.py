@@ -42,9 +42,7 @@ def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
 
 @shortly
 def simulate(
-    scenario: reading.Scenario | str | Path,
-    law: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    scenario: reading.Scenario | str | Path, law: str | None = None, progress: Callable[[int, int], None] | None = None
 ) -> xr.Dataset:
     """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc, with
     the same attributes; `attrs["diverged_at"]` (s) is there only when the motion was lost."""

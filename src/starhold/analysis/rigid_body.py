@@ -34,9 +34,7 @@ WHEEL = ("wheel_momentum", "wheel_command", "wheel_available")
 
 MEASURES: dict[str, Measure] = {
     "settling_time": Measure(
-        "settling",
-        "s",
-        "time after which attitude and rate stay within their tolerances, the last tenth at least",
+        "settling", "s", "time after which attitude and rate stay within their tolerances, the last tenth at least"
     ),
     "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3, likewise"),
     "overshoot": Measure("overshoot", "%", "largest turn beyond the target, of the initial angle", 100.0),
@@ -282,12 +280,7 @@ AGAINST_LIMITS = {
     **dict.fromkeys(("peak_acceleration", "peak_accelerations", "acceleration_limit"), "rad/s^2"),
 }
 """Further metrics of a transient, with their units."""
-UNITS = {
-    "diverged_at": "s",
-    **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units,
-    **AGAINST_LIMITS,
-    **COSTS,
-}
+UNITS = {"diverged_at": "s", **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units, **AGAINST_LIMITS, **COSTS}
 """The metrics with their units, SI."""
 METRICS = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"), units=UNITS)
 """Settled before unsettled, then sooner, then more accurate, then more sparing."""

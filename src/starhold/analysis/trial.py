@@ -93,12 +93,7 @@ def _limited(claim: Claim) -> bool:
 
 
 def _falling(
-    free: ClosedLoop,
-    certificate: Certificate,
-    claim: Claim,
-    states: Array,
-    value: Height,
-    floor: float,
+    free: ClosedLoop, certificate: Certificate, claim: Claim, states: Array, value: Height, floor: float
 ) -> Generator[tuple[Batch, float]]:
     """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one rises by
     more than a little of it and `floor`."""

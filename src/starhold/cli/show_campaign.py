@@ -42,14 +42,7 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
     """Show a bar for each law, of so many runs, with the rate and the time left; yields what is to be called with a law and
     how many more of its runs are done, from any thread. Where an error ends it before any run, nothing of it stays. drawn:
     whether runs differ in more than their noise."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("runs"),
-        Rate(),
-        TimeLeft(),
-    )
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"), Rate(), TimeLeft())
     titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]
     if not drawn:
         titles[0] += "; nothing is drawn, so they differ by their random numbers alone, if there are any"

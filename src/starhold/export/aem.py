@@ -26,12 +26,7 @@ BODY = "SC_BODY"
 """How the names of frames fixed to the spacecraft begin."""
 OFF_UNIT = 1e-3
 """By how much the length of a quaternion may differ from 1: more is no rounding."""
-VALUES = {
-    "QUATERNION": 4,
-    "QUATERNION/DERIVATIVE": 8,
-    "QUATERNION/RATE": 7,
-    "QUATERNION/ANGVEL": 7,
-}
+VALUES = {"QUATERNION": 4, "QUATERNION/DERIVATIVE": 8, "QUATERNION/RATE": 7, "QUATERNION/ANGVEL": 7}
 """Types of attitude that are read, and the numbers of a line of theirs; all but the quaternion are passed over."""
 NAME = re.compile(r"[ -~]*[!-~][ -~]*")
 _EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")

@@ -63,11 +63,7 @@ class Fit(NamedTuple):
     ] = None
     below: Annotated[
         Vector, Gain("1", shape=(3,), spread=False, text="c, d, e of c exp(d angle) + e, 1/s, up to the split")
-    ] = (
-        -1.018,
-        -2.071,
-        -0.849,
-    )
+    ] = (-1.018, -2.071, -0.849)
     above: Annotated[Vector, Gain("1", shape=(3,), spread=False, text="the same beyond it")] = (-2.177, -0.726, -0.155)
     split: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="where the second piece begins")] = math.radians(
         85.0

@@ -350,8 +350,6 @@ def _read(given: Any) -> Distribution:
 
 
 Dispersed: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(_read),
-    WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]}),
+    Any, BeforeValidator(_read), WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]})
 ]
 """The table of one dispersion, by its distribution."""

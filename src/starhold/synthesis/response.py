@@ -109,11 +109,7 @@ def fastest(craft: Craft, gains: Any) -> float:
 
 
 def settle(
-    torque: Callable[..., Any],
-    gains_of: Callable[[float], Any],
-    rate_of: Callable[[Any], float],
-    craft: Craft,
-    spec: Any,
+    torque: Callable[..., Any], gains_of: Callable[[float], Any], rate_of: Callable[[Any], float], craft: Craft, spec: Any
 ) -> tuple[Any, Turn]:
     """Return the gains of the least scale x (1/s) that settle in time, and their slew.
 

@@ -170,10 +170,7 @@ def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
     moments, steep = np.linalg.eigvalsh(J), float(np.linalg.norm(K, 2)) * more
     low, high = float(moments[0]) / more, float(moments[-1]) * more
     k, size = float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) / more, float(np.sqrt(high / low * (far**2).sum())) * more
-    found: dict[str, Any] = {f"far.{i}": float(x) for i, x in enumerate(far)} | {
-        "inertia.low": low,
-        "inertia.high": high,
-    }
+    found: dict[str, Any] = {f"far.{i}": float(x) for i, x in enumerate(far)} | {"inertia.low": low, "inertia.high": high}
     found |= {"surface.low": k, "surface.high": steep, "surface": size, "end.rate": (size + steep * size / k) * more}
     return found | {"end.angle": 2.0 * asin(min(size / k, 1.0)) * more}
 

@@ -21,14 +21,7 @@ from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop
 from starhold.conformance.bodies.any_body import survives_toml
 from starhold.conformance.units import rescaled, times
-from starhold.conformance.verdicts import (
-    STEPS,
-    NotApplicableError,
-    agree,
-    declares_itself,
-    gives_reasons,
-    require,
-)
+from starhold.conformance.verdicts import STEPS, NotApplicableError, agree, declares_itself, gives_reasons, require
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -156,10 +149,7 @@ def _near(seen: Measurement, share: float) -> Measurement:
     return seen._replace(attitude=normalise((1.0, x, y, z)), rate=tuple(rates[:3]), body_rate=tuple(rates[3:]))
 
 
-MOTIONS = (
-    *random_measurements(5),
-    *map(_near, random_measurements(3), (0.1, 1e-2, 1e-3)),
-)
+MOTIONS = (*random_measurements(5), *map(_near, random_measurements(3), (0.1, 1e-2, 1e-3)))
 """Far from the target, and in boundary layers about it."""
 HOLDS = (1, 4, 16, 64, 256)
 """Calls in which each motion is shown, round after round, as long as a gain has changed nothing."""

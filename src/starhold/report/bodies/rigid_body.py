@@ -83,11 +83,7 @@ class RigidBodyReport:
 
         plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
         scene = _scene(scenario, flights)
-        data = {
-            "times": rounded(plots.times),
-            "plots": [*_drawn(plots, flights), _accuracy(flights)],
-            "scene": scene,
-        }
+        data = {"times": rounded(plots.times), "plots": [*_drawn(plots, flights), _accuracy(flights)], "scene": scene}
         longest = max(len(flight.recording["time"]) for flight in flights)
         sampling = Sampling(thinning(longest, PAGE_POINTS))
         if end is not None:

@@ -101,8 +101,7 @@ class Spacecraft(Table):
     inertia: Annotated[Any, *INERTIA]
     torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, text="largest torque"))] = math.inf
     limit: Annotated[
-        Literal["axis", "norm", "none"],
-        Field(description="whether the limit holds for each axis, the norm, or not at all"),
+        Literal["axis", "norm", "none"], Field(description="whether the limit holds for each axis, the norm, or not at all")
     ] = "axis"
     actuator_lag: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time constant of the actuators"))] = 0.0
     torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
@@ -147,8 +146,7 @@ class TargetTable(Pointing):
         Field(description="fixed, third axis to the centre of attraction, or as a file tells over time"),
     ] = "inertial"
     file: Annotated[
-        str | None,
-        Field(description="history beside the scenario: CSV of time (s), q0, q1, q2, q3, or a CCSDS AEM (.aem)"),
+        str | None, Field(description="history beside the scenario: CSV of time (s), q0, q1, q2, q3, or a CCSDS AEM (.aem)")
     ] = None
 
     @model_validator(mode="after")
@@ -236,8 +234,7 @@ class FaultTable(Table):
     inertia: Annotated[Any, *INERTIA] = None
     delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
     action: Annotated[
-        Action,
-        Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both"),
+        Action, Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both")
     ] = "both"
     """Unless it is "none", the law knows the new inertia from the diagnosis on."""
 
