@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from starhold.files import atomic_write
 from starhold.report.plots import Mark, Plot, back_to_front, colour
@@ -23,12 +23,8 @@ POINTS = 2000
 """Samples of a curve, about two for each column of pixels."""
 
 
-class Picture(Protocol):
-    """All that the figures show, without the runs it was taken from: small, and quickly sent to another process."""
-
-    def makers(self) -> dict[str, Callable[[], Any]]:
-        """Return the function that draws each figure, by the name of its file."""
-        ...
+Picture: TypeAlias = dict[str, Callable[[], Any]]
+"""What draws each figure, by the name of its file, without the runs: small, and quickly sent to another process."""
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:
@@ -41,7 +37,7 @@ def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        return [save(make(), folder / f"{key}.png") for key, make in list(what.makers().items())[part]]
+        return [save(make(), folder / f"{key}.png") for key, make in list(what.items())[part]]
 
 
 def warm_up() -> None:

@@ -25,6 +25,11 @@ def table_html(table: Table, kind: str = "", fit: bool = False) -> str:
     return f"{opened}<thead><tr>{heads}</tr></thead>\n<tbody>{rows}</tbody></table></div>"
 
 
+def titled(title: str, table: Table) -> str:
+    """Make a section of a table of laws."""
+    return f"<h2>{title}</h2>\n{table_html(table, 'text')}"
+
+
 def _cell(value: Any, side: str) -> str:
     text = escape(f"{value}")
     if not isinstance(value, Cell):
@@ -34,6 +39,8 @@ def _cell(value: Any, side: str) -> str:
     if value.kind == "share":
         width = 100.0 * min(max(value.number, 0.0), 1.0) if math.isfinite(value.number) else 0.0
         return f'<td class="words bar">{text}<i style="width:{width:.1f}%"></i></td>'
+    if value.kind == "name":
+        return f'<th scope="row">{swatch(int(value.number))}{text}</th>'
     if value.kind == "law":
         return f'<td class="words whose">{swatch(int(value.number))}{text}</td>'
     title = f' title="{escape(value.detail)}"' if value.detail else ""

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from starhold.report.commands import Cell, Column, Table
+from starhold.report.html_tables import titled
 from starhold.report.plots import Mark, Panel, Plot, back_to_front, colour
 from starhold.report.proved import swatch
 from starhold.report.text import lost_text, number_text, unknown_text, value_text
@@ -218,20 +220,11 @@ def plot_box(plot: Mapping[str, Any]) -> str:
 
 def laws_table(flights: Sequence[Flight]) -> str:
     """The laws with their gains."""
-    rows = "".join(
-        f'<tr><th scope="row">{swatch(number)}{escape(flight.name)}</th><td>{escape(flight.law)}</td>'
-        f"<td>{_gains(flight) or '—'}</td></tr>"
-        for number, flight in enumerate(flights)
-    )
-    head = '<th scope="col">name</th><th scope="col">type</th><th scope="col">gains</th>'
-    return (
-        f'<h2>Laws</h2>\n<div class="wide"><table class="text"><thead><tr>{head}</tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>"
-    )
-
-
-def _gains(flight: Flight) -> str:
-    return ", ".join(f"{escape(name)} = {escape(value_text(*gain))}" for name, gain in flight.gains.items())
+    rows: list[list[Any]] = []
+    for number, flight in enumerate(flights):
+        gains = ", ".join(f"{name} = {value_text(*gain)}" for name, gain in flight.gains.items())
+        rows.append([Cell(flight.name, "name", number), flight.law, gains or "—"])
+    return titled("Laws", Table([*map(Column, ("name", "type", "gains"))], rows))
 
 
 def settings(scenario: Scenario, title: str) -> str:

@@ -23,9 +23,10 @@ class Column(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Words of a table with a look of their own. kind: "law", in the colour of the law of this number; an outcome, "met",
-    "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of the column below it; "shade", in
-    the colour that detail names, the stronger the farther the number is from 0; else detail says what the words mean."""
+    """Words of a table with a look of their own. kind: "law", in the colour of the law of this number, or "name" where it
+    names its row; an outcome, "met", "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of
+    the column below it; "shade", in the colour that detail names, the stronger the farther the number is from 0; else detail
+    says what the words mean."""
 
     text: str
     kind: str = ""
