@@ -24,7 +24,7 @@ NOTE = (
     "Any other claim carries no proof, and is undecided."
 )
 Outcome = Literal["proved", "refuted", "undecided"]
-EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
+EXACT, BALLS = "exact identity", "ball arithmetic"
 EXACT_SIGN = "exact inequality"
 SQUARES, LYAPUNOV = "sum of squares", "Lyapunov's inequality"
 

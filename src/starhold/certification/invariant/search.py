@@ -158,16 +158,6 @@ def at(polynomial: Poly, equilibrium: Sequence[Any]) -> Poly:
     return polynomial.compose(*(g if x is None else context.constant(x) for g, x in pairs))
 
 
-def cells_at(what: Candidate, equilibrium: Sequence[Any]) -> list[Cell]:
-    """The cells, thin ones too, whose closures hold an equilibrium for some of the parameters."""
-    found: list[Cell] = []
-    for cell in (*what.pieces.cells, *what.pieces.thin):
-        sides = [at(guard, equilibrium) for guard in what.pieces.guards(cell)]
-        if not any(side.is_constant() and not side.is_zero() and side.leading_coefficient() < 0 for side in sides):
-            found.append(cell)
-    return found
-
-
 def value(what: Candidate, state: Sequence[Any]) -> Any:
     """V at an exact state, None where its cells do not agree."""
     found = [cell.V(*state) for cell in closed_cells(what, state)]
