@@ -104,7 +104,7 @@ def _form(a: Rows, p: Poly | None = None, cofactors: Sequence[Poly] = (), zeros:
 
 
 def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma]:
-    """Yield that x'Px is positive, and that where y = Ax it is less for y than rate^2 times that for x, or falls."""
+    """Yield that x'Px is positive, and that where y = Ax it is less for y than rate^2 times that for x, or decreases."""
     x, y, PA = _vector("x", len(P)), _vector("y", len(P)), times(P, o.A)
     Ax, Px, Py = apply(o.A, x), apply(P, x), apply(P, y)
     zeros = [b - a for a, b in zip(Ax, y, strict=True)]

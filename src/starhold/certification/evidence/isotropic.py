@@ -80,14 +80,14 @@ LESS = (3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
 
 
 class Reach(NamedTuple):
-    """A V that was recorded, what the kernel asks of its fall for the level 1, and about the largest level (1/s2)."""
+    """A V that was recorded, what the kernel asks of its decrease for the level 1, and about the largest level (1/s2)."""
 
     shape: Shape
     V: str
     asked: Sum
     level: float
 
-    def falls(self, level: float) -> bool:
+    def decreases(self, level: float) -> bool:
         """Whether floats have a sum for a level."""
         inside, *others = self.asked.known
         asked = Sum(self.asked.p, [inside - 1 + Fraction(level), *others], (), self.asked.strict)
@@ -110,7 +110,7 @@ def find_isotropic(loop: Loop) -> None:
     for one in sorted(found, key=lambda one: -one.shape.volume(one.level)):
         for level in (short(one.level * (1.0 - less)) for less in LESS):
             claim = loop.claim(ISOTROPIC, words(loop), one.V, level=level, **contents(loop, one.shape, level))
-            if one.falls(level) and loop.try_to_show(claim, loop.scales(one.V, level) | units(level)):
+            if one.decreases(level) and loop.try_to_show(claim, loop.scales(one.V, level) | units(level)):
                 return
 
 
@@ -135,7 +135,7 @@ def in_seconds(shape: Shape, a: float) -> Shape:
 
 
 def reach(loop: Loop, shape: Shape) -> Reach:
-    """Record V, and find about the largest level (1/s2) below which V falls, by points of a grid."""
+    """Record V, and find about the largest level (1/s2) below which V decreases, by points of a grid."""
 
     def height(measurement: Any) -> Scalar:
         return shape.value(measurement.attitude, measurement.rate)
@@ -151,8 +151,8 @@ def reach(loop: Loop, shape: Shape) -> Reach:
     fastest = max(abs(shape.g), abs(shape.g + 2.0 * shape.m)) + sqrt(2.0 * top + shape.g**2)
     u, x, v = np.meshgrid(np.linspace(0.0, 2.0, 61)[1:], np.linspace(-1.0, 1.0, 31), np.linspace(0.0, fastest, 61)[1:])
     at = {"u": u, "v": v, "t": x * np.sqrt(u * (2.0 - u))}
-    heights, falls = 1.0 - values(asked.known[0], at), values(asked.p, at)
-    return Reach(shape, V, asked, min(top * (1.0 - 1e-6), float(heights[falls <= 0.0].min(initial=np.inf))))
+    heights, slopes = 1.0 - values(asked.known[0], at), values(asked.p, at)
+    return Reach(shape, V, asked, min(top * (1.0 - 1e-6), float(heights[slopes <= 0.0].min(initial=np.inf))))
 
 
 def values(p: Poly, at: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -36,11 +36,8 @@ from starhold.kernel.rules import Sum
 
 sparse: Any = import_module("scipy.sparse")
 pivoted: Any = import_module("scipy.linalg").qr
-linprog: Any = import_module("scipy.optimize").linprog
 MARGIN = 1e-7
 """The least eigenvalue, in scaled units, with which exact numbers are tried."""
-PAIRED = 10
-"""Known polynomials of which products are tried in an identity."""
 MOST = 60_000
 """Entries of the matrices, at most."""
 Terms: TypeAlias = dict[Monomial, Fraction]

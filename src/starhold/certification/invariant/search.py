@@ -50,8 +50,8 @@ def grid(box: Sequence[tuple[float, float]], count: int | None = None) -> Array:
 
 
 def wrong(what: Candidate, sense: int, count: int = 8) -> list[Array]:
-    """States at which V is positive and does not fall (sense -1: grow), those of the least V first, refined by grids that
-    shrink around them."""
+    """States at which V is positive and does not decrease (sense -1: grow), those of the least V first, refined by grids
+    that shrink around them."""
     values = Values(what, grid(what.box))
     tolerance = 1e-12 * float(np.nanmax(np.abs(values.slope), initial=0.0))
     floor = 1e-12 * float(np.nanmax(np.abs(values.V), initial=0.0))

@@ -6,7 +6,7 @@ M is a compact set, V its indicator: continuous, zero on M and positive elsewher
 * `attracts` (theorem 2): and no motion can stay where V' = 0 but in M.
 * `region` (its corollary): all motions that start in {V <= level} stay there and come to M.
 * `unstable` (theorem 3): V' > 0 wherever V > 0 in a neighbourhood; V need be positive somewhere in every neighbourhood only.
-* `intersection` (theorem 4): M is where none of several V_k is positive, and each falls outside. Their maximum is a V.
+* `intersection` (theorem 4): M is where none of several V_k is positive, and each decreases outside. Their maximum is a V.
 * `avoids`: no motion from one set comes to another. V <= 0 on the one, V > 0 on the other, V' <= c V with a polynomial c.
 """
 
@@ -44,7 +44,7 @@ STEPS = {
     "positive": "positive", "border": "bounded", "changes": "falls", "agree": "switching", "continuous": "continuous",
     "never": "falls", "start": "start", "unsafe": "unsafe", "barrier": "barrier",
 }  # fmt: skip
-"""What the kernel's obligations are about."""
+"""The steps of a theorem, by the words with which the names of the kernel's obligations begin."""
 ASSUMPTIONS = "equations-as-given", "filippov"
 NEAR = 1e-6
 """The share of the largest V below which a V that rises leaves no level."""
@@ -229,8 +229,8 @@ class _Proof:
             given = {f"{name[:-1]}core": hint for name, hint in inner["evidence"].items() if name.endswith(" of V")}
             self.numbers["core"] = float(numbers["core.level"])
         if what.equilibrium is None and not any(name.startswith("member") for name in numbers):
-            falls = wanted.theorem not in ("stable", "unstable")
-            member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if falls else 0.0)
+            decreasing = wanted.theorem not in ("stable", "unstable")
+            member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if decreasing else 0.0)
             if member is None:
                 return "no state with V <= 0 was found in the box: member"
             numbers |= {f"member.{x}": fraction(v) for x, v in zip(what.pieces.names, member, strict=True)}
@@ -264,7 +264,7 @@ class _Proof:
         what, level = self.what, self.wanted.level
         if what.system.angles or self.states:
             return []
-        sense, word = (-1, "does not grow") if self.unstable else (1, "does not fall")
+        sense, word = (-1, "does not grow") if self.unstable else (1, "does not decrease")
         found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
         found.append(("continuous", "jumps", lambda: search.jump(what)))
         if what.equilibrium is not None and not self.unstable:
