@@ -93,7 +93,7 @@ def query(
         table.add_row(*(_shown(value) for value in row))
     console.print(table, markup=False)
     if len(frame) > MOST_ROWS:
-        console.print(f"the first {MOST_ROWS} of {len(frame)} rows; --csv gives all", highlight=False)
+        console.print(f"the first {MOST_ROWS} of {len(frame)} rows; --csv gives all")
 
 
 MOST_ROWS = 60

@@ -97,9 +97,9 @@ def check_part(
     for verdict in examine(examined) if isinstance(examined, Law) else examine_part(examined):
         failed += verdict.outcome == "failed"
         colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
-        console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {escape(verdict.name)}", highlight=False)
+        console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {escape(verdict.name)}")
         if verdict.reason:
-            console.print(f"{'':16}{verdict.reason}", highlight=False, markup=False)
+            console.print(f"{'':16}{verdict.reason}", markup=False)
     if failed:
         raise typer.Exit(FAILED_CHECK)
 

@@ -53,7 +53,7 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
 
     def notice(law: str, more: int) -> None:
         with suppress(IndexError):
-            console.print(titles.pop(), highlight=False)
+            console.print(titles.pop())
             bars.start()
         bars.update(tasks[law], advance=more, description=escape(_plain(law)))
 
@@ -78,7 +78,7 @@ def print_campaign(result: CampaignResult, body: str) -> None:
         outcome = outcome_of(law)
         shown = f"{marked(Cell(outcome, outcome))}  " if outcome else ""
         text = escape(_plain(headline(law, result.sampling, words)))
-        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {text}", highlight=False)
+        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {text}")
     _print(verdicts(result, words), columns=7)
     _print(metrics(result, words, METRICS), with_note=False)
     _print(brackets(result, words), with_note=result.contradicted)
@@ -89,11 +89,11 @@ def print_campaign(result: CampaignResult, body: str) -> None:
             causes = drivers(law.drivers, words, DRIVERS)
             _print(causes._replace(heading=law.law, note=f"{law.law}: {causes.note}"))
     _print(again(result, AGAIN), with_note=False)
-    console.print(f"\ndigest {result.digest}", highlight=False)
+    console.print(f"\ndigest {result.digest}")
     if result.flown and result.seconds > 0.0:
         rate = figure(result.flown / result.seconds, 3)
         flown = f"{counted(result.flown, 'run')} flown in {result.seconds:.3g} s, {rate} runs/s"
-        console.print(flown, highlight=False)
+        console.print(flown)
 
 
 def _print(section: Section | None, columns: int | None = None, with_note: bool = True) -> None:
@@ -106,7 +106,7 @@ def _print(section: Section | None, columns: int | None = None, with_note: bool 
         title = "" if section.heading == "Verdicts" else marked(section.heading)
         print_rows(table._replace(columns=table.columns[:columns], rows=rows, title=title), apart=True)
     if with_note and section.note:
-        console.print(marked(section.note), highlight=False)
+        console.print(marked(section.note))
 
 
 def _plain(text: str) -> str:

@@ -39,9 +39,9 @@ COLOURS = {
 def print_certificate(tried: Tried) -> None:
     """Claims with their outcomes, why those that are not proved are not, the assumptions, and the flights."""
     certificate, trial, inside = tried
-    console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
+    console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}")
     if not certificate.claims:
-        console.print(f"  no claim: {_safe(unclaimed(certificate.subject))}", highlight=False)
+        console.print(f"  no claim: {_safe(unclaimed(certificate.subject))}")
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
     for _ in range(3):
         table.add_column(overflow="fold")
@@ -53,21 +53,19 @@ def print_certificate(tried: Tried) -> None:
         for line in reasons(claim):
             table.add_row("", "", _safe(line))
     if certificate.claims:
-        console.print(table, highlight=False)
-        console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]", highlight=False)
+        console.print(table)
+        console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]")
     outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
     if outside:
-        console.print(f"  this scenario starts outside the sets of: {', '.join(outside)}", highlight=False)
+        console.print(f"  this scenario starts outside the sets of: {', '.join(outside)}")
     if trial is not None:
-        console.print(
-            f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]", highlight=False
-        )
+        console.print(f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]")
     console.print()
 
 
 def print_proved(flights: Sequence[Flight]) -> None:
     """One line for each claim of several laws, and how their flights leave what is proved."""
-    console.print("\nCertified on this spacecraft (starhold certify tells how):", highlight=False)
+    console.print("\nCertified on this spacecraft (starhold certify tells how):")
     table = Table(show_edge=False, pad_edge=False, box=None, show_header=False)
     for _ in range(3):
         table.add_column(overflow="fold")
@@ -83,7 +81,7 @@ def print_proved(flights: Sequence[Flight]) -> None:
             for text, kinds in texts.items():
                 if text:
                     table.add_row("", "[yellow]left[/yellow]", f"by this flight, {', '.join(kinds)}: {text}")
-    console.print(table, highlight=False)
+    console.print(table)
 
 
 def reasons(claim: Claim) -> list[str]:
@@ -112,11 +110,11 @@ def assumptions(certificate: Certificate) -> str:
 def print_compared(others: Sequence[str], scenario: str | None) -> None:
     """Print whether the proofs are about the loops of a scenario; None: they were not compared with any."""
     if scenario is None:
-        console.print("The programs of its proofs were not compared with those of a scenario.", highlight=False)
+        console.print("The programs of its proofs were not compared with those of a scenario.")
     elif not others:
-        console.print(f"The programs of its proofs are those of {_safe(scenario)}.", highlight=False)
+        console.print(f"The programs of its proofs are those of {_safe(scenario)}.")
     for text in others:
-        console.print(f"[red]another loop[/red]  {_safe(text)}", highlight=False)
+        console.print(f"[red]another loop[/red]  {_safe(text)}")
 
 
 def print_findings(findings: Sequence[Finding]) -> None:
@@ -133,14 +131,12 @@ def print_findings(findings: Sequence[Finding]) -> None:
     print_rows(Rows([*map(Column, ("certificate", "claim", "obligations", "verdict"))], rows))
     failed = [finding for finding in findings if finding.verdict == "fails"]
     for f in failed:
-        console.print(f"[red]fails[/red]  {_where(f)}", highlight=False)
+        console.print(f"[red]fails[/red]  {_where(f)}")
     left = [finding for finding in findings if finding.verdict == "not checked"]
     for f in left:
-        console.print(f"[yellow]not checked[/yellow]  {_where(f)}", highlight=False)
+        console.print(f"[yellow]not checked[/yellow]  {_where(f)}")
     claimed = sum(finding.verdict == "holds" for finding in findings)
-    console.print(
-        f"{claimed} obligations hold, {len(failed)} fail{f', {len(left)} are not checked' if left else ''}.", highlight=False
-    )
+    console.print(f"{claimed} obligations hold, {len(failed)} fail{f', {len(left)} are not checked' if left else ''}.")
 
 
 def _where(finding: Finding) -> str:

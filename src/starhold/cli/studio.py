@@ -46,7 +46,7 @@ def studio(
     from starhold.studio.server import serve
 
     def announce(address: str) -> None:
-        console.print(f"Studio: {address}", soft_wrap=True, highlight=False, markup=False)
-        console.print("Nothing leaves this machine. Ctrl-C ends it.", highlight=False)
+        console.print(f"Studio: {address}", soft_wrap=True, markup=False)
+        console.print("Nothing leaves this machine. Ctrl-C ends it.")
 
     serve(path, name, text, port, announce, browser)
