@@ -1,7 +1,5 @@
 """Files appear under their names only when they are whole, and only one process at a time writes into a folder."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Metrics of any run: when values stay within a bound, and what share of the time is on a limit."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Errors are rotation vectors (rad, body axes), small ones, so that they add up: arrays (runs, instants, 3).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal, NamedTuple, TypeAlias
 

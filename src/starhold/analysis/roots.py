@@ -1,8 +1,6 @@
 """The root of the modal law that slews fastest within limits is searched over the initial angle, and a fit put through
 it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """The duration of a slew and its peak rate and acceleration, of one run or of many lanes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Flies random states of a certified set against the claim: a test of the certifier, and no part of any proof."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A chunk is a block of consecutive runs of one law: a row of numbers a run, and what adds up over runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias

@@ -21,8 +21,6 @@ called significant with probability `RISK` at most, for inputs that are drawn in
 together, each shows what the other does; such pairs are marked.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A column of numbers or words becomes ranks and bins, which is all that tests without assumptions ask of it."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

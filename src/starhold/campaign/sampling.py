@@ -1,8 +1,6 @@
 """Plans of a campaign: which numbers each run draws. They are the same however the runs are cut into chunks, and whoever
 draws them."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

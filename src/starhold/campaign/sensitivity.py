@@ -11,8 +11,6 @@ says. So a design is made of `SCRAMBLINGS` sequences that are scrambled independ
 of them is left out gives the half-widths (the jackknife over groups; A. B. Owen, Monte Carlo theory, 2013, chapter 17).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -20,8 +20,6 @@ A share of 99.73 % with 90 % confidence is decided by 1104 runs without a failur
 needs 852; by 2128, 2916, 4907 and 7793 runs with 1, 2, 5 and 10 failures, where it needs 1440, 1970, 3433 and 5704.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, TypeAlias

@@ -10,8 +10,6 @@ A margin is kept where it is 0 or more. A margin that is NaN or minus infinity, 
 any other.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """Processes of this machine that fly blocks. Each talks to this one alone, through a pipe that nobody else can open, and
 ends when this one does."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """Assumptions of claims, by the identifiers of the kernel, are told in words, and looked for in flights."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, TypeAlias

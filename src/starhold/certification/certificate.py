@@ -4,8 +4,6 @@ Sentences are made from the numbers when they are shown (`wording`), so that not
 the independent checker verifies.
 """
 
-from __future__ import annotations
-
 import json
 import platform
 from collections.abc import Iterator, Sequence

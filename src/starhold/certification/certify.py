@@ -1,7 +1,5 @@
 """All claims about one closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, isinf

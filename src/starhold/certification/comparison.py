@@ -1,7 +1,5 @@
 """Compares a proof with a loop: whether its programs and numbers are those that fly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from math import inf, isfinite

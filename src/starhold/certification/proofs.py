@@ -1,7 +1,5 @@
 """Claims that the kernel has proved, as sentences, departures, trials and pages read them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """Prints what the kernel checked for Rocq (Coq 8.16 and later): each obligation is a lemma about real numbers, proved from
 its evidence by the rules in rocq.v. Polynomials are multiplied by positive numbers, so that their coefficients are whole."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction

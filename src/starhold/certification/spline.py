@@ -8,8 +8,6 @@ ends at the next knot and gives the rates of both. With x = |phi|^2, k1 = (1 - c
 Floats guess the peaks; that nothing exceeds them by much is shown by intervals on ever smaller parts of each stretch.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

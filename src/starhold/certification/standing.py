@@ -1,7 +1,5 @@
 """A claim stands on some numbers of its loop; others may change, or change within bounds, with the claim still proved."""
 
-from __future__ import annotations
-
 from collections.abc import Set
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The loop a certificate speaks of, and bounds on what acts on it from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, cast

@@ -1,8 +1,6 @@
 """The check of a certificate file: the kernel decides every proof, and of what stands in the file beside the proofs nothing
 says more than they do."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

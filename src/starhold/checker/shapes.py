@@ -1,7 +1,5 @@
 """The shape of a certificate file: the keys of each object, and what each may hold."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias

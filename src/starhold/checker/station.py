@@ -1,8 +1,6 @@
 """Certificates about loops that keep a craft near a libration point: the kernel decides their proof, and here it is compared
 with the law and with what the certificate tells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """The commands `campaign`, `query` and `rerun`."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated, Any

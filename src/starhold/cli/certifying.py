@@ -1,7 +1,5 @@
 """The commands `certify` and `check`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

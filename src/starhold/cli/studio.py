@@ -1,7 +1,5 @@
 """The command that serves the studio."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Makes a command of each file in `starhold.report.commands`."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import sys

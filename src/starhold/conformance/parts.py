@@ -1,7 +1,5 @@
 """The checks that every part but a law must pass, whatever its role."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import inf

@@ -1,7 +1,5 @@
 """Physics in other units: everything a law takes is rescaled by its declared unit."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

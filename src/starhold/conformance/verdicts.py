@@ -1,7 +1,5 @@
 """A check's verdict, and the helpers that the checks of parts of all roles share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple
 

@@ -4,8 +4,6 @@ Versions 1.0 (CCSDS 504.0-B-1) and 2.0 (504.0-B-2). The quaternion Q1 Q2 Q3 QC o
 REF_FRAME_A into REF_FRAME_B as `starhold.algebra.quaternion` has it: a vector's components in A become those in B.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

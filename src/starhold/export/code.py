@@ -1,7 +1,5 @@
 """A law as C99: one header, one source."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cached_property

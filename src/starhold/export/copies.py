@@ -1,8 +1,6 @@
 """Copies of equations call each other through a recorder, which may keep the calls: else a recording is one long list of
 operations, in which the equations that an equation calls vanish."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import update_wrapper
 from types import CellType, FunctionType, ModuleType

@@ -1,7 +1,5 @@
 """Writes a law in C into a folder: header, source, self-test, the file that builds them, and a manifest."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The part of a closed loop that flies on a computer: from readings of sensors to the command, with all memories."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import SimpleNamespace

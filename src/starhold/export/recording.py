@@ -1,8 +1,6 @@
 """Records equations with the calls among them kept as functions, with structs of C for their tuples, and with the names that
 the source has for values."""
 
-from __future__ import annotations
-
 import ast
 import linecache
 import re

@@ -1,7 +1,5 @@
 """Shells over the same C, and their build files: templates filled with the names and numbers of a law."""
 
-from __future__ import annotations
-
 import io
 import re
 import uuid

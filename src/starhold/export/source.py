@@ -1,7 +1,5 @@
 """The texts of a law in C: header, source and the file that builds them."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence

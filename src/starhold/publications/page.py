@@ -1,7 +1,5 @@
 """The pages of a reproduction: one a publication, and an index. They hold their figures, and open offline."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Mapping, Sequence

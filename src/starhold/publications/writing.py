@@ -1,7 +1,5 @@
 """Writes a reproduction: a page and a folder of scenario files a publication, an index and `summary.json`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from io import BytesIO

@@ -1,7 +1,5 @@
 """Figures of bars: a row for each thing, a panel for each quantity."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

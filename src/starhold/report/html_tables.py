@@ -1,7 +1,5 @@
 """HTML for tables of results, and for outcomes, code and notes beside them."""
 
-from __future__ import annotations
-
 import math
 from html import escape
 from typing import Any

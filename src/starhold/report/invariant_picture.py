@@ -1,7 +1,5 @@
 """The phase portrait of a system with the sets that were certified, one panel a claim."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

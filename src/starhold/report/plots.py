@@ -1,7 +1,5 @@
 """Plots over time, whoever draws them: panels with a curve for each law."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Sequence
 from colorsys import hls_to_rgb
 from dataclasses import dataclass, replace

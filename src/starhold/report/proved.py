@@ -1,7 +1,5 @@
 """The section of the page on claims: which are proved of each law, which are not, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any

@@ -1,7 +1,5 @@
 """The decay rate (degree of stability) over the gains, with the mode that decides it, the torque budget and the optimum."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

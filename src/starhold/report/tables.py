@@ -1,7 +1,5 @@
 """Results of studies as CSV files, SI units and radians."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The gains that formulas give the laws of a scenario, with figures to judge them by."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any

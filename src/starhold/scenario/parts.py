@@ -1,8 +1,6 @@
 """The [[part]] tables of a scenario are read: parts of any role that stand in a file of their own, here or in another
 package."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache

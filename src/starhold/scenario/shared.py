@@ -1,7 +1,5 @@
 """Parameters that a scenario gives to all its parts and laws at once, such as the epoch, are those declared as `shared`."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 

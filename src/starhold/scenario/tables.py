@@ -1,7 +1,5 @@
 """The base of all tables of a scenario file, and how they refuse."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field

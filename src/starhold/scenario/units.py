@@ -1,8 +1,6 @@
 """Texts such as "0.01 N m" become numbers. Number and unit are read here, by a grammar that computes nothing; the units
 library only gives the worth of these units."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections import Counter

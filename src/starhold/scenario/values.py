@@ -3,8 +3,6 @@
 Keys are told as `Scenario.with_` takes them. Values are validated ones: SI or scaled, as plain numbers in the file would be.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

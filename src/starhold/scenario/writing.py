@@ -1,7 +1,5 @@
 """Laws and parts are written as TOML."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Loops that differ only in numbers fly as batches, a vector of lanes at a time; each is recorded as `fly` does it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Many trajectories fly at once: blocks of lanes, divided among threads."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Phase portraits of a system with the sets that were certified, one a claim."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

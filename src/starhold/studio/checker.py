@@ -1,7 +1,5 @@
 """Scenarios are checked in a process of their own, for the files that they name may not end, or end the process."""
 
-from __future__ import annotations
-
 import hashlib
 import threading
 from concurrent.futures import ProcessPoolExecutor

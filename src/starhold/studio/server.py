@@ -1,7 +1,5 @@
 """The studio's server: on this machine alone, for whoever has the token that it was started with."""
 
-from __future__ import annotations
-
 import json
 import secrets
 import socket

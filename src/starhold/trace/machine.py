@@ -1,7 +1,5 @@
 """Programs are compiled for this processor and called."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from functools import cache

@@ -5,8 +5,6 @@ No test runs it on a GPU. The text for LLVM is run on the processor at hand, one
 that LLVM makes of it is checked: every operation rounds to nearest and none is fused.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -1,8 +1,6 @@
 """A check, which raises an InputError or a ValueError where it refuses numbers, becomes a program that tells which refusal
 holds: every way through its comparisons is recorded."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import reduce
 from typing import Any

@@ -1,7 +1,5 @@
 """Makes kernel.pyz, the kernel as one file that Python runs by itself, the same bytes wherever it is made."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from pathlib import Path

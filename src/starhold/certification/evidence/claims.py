@@ -1,7 +1,5 @@
 """Finds all claims about an attitude loop that the kernel can be shown; here those near rest and on sliding surfaces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from fractions import Fraction
 from math import asin, floor, log10, sqrt

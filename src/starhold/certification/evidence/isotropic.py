@@ -1,7 +1,5 @@
 """Finds the claim about a loop that knows no axis: a V with a mixed term, the largest level, and evidence for the kernel."""
 
-from __future__ import annotations
-
 from bisect import bisect
 from fractions import Fraction
 from math import acos, sqrt

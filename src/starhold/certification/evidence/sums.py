@@ -4,8 +4,6 @@ In floats the matrices are made as definite as can be, in units (powers of two) 
 to few binary digits they still are; what is then amiss is put on the matrix that has no factor.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

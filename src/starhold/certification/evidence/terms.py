@@ -1,7 +1,5 @@
 """Helpers about polynomials for those who look for sums of squares."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """A system, a function V and a box, for what floats and exact values at states tell of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

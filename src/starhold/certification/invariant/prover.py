@@ -3,8 +3,6 @@
 Nothing here is trusted: whatever is found counts once the kernel has accepted it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Writes piecewise polynomials as a program of the proof kernel, their numbers exactly."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any

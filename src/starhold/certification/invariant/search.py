@@ -1,7 +1,5 @@
 """Floats guess how large a level may be, and states that refute. The latter are verified in exact rationals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice

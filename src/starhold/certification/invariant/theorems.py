@@ -10,8 +10,6 @@ M is a compact set, V its indicator: continuous, zero on M and positive elsewher
 * `avoids`: no motion from one set comes to another. V <= 0 on the one, V > 0 on the other, V' <= c V with a polynomial c.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Certificates of invariant sets in sentences. Every number in them comes from the claim."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The checks for laws that turn a rigid body."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
