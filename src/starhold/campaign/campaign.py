@@ -1,7 +1,5 @@
 """Flies a campaign into a folder, or goes on with one."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import time
@@ -11,12 +9,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.campaign.again import hashes
+from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.engines import Block, Engine, Threads, Workers, flying
 from starhold.campaign.job import Job, Source
 from starhold.campaign.manifest import FILE, Manifest
@@ -28,10 +27,6 @@ from starhold.errors import InputError
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import show
 from starhold.scenario.reading import Scenario
-
-if TYPE_CHECKING:
-    from starhold.campaign.dispersions import Dispersion
-
 
 CHUNK, SMALL = 16384, 512
 """Runs of a block: where many runs' numbers are made at once, and where each is made by itself."""

@@ -1,20 +1,16 @@
 """Figures as PNG files, every law in every figure, and the helpers that draw them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from starhold.files import atomic_write
 from starhold.report.plots import Mark, Plot, back_to_front, colour
 from starhold.report.text import lost_text
-
-if TYPE_CHECKING:
-    from starhold.studies.flight import Flight
+from starhold.studies.flight import Flight
 
 DPI = 110
 NOTHING: Any = None

@@ -1,11 +1,8 @@
 """The page of a comparison; it opens offline and loads nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from starhold.report.body import report_of
 from starhold.report.living import living_data
@@ -22,10 +19,8 @@ from starhold.report.page_parts import (
     versions,
 )
 from starhold.report.proved import section as proved
-
-if TYPE_CHECKING:
-    from starhold.scenario.reading import Scenario
-    from starhold.studies.flight import Flight
+from starhold.scenario.reading import Scenario
+from starhold.studies.flight import Flight
 
 
 def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> None:

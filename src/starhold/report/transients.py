@@ -1,16 +1,11 @@
 """The transient of each law against the limits of its scenario, in words and as a section of the page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from starhold.report.commands import Cell, Column, Table
 from starhold.report.html_tables import titled
-
-if TYPE_CHECKING:
-    from starhold.studies.flight import Flight
+from starhold.studies.flight import Flight
 
 
 def transient_text(flight: Flight) -> str:

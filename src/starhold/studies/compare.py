@@ -1,25 +1,20 @@
 """Flies the laws of a scenario, whatever its body is, and measures and certifies them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from starhold.analysis.ranking import MetricSet
 from starhold.analysis.rigid_body import error_angle
 from starhold.scenario.building import build as build
+from starhold.scenario.reading import Scenario
 from starhold.simulation.lane import Progress, Recording, fly
 from starhold.studies.body import study_of
 from starhold.studies.flight import Flight
 from starhold.studies.modes import modes_flown
 from starhold.version import __version__
-
-if TYPE_CHECKING:
-    from starhold.analysis.ranking import MetricSet
-    from starhold.scenario.reading import Scenario
-
 
 Notice: TypeAlias = Callable[[str, int, int], None]
 """Called with a law's name, the control steps done and those in all."""

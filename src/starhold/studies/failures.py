@@ -1,31 +1,27 @@
 """The failures of wheels: the control that a spacecraft has after the loss of one or two of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.rigid_body import measure
 from starhold.errors import InputError
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
 from starhold.studies.bodies.rigid_body import certify_law
 from starhold.synthesis.stability_degree import degree, scale
-
-if TYPE_CHECKING:
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.scenario.reading import LawEntry, Scenario
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -11,29 +11,27 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
 from starhold.errors import InputError
+from starhold.laws.interface import Field
 from starhold.laws.modes import mode_laws
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Numbers, make_step, numbers_of, one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
 from starhold.scenario.making import changed, plain, variants
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import recorded
 from starhold.studies.flat import Flat
 from starhold.studies.questions import Asked, ask
 from starhold.trace.calling import record_call
 from starhold.trace.handles import Handle
 from starhold.trace.program import Load, Program, statements
-
-if TYPE_CHECKING:
-    from starhold.laws.interface import Field
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.scenario.reading import LawEntry, Scenario
 
 Array: TypeAlias = NDArray[np.float64]
 Values: TypeAlias = dict[str, Any]

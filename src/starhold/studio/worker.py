@@ -1,8 +1,6 @@
 """Does one thing that the studio was asked for, in a process of its own: tells its progress and its result, and leaves its
 files in a folder."""
 
-from __future__ import annotations
-
 import base64
 import shutil
 import time
@@ -12,15 +10,12 @@ from functools import partial
 from html import escape
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from starhold.errors import InputError
 from starhold.report import commands
-from starhold.scenario.reading import parse
+from starhold.scenario.reading import Scenario, parse
 from starhold.studio.apart import begin
-
-if TYPE_CHECKING:
-    from starhold.scenario.reading import Scenario
 
 PULSE = 0.2
 """Seconds between two lines of progress at least."""
