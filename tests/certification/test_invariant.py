@@ -9,8 +9,7 @@ import pytest
 
 from starhold.algebra.scalar import clip, less, maximum, where
 from starhold.certification.invariant import InvariantProblem, System, WantedSet, builtin_names, certify, prove
-from starhold.certification.invariant.candidate import Candidate
-from starhold.certification.invariant.search import Values
+from starhold.certification.invariant.search import Candidate, Values
 from starhold.certification.invariant.wording import OBLIGATIONS, evidence, limit, sentence, size
 from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, proved, system
 

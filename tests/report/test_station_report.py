@@ -8,8 +8,7 @@ from PIL import Image
 
 from starhold.analysis.libration_point import METRICS
 from starhold.report.page import render
-from starhold.report.path_plots import collect
-from starhold.report.phase_portrait import phase_portrait
+from starhold.report.path_plots import collect, phase_portrait
 from starhold.report.plots import colour
 from tests.report.flown import draw, told
 from tests.report.flown import stations as flights

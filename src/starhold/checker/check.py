@@ -17,13 +17,15 @@ from starhold.checker.shapes import (
     SUBJECT,
     UNKNOWN_BODY,
     CheckError,
+    StationSubject,
     Verdict,
     certificate_shaped,
     demand,
     outcome_of,
+    read_station,
     shaped,
+    station_findings,
 )
-from starhold.checker.station import StationSubject, read_station, station_findings
 from starhold.errors import InputError
 from starhold.kernel.check import Proved
 from starhold.kernel.check import check as prove_all

@@ -68,7 +68,7 @@ def check(
     import hashlib
     from contextlib import ExitStack
 
-    from starhold.certification.evidence.bundle import kernel_bundle
+    from starhold.certification.certificate import kernel_bundle
     from starhold.checker import check_file, passed
     from starhold.checker.check import BY_THE_KERNEL
     from starhold.cli.console import console

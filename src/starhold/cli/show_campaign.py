@@ -14,10 +14,8 @@ from rich.text import Text
 from starhold.cli.console import console
 from starhold.cli.show import print_rows
 from starhold.errors import InputError
-from starhold.report.campaign_drivers import drivers, indices
-from starhold.report.campaign_tables import Section, again, brackets, metrics, verdicts
-from starhold.report.campaign_units import Wording, counted, figure
-from starhold.report.campaign_words import headline, outcome_of
+from starhold.report.campaign_tables import Section, again, brackets, drivers, indices, metrics, verdicts
+from starhold.report.campaign_units import Wording, counted, figure, headline, outcome_of
 from starhold.report.commands import Cell
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from starhold.scenario.bodies import bodies
 from starhold.scenario.bodies.any_body import tables_of
 from starhold.scenario.checking import nearest
 from starhold.scenario.parts import ROLES, part_model, read_parts
-from starhold.scenario.shared import shared_values
+from starhold.scenario.tables import shared_values
 from starhold.scenario.writing import part_table
 from starhold.simulation.lane import fly, label, recorded
 from starhold.studies.body import body_module

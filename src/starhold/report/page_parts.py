@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from starhold.report.commands import Cell, Column, Table
-from starhold.report.html_tables import titled
 from starhold.report.plots import Mark, Panel, Plot, back_to_front, colour
 from starhold.report.proved import swatch
+from starhold.report.tables import titled
 from starhold.report.text import lost_text, number_text, unknown_text, value_text
 from starhold.scenario.checking import read_toml
 from starhold.studies.flight import Flight

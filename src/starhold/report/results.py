@@ -187,7 +187,7 @@ def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -
 
 
 def _write_kernel(folder: Path) -> None:
-    from starhold.certification.evidence.bundle import kernel_bundle
+    from starhold.certification.certificate import kernel_bundle
 
     with atomic_write(folder / KERNEL) as hidden:
         hidden.write_bytes(kernel_bundle())

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from starhold.report.commands import Cell, Column, Table
-from starhold.report.html_tables import titled
+from starhold.report.tables import titled
 from starhold.studies.flight import Flight
 
 

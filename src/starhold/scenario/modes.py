@@ -16,8 +16,7 @@ from starhold.scenario.bodies.interface import Body
 from starhold.scenario.checking import make_gains, nearest, pick_law, refuse_unstable, refusing, show, validate
 from starhold.scenario.quantity import quantity
 from starhold.scenario.schema import LawTable, law_model
-from starhold.scenario.shared import refuse_own, values_of
-from starhold.scenario.tables import Name, Table, at_key
+from starhold.scenario.tables import Name, Table, at_key, refuse_own, values_of
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario

@@ -24,8 +24,7 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.schema import columns
-from starhold.scenario.shared import own_fields, refuse_own, values_of
-from starhold.scenario.tables import Name, Table
+from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts that stand in [[part]] tables; a law has its own, and so has the body."""

@@ -16,8 +16,7 @@ from starhold.laws.interface import Gain
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import MOST_SUBSTEPS
 from starhold.scenario.quantity import any_quantity, quantity
-from starhold.scenario.shared import own_fields
-from starhold.scenario.tables import Name, Table, at_key
+from starhold.scenario.tables import Name, Table, at_key, own_fields
 
 APART = ("law", "part")
 """Arrays of tables that are read one by one, each by the type that it names."""

@@ -24,8 +24,7 @@ from starhold.scenario.parts import part_model
 from starhold.scenario.quantity import declared, reader
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import law_model
-from starhold.scenario.shared import refuse_own
-from starhold.scenario.tables import Table
+from starhold.scenario.tables import Table, refuse_own
 
 SHARED = ("name", "description", "campaign", "simulation", "certify")
 """Tables and keys that all runs of a campaign share."""

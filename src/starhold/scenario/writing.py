@@ -14,7 +14,7 @@ from starhold.parts.contract import Field
 from starhold.parts.part import Part
 from starhold.scenario.bodies import bodies, body_for
 from starhold.scenario.checking import read_toml
-from starhold.scenario.shared import shared_values
+from starhold.scenario.tables import shared_values
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 

@@ -77,7 +77,7 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
 def _block(block: commands.Block) -> str:
     from rich.text import Text
 
-    from starhold.report.html_tables import table_html
+    from starhold.report.tables import table_html
 
     if isinstance(block, commands.Heading):
         return f"<h2>{escape(block.name + block.rest)}</h2>"

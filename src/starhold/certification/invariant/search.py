@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from typing import Any
 
@@ -10,9 +12,42 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.invariant.candidate import Candidate, Floats
-from starhold.certification.invariant.system import Cell, Poly, along, solve
+from starhold.certification.invariant.system import Cell, Cells, Poly, System, along, solve, split
 from starhold.certification.matrices import number
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A system, a function V and a box; M is {V <= 0} in it. `equilibrium`: the point that M is told to be, its
+    coordinates, None for parameters; else None."""
+
+    system: System
+    V: Any
+    box: tuple[tuple[float, float], ...]
+    equilibrium: tuple[Any, ...] | None = None
+
+    @cached_property
+    def pieces(self) -> Cells:
+        """Return the cells of rates and V together."""
+        return split(self.system, self.V)
+
+
+class Floats:
+    """A polynomial is evaluated in floats."""
+
+    def __init__(self, polynomial: Poly) -> None:
+        self._terms = [(tuple(int(power) for power in powers), number(c)) for powers, c in polynomial.to_dict().items()]
+
+    def at(self, points: Any) -> Any:
+        """Return its values at points (n, ...)."""
+        total = np.zeros(np.shape(points)[1:])
+        for powers, c in self._terms:
+            term = c
+            for x, power in zip(points, powers, strict=True):
+                term = term * x**power if power else term
+            total = total + term
+        return total
+
 
 Array = NDArray[np.float64]
 POINTS = {1: 4001, 2: 301, 3: 61, 4: 23, 7: 5, 8: 3, 9: 3}
