@@ -181,13 +181,8 @@ def _limit(loop: Any) -> str:
 
 def _choices(loop: Any) -> list[str]:
     """Return the gains that are constants of this code."""
-    choices: list[str] = []
-    for field in fields(type(loop.gains)):
-        value = getattr(loop.gains, field.name)
-        if field.gain.choices:
-            choices.append(f"{field.name} = {field.gain.choices[value]}")
-        elif field.gain.whole:
-            choices.append(f"{field.name} = {value}")
+    pairs = zip(fields(type(loop.gains)), loop.gains, strict=True)
+    choices = [f"{item.name} = {item.written(value)}" for item, value in pairs if item.gain.choices or item.gain.whole]
     return [f"Fixed in this code: {', '.join(choices)}."] if choices else []
 
 

@@ -157,12 +157,11 @@ def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[Mark] = ())
     """A plot over time for the script that draws it."""
     order = back_to_front(flights, plot)
     panels = [panel_data(panel, order, thin=plot.chatters) for panel in plot.panels]
-    label = f"time, {plot.clock}"
     return {
         "name": plot.name,
         "title": plot.title,
         "dashed": plot.dashed,
-        "xlabel": label,
+        "xlabel": f"time, {plot.clock}",
         "panels": panels,
         "marks": [(mark.time, mark.word) for mark in marks],
     }
@@ -294,7 +293,7 @@ def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         if item.gain.shared in shared:
             continue
-        text = item.gain.choices[value] if item.gain.choices else _value(value)
+        text = _value(item.written(value))
         unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
         rows.append(_row(item.name, with_units(written.get(item.name), value) or text + unit, item.gain.text))
     return _section(f"{fitted.part.role} {fitted.called}", rows)

@@ -121,7 +121,7 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
             try:
                 text = read_text(folder / given)
                 lines = [line.split(",") for line in text.splitlines() if line.strip() and not line.startswith("#")]
-                if lines and not _is_number(lines[0][0]):
+                if lines and number_in(lines[0][0]) is None:
                     lines = lines[1:]
                 if any(len(line) != len(item.gain.columns) for line in lines):
                     raise ValueError(f"a line without {len(item.gain.columns)} columns")
@@ -133,12 +133,12 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
     return filled
 
 
-def _is_number(text: str) -> bool:
+def number_in(text: str) -> float | None:
+    """The number that a cell of a CSV file holds; None for words."""
     try:
-        float(text)
+        return float(text)
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def check_fit(loop: ClosedLoop, where: str) -> None:

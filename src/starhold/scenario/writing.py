@@ -60,9 +60,8 @@ def law_table(law: Law, gains: Any) -> str:
     which = f'type = "{law.name}"' if law.file is None else f"file = {json.dumps(str(law.file))}"
     lines = ["[[law]]", which]
     for item, value in _own(law.fields(), gains, body_for(law).tables.SHARED):
-        shown = item.gain.choices[value] if item.gain.choices else value
         # JSON's strings, integers, finite floats and arrays are TOML's too.
-        lines.append(f"{item.name} = {json.dumps(shown, allow_nan=False)}")
+        lines.append(f"{item.name} = {json.dumps(item.written(value), allow_nan=False)}")
     return "\n".join(lines) + "\n"
 
 
@@ -88,7 +87,7 @@ def part_table(part: Part, params: Any) -> dict[str, Any]:
     for item, value in _own(part.fields(), params, body.tables.SHARED if body else ()):
         if isinstance(value, float) and not math.isfinite(value):
             continue
-        table[item.name] = item.gain.choices[int(value)] if item.gain.choices else json.loads(json.dumps(value))
+        table[item.name] = json.loads(json.dumps(item.written(value)))
     return table
 
 

@@ -28,7 +28,7 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
     run = name_samples(scenario, loop, samples, carry)
     metrics = study.metrics_of(run) | _law_counters(entry, carry.memory)
     gains = {
-        item.name: (item.gain.choices[value], "1") if item.gain.choices else (value, item.gain.unit)
+        item.name: (item.written(value), "1" if item.gain.choices else item.gain.unit)
         for item, value in zip(entry.law.fields(), entry.gains, strict=True)
     }
     values, modes = gains | study.resources(entry), modes_flown(entry.law, run)

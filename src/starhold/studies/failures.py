@@ -18,6 +18,7 @@ from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
+from starhold.scenario.designing import written
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
 from starhold.studies.bodies.rigid_body import certify_law
@@ -199,10 +200,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         known = replace(known, wheel=working[known.wheel - 1] + 1)
     return replace(
         failure,
-        gains={
-            item.name: item.gain.choices[value] if item.gain.choices else value
-            for item, value in zip(entry.law.fields(), gains, strict=True)
-        },
+        gains=written(entry.law.fields(), gains),
         eta=_degree(scenario, entry, gains),
         settling=metrics["settling_time"],
         diverged_at=lost_at,

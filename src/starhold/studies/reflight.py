@@ -160,7 +160,7 @@ def _explicit(scenario: Scenario) -> Scenario:
         changes |= {f"law[{place}].{item.name}": None for item in entry.law.fields(entry.form)}
         changes[f"law[{place}].form"] = None
         for item, value in zip(entry.law.fields(), entry.gains, strict=True):
-            changes[f"law[{place}].{item.name}"] = item.gain.choices[value] if item.gain.choices else value
+            changes[f"law[{place}].{item.name}"] = item.written(value)
     return changed(scenario, changes)
 
 

@@ -30,7 +30,7 @@ from starhold.parts.targets import history
 from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque, torque_limit
 from starhold.scenario.bodies.rigid_body.tables import Pointing, TargetTable
 from starhold.scenario.checking import show, validate
-from starhold.scenario.parts import read_part
+from starhold.scenario.parts import number_in, read_part
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -183,7 +183,7 @@ def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], 
         cells = [cell.strip() for cell in cells]
         if not any(cells):
             continue
-        if not rows and _number(cells[0]) is None:
+        if not rows and number_in(cells[0]) is None:
             order = _order(cells, number)
             continue
         rows.append(_numbers(cells, order, number))
@@ -210,7 +210,7 @@ def _numbers(cells: list[str], order: list[int], line: int) -> list[float]:
         raise ValueError(f"line {line}: {len(cells)} columns")
     row: list[float] = []
     for place in order:
-        number = _number(cells[place])
+        number = number_in(cells[place])
         if number is None or not math.isfinite(number):
             raise ValueError(f"line {line}: {cells[place]!r}, which is no finite number")
         row.append(number)
@@ -218,10 +218,3 @@ def _numbers(cells: list[str], order: list[int], line: int) -> list[float]:
     if abs(length - 1.0) > OFF_UNIT:
         raise ValueError(f"line {line}: a quaternion of length {length:.6g}")
     return row
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
