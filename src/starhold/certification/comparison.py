@@ -24,12 +24,8 @@ def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = 
     """Return how a claim, which the kernel has checked, is about another loop than this one, or about less than another mode
     hands over, up to its ends; nothing where it is not."""
     own = Loop(make_subject(loop))
-    return [
-        *_programs(claim, own.roles, own.subject),
-        *_numbers(claim, own),
-        *_words(claim, own),
-        *_handed_over(claim, ends),
-    ]
+    apart = [*_programs(claim, own.roles, own.subject), *_numbers(claim, own)]
+    return [*apart, *_words(claim, own), *_handed_over(claim, ends)]
 
 
 def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
