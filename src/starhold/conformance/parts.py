@@ -12,7 +12,7 @@ from starhold.algebra.quaternion import conjugate, multiply, to_reference, vecto
 from starhold.algebra.structure import flatten, leaves
 from starhold.algebra.vector import ZERO, add, apply, norm, subtract
 from starhold.conformance.bench import PERIOD, sample_loop
-from starhold.conformance.units import rescale, rescale_params
+from starhold.conformance.units import SYSTEMS, rescale, rescale_params
 from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, require, run
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
@@ -31,9 +31,6 @@ from starhold.scenario.tables import shared_values
 from starhold.scenario.writing import part_table
 from starhold.simulation.lane import fly, label, recorded
 from starhold.studies.body import body_module
-
-SYSTEMS = ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0))
-"""Units of mass, length and time, in kg, m and s, in which physics must be the same."""
 
 
 def examine_part(part: Part) -> Iterator[Verdict]:
@@ -177,9 +174,6 @@ def keeps_momentum(part: Part) -> None:
         # The command of a law is a torque from outside where the effector does not take it.
         loop = loop if part.flag("ACTS") else replace(loop, limit="axis", command_limit=0.0)
         loop = replace(loop, start=loop.start._replace(position=ZERO, velocity=ZERO), period=PERIOD / 10.0)
-        if not part.flag("ACTS"):
-            # The command would act on the body from outside.
-            loop = replace(loop, command_limit=0.0)
         carries = [loop.carry(), fly(loop, 10 * STEPS)[1]]
         numbers = loop.setup().effectors
         totals: list[Any] = []

@@ -10,6 +10,9 @@ from starhold.parts.craft import Craft
 from starhold.parts.part import Part
 from starhold.scenario.units import unit_registry
 
+SYSTEMS = ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0))
+"""Units of mass, length and time, in kg, m and s, in which physics must be the same."""
+
 
 def rescaled(
     law: Law, measurement: Measurement, gains: Any, craft: Craft, factors: tuple[float, float, float]

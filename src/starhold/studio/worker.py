@@ -32,7 +32,6 @@ def _compare(scenario: Scenario, folder: Path, tell: Tell) -> str:
 
 
 def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
-    from starhold.report.page_parts import document, versions
     from starhold.report.proved import section
     from starhold.report.results import write_proofs
     from starhold.scenario.building import build
@@ -51,8 +50,7 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
         certificates = tuple(one.certificate for one in tried)
         flights.append(Flight(entry.name, entry.law.name, run, {}, {}, study.metric_set(run), certificates))
     write_proofs([certificate for flight in flights for certificate in flight.certificates], scenario.name, folder)
-    text = document(scenario, [section(flights)], {"laws": [], "plots": []}, (), f"{versions()}.")
-    return _page(folder, text)
+    return _document(scenario, folder, [section(flights)])
 
 
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
@@ -114,7 +112,9 @@ def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
 def _document(scenario: Scenario, folder: Path, parts: list[str]) -> str:
     from starhold.report.page_parts import document, versions
 
-    return _page(folder, document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}."))
+    text = document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}.")
+    (folder / "report.html").write_text(text, encoding="utf-8", newline="\n")
+    return "report.html"
 
 
 def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
@@ -141,11 +141,6 @@ def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
     result = fly_campaign(scenario, folder, None, Options(engine_of(None, None, None), force=True), notice)
     tell(0, 0, "the report is written")
     return write_campaign(scenario, result).name
-
-
-def _page(folder: Path, text: str) -> str:
-    (folder / "report.html").write_text(text, encoding="utf-8", newline="\n")
-    return "report.html"
 
 
 KINDS = {

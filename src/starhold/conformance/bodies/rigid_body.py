@@ -18,7 +18,7 @@ from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop
 from starhold.conformance.bodies.any_body import survives_toml
-from starhold.conformance.units import rescaled, times
+from starhold.conformance.units import SYSTEMS, rescaled, times
 from starhold.conformance.verdicts import STEPS, NotApplicableError, agree, declares_itself, gives_reasons, require
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Measurement
@@ -134,7 +134,7 @@ def keeps_units(law: Law) -> None:
             calls = max(calls, _first_effect(again, _torques(law, changed)))
         torques = np.array(list(islice(plain, calls)))
         size = max(float(np.abs(torques).max()), 1e-9)
-        for system in ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0)):
+        for system in SYSTEMS:
             others = np.array(list(islice(_torques(law, gains, system), calls)))
             error = float(np.abs(others - torques).max()) / size
             require(error < 1e-6, f"with kg, m, s scaled by {system} the torque changes by {error:.1e} of itself")
