@@ -141,3 +141,8 @@ def print_rows(what: Rows, apart: bool = False) -> None:
     if apart:
         console.print()
     console.print(table)
+
+
+def printable(text: str) -> str:
+    """Text from a file without characters that steer a terminal."""
+    return "".join(c if c.isprintable() or c == "\N{NARROW NO-BREAK SPACE}" else ascii(c)[1:-1] for c in text)

@@ -12,7 +12,7 @@ from rich.progress import TimeRemainingColumn as TimeLeft
 from rich.text import Text
 
 from starhold.cli.console import console
-from starhold.cli.show import print_rows
+from starhold.cli.show import print_rows, printable
 from starhold.errors import InputError
 from starhold.report.campaign_tables import Section, again, brackets, drivers, indices, metrics, verdicts
 from starhold.report.campaign_units import Wording, counted, figure, headline, outcome_of
@@ -47,13 +47,13 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
     bars = Progress(*columns, console=console)
     tasks: dict[str, TaskID] = {}
     for law in laws:
-        tasks[law] = bars.add_task(f"{escape(_plain(law))} (compiling)", total=runs)
+        tasks[law] = bars.add_task(f"{escape(printable(law))} (compiling)", total=runs)
 
     def notice(law: str, more: int) -> None:
         with suppress(IndexError):
             console.print(titles.pop())
             bars.start()
-        bars.update(tasks[law], advance=more, description=escape(_plain(law)))
+        bars.update(tasks[law], advance=more, description=escape(printable(law)))
 
     if console.is_terminal:
         bars.start()
@@ -75,7 +75,7 @@ def print_campaign(result: CampaignResult, body: str) -> None:
     for law in result.laws:
         outcome = outcome_of(law)
         shown = f"{marked(Cell(outcome, outcome))}  " if outcome else ""
-        text = escape(_plain(headline(law, result.sampling, words)))
+        text = escape(printable(headline(law, result.sampling, words)))
         console.print(f"{shown}[bold]{marked(law.law)}[/bold] {text}")
     _print(verdicts(result, words), columns=7)
     _print(metrics(result, words, METRICS), with_note=False)
@@ -107,13 +107,8 @@ def _print(section: Section | None, columns: int | None = None, with_note: bool 
         console.print(marked(section.note))
 
 
-def _plain(text: str) -> str:
-    """Text from a file without characters that steer a terminal."""
-    return "".join(c if c.isprintable() or c == "\N{NARROW NO-BREAK SPACE}" else ascii(c)[1:-1] for c in text)
-
-
 def marked(cell: Any) -> str:
     """Words as they can be printed, without markup of their own or characters that steer a terminal; outcomes in colour."""
-    text = escape(_plain(f"{cell}"))
+    text = escape(printable(f"{cell}"))
     colour = COLOURS.get(cell.kind, "") if isinstance(cell, Cell) else ""
     return f"[{colour}]{text}[/{colour}]" if colour else text

@@ -13,7 +13,7 @@ from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, eigenvalues, evidence, methods, sentence, unclaimed
 from starhold.cli.console import console
-from starhold.cli.show import print_rows
+from starhold.cli.show import print_rows, printable
 from starhold.report.commands import Column
 from starhold.report.commands import Table as Rows
 from starhold.report.text import left_text
@@ -146,7 +146,7 @@ def _where(finding: Finding) -> str:
 
 def _safe(text: str) -> str:
     """Text from a file as one that can be printed: no markup, nothing that steers a terminal, no half of a character."""
-    plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    plain = printable(text)
     return escape(plain if len(plain) <= LONGEST else f"{plain[:LONGEST]} …")
 
 

@@ -18,7 +18,7 @@ from starhold.files import atomic_write
 from starhold.report import campaign_tables as tables
 from starhold.report.campaign_tables import Section, drivers, indices, picture
 from starhold.report.campaign_units import Wording, count_text, flown_text, headings_of, headline, outcome_of, plain_measure
-from starhold.report.page_parts import document, rounded, versions
+from starhold.report.page_parts import document, plot_box, rounded, versions
 from starhold.report.plots import colour
 from starhold.report.proved import swatch
 from starhold.report.results import PAGE, write_run
@@ -164,12 +164,6 @@ def _lines(envelope: Envelope) -> dict[str, NDArray[np.float64]]:
     return {key: getattr(envelope, key) for key in ("least", "low", "median", "high", "most")}
 
 
-def box(plot: dict[str, Any]) -> str:
-    """Make the place of a plot, which the script fills."""
-    notes = "".join(f"<span>{escape(note)}</span>" for note in plot["notes"])
-    return f'<div class="plot"><h3>{escape(plot["title"])}{notes}</h3><div id="{plot["name"]}"></div></div>'
-
-
 READING = {
     "verdict": "Met, missed or not decided, for a share of all flights and with a confidence, both set "
     "beforehand. Met: were the requirement kept by less than that share, so few failures would come up with a probability "
@@ -301,7 +295,7 @@ def _distributions(plots: list[dict[str, Any]], result: CampaignResult) -> str:
         '<p class="note">Bins of runs; dashed: what is required. Where laws have bins of their own, heights are per unit, '
         "so that areas compare.</p>"
     )
-    grid = f'<div class="grid">{"".join(map(box, plots))}</div>'
+    grid = f'<div class="grid">{"".join(map(plot_box, plots))}</div>'
     return f"<h2>Distributions</h2>\n{note}\n{_switches(result, rare)}\n{grid}"
 
 
@@ -312,7 +306,7 @@ def _over_time(plots: list[dict[str, Any]], result: CampaignResult) -> str:
         '<p class="note">Of the runs that were not lost, the largest value in each window of time: median (line), 5 to 95 % '
         "(band), least and largest of all runs (thin lines). Drag to zoom, double-click to zoom out.</p>"
     )
-    return f"<h2>Envelopes over time</h2>\n{note}\n{_switches(result)}\n{''.join(map(box, plots))}"
+    return f"<h2>Envelopes over time</h2>\n{note}\n{_switches(result)}\n{''.join(map(plot_box, plots))}"
 
 
 def _store(result: CampaignResult, words: Wording) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from starhold.algebra.structure import flatten
 from starhold.analysis.rigid_body import recorded_meter
-from starhold.certification.standing import standing
+from starhold.certification.assumptions import standing
 from starhold.laws.interface import Gain
 from starhold.report.page_parts import with_units
 from starhold.report.plots import colour

@@ -213,8 +213,9 @@ def ranking(flights: Sequence[Flight]) -> str:
 
 def plot_box(plot: Mapping[str, Any]) -> str:
     """The box of a plot, which a script fills."""
-    dashed = f"<span>– – {escape(plot['dashed'])}</span>" if plot["dashed"] else ""
-    return f'<div class="plot"><h3>{escape(plot["title"])}{dashed}</h3><div id="{plot["name"]}"></div></div>'
+    notes = plot["notes"] if "notes" in plot else [f"– – {plot['dashed']}"] * bool(plot["dashed"])
+    spans = "".join(f"<span>{escape(note)}</span>" for note in notes)
+    return f'<div class="plot"><h3>{escape(plot["title"])}{spans}</h3><div id="{plot["name"]}"></div></div>'
 
 
 def laws_table(flights: Sequence[Flight]) -> str:
