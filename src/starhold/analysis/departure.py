@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, subtract
-from starhold.analysis.metrics import ALMOST, on_limit
+from starhold.analysis.meter import ALMOST, on_limit
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.subject import make_subject

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from starhold.algebra.scalar import absolute, less, maximum, minimum, sqrt, where
 from starhold.algebra.structure import places
 from starhold.algebra.vector import ZERO, Vector, dot, subtract
-from starhold.analysis.meter import INSTANT, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
-from starhold.analysis.metrics import LAST
+from starhold.analysis.meter import INSTANT, LAST, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.parts.bodies.libration_point import Units
 

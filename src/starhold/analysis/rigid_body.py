@@ -17,8 +17,7 @@ from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
 from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
-from starhold.analysis.meter import INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
-from starhold.analysis.metrics import ALMOST
+from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from starhold.algebra.scalar import absolute, less, maximum, where
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO, Vector, dot, subtract
 from starhold.algebra.words import number_of
-from starhold.analysis.metrics import too_late
+from starhold.analysis.meter import too_late
 from starhold.analysis.rigid_body import acceleration
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Observer

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import stays_within
+from starhold.analysis.meter import stays_within
 from starhold.analysis.rigid_body import DECADES, acceleration, error_angle
 from starhold.parts.bodies import rigid_body
 from starhold.parts.effectors import wheels

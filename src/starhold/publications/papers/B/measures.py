@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import stays_within
+from starhold.analysis.meter import stays_within
 from starhold.parts.craft import tensor
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
