@@ -4,6 +4,8 @@ Sentences are made from the numbers when they are shown (`wording`), so that not
 the independent checker verifies.
 """
 
+from __future__ import annotations
+
 import io
 import json
 import platform

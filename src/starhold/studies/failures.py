@@ -1,5 +1,7 @@
 """The failures of wheels: the control that a spacecraft has after the loss of one or two of them."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
