@@ -42,13 +42,11 @@ def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
 
 @shortly
 def simulate(
-    scenario: reading.Scenario | str | Path,
-    law: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    scenario: reading.Scenario | str | Path, law: str | None = None, progress: Callable[[int, int], None] | None = None
 ) -> xr.Dataset:
     """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc, with
     the same attributes; `attrs["diverged_at"]` (s) is there only when the motion was lost."""
-    opened = _opened(scenario)
+    opened = reading.open_scenario(scenario)
     entry = opened.pick(law)
     return studies.record(opened, studies.build(opened, entry), progress).dataset()
 
@@ -88,11 +86,10 @@ def sweep(
     combination is flown; or a list of changes as a scenario's `with_` takes them. law: the one that flies; if None those
     that the keys name, else all. Each row is what `compare` measures of the changed scenario, but for the cost of calls;
     nothing is certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the
-    first flight where one of the scenarios cannot be.
-    """
+    first flight where one of the scenarios cannot be."""
     from starhold.studies.sweep import sweep as fly_sweep
 
-    return fly_sweep(_opened(scenario), changes, law, threads, progress)
+    return fly_sweep(reading.open_scenario(scenario), changes, law, threads, progress)
 
 
 @shortly
@@ -126,8 +123,7 @@ def campaign(
     cluster): who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed, `runs`
     at the most. search: look for the worst, too. progress: called with a law and how many more of its runs were flown.
 
-    InputError for whatever is wrong, what was flown until then being kept.
-    """
+    InputError for whatever is wrong, what was flown until then being kept."""
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
 
@@ -146,7 +142,7 @@ def campaign(
     }
     options = Options(engine_of(threads, workers, scheduler), resume, force, until_decided, search)
     place = Path(_temporary() if folder is None else folder)
-    return fly_campaign(with_campaign(_opened(scenario), plain), place, law, options, progress)
+    return fly_campaign(with_campaign(reading.open_scenario(scenario), plain), place, law, options, progress)
 
 
 def _temporary() -> str:
@@ -182,13 +178,13 @@ def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> 
     `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tried by ten thousand flights."""
     from starhold.studies.certificates import certify_scenario
 
-    return [tried.certificate for tried in certify_scenario(_opened(scenario), law)]
+    return [tried.certificate for tried in certify_scenario(reading.open_scenario(scenario), law)]
 
 
 @shortly
 def compare(scenario: reading.Scenario | str | Path) -> list[Flight]:
     """Fly every law of a scenario; each Flight has the run (`run`, a Dataset) and its `metrics` (SI)."""
-    return studies.compare(_opened(scenario))
+    return studies.compare(reading.open_scenario(scenario))
 
 
 @shortly
@@ -214,12 +210,12 @@ def export_c(
 
     from starhold.export.code import check_name, make_code
     from starhold.export.folder import make_files, write
-    from starhold.export.proof import UNPROVED, proof_of
     from starhold.export.shells import shell_files
+    from starhold.export.source import UNPROVED, proof_of
     from starhold.report.results import open_folder, write_proofs
     from starhold.studies.certificates import certify_scenario
 
-    opened = _opened(scenario)
+    opened = reading.open_scenario(scenario)
     entry = opened.pick(law)
     code = make_code(studies.build(opened, entry), check_name(re.sub(r"\W", "_", entry.name) if name is None else name))
     more = shell_files(code, shells)
@@ -319,7 +315,7 @@ def linearise(scenario: reading.Scenario | str | Path, law: str | None = None, d
     there or whose memory never comes to rest, and where python-control is not installed."""
     from starhold.studies.linear import linear_of, systems_of
 
-    opened = _turning(scenario)
+    opened = reading.open_scenario(scenario).about("rigid-body")
     return systems_of(linear_of(opened, opened.pick(law), delay))
 
 
@@ -329,7 +325,7 @@ def margins(scenario: reading.Scenario | str | Path, law: str | None = None, del
     `linearise`, of whose sampled loop they are. NaN, and a warning why, where that loop is not stable."""
     from starhold.studies.linear import margins_of
 
-    opened = _turning(scenario)
+    opened = reading.open_scenario(scenario).about("rigid-body")
     return margins_of(opened, opened.pick(law), delay)
 
 
@@ -346,16 +342,8 @@ def studied(name: str, *about: Any, **options: Any) -> Any:
 
     declared = command(name)
     if declared.read is None:
-        about = (_opened(about[0]), *about[1:])
+        about = (reading.open_scenario(about[0]), *about[1:])
     return declared.study(*declared.prepare(*about, **options))
-
-
-def _opened(scenario: reading.Scenario | str | Path) -> reading.Scenario:
-    return reading.open_scenario(scenario)
-
-
-def _turning(scenario: reading.Scenario | str | Path) -> reading.Scenario:
-    return _opened(scenario).about("rigid-body")
 
 
 @shortly

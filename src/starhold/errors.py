@@ -1,7 +1,5 @@
 """Errors that a user can cause are one line; the command line ends with exit code 2 on it."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable
 from functools import wraps

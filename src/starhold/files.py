@@ -1,7 +1,5 @@
 """Files appear under their names only when they are whole, and only one process at a time writes into a folder."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -23,8 +21,7 @@ _claimed: dict[tuple[int, int], int] = {}
 def claim(folder: Path) -> None:
     """Make this process the only one that writes results into a folder, until it ends.
 
-    Raises BlockingIOError where another one does. The system drops the claim with the process, however that ends.
-    """
+    Raises BlockingIOError where another one does. The system drops the claim with the process, however that ends."""
     try:
         import fcntl
     except ImportError:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from starhold.algebra.intervals import Intervals
+from starhold.certification.spline import Intervals
 
 finite = st.floats(-1e60, 1e60, allow_subnormal=True)
 pairs = st.tuples(finite, finite).map(sorted)

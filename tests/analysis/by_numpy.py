@@ -6,7 +6,7 @@ import numpy as np
 
 from starhold.analysis.any_body import COMMAND
 from starhold.analysis.libration_point import YEAR, CircleGoal
-from starhold.analysis.metrics import ALMOST, LAST, on_limit, stays_within, too_late
+from starhold.analysis.meter import ALMOST, LAST, on_limit, stays_within, too_late
 from starhold.analysis.rigid_body import DECADES, error_angle
 
 

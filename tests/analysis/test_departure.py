@@ -14,7 +14,7 @@ from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_b
 from starhold.certification.assumptions import ASSUMPTIONS, WITHOUT, assumption
 from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
 from starhold.certification.certify import certify
-from starhold.certification.mixed import Shape
+from starhold.certification.evidence.isotropic import Shape
 from starhold.certification.proofs import IN_THE_LOOP
 from starhold.certification.wording import HEADINGS, sentence
 from starhold.checker import check_file, passed

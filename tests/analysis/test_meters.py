@@ -18,9 +18,9 @@ from starhold.analysis.rigid_body import EXTRAS, Cone
 from starhold.parts.bodies.libration_point import Units
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
+from starhold.simulation.batched import begin_metered
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import ThreadPool, carry_columns
-from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
 from starhold.studies.compare import name_samples
 from tests.analysis.by_numpy import of_any_body, of_libration_point, of_rigid_body

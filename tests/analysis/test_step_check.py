@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from starhold.algebra.quaternion import multiply
-from starhold.analysis.step_check import halved, step_error
 from starhold.scenario.reading import load
-from starhold.studies.compare import build, record
+from starhold.studies.compare import build, halved, record, step_error
 
 
 def recordings(name, count=3):

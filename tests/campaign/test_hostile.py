@@ -9,7 +9,7 @@ import pytest
 
 from starhold.campaign.campaign import with_campaign
 from starhold.errors import InputError
-from starhold.report.campaign_files import write_campaign
+from starhold.report.campaign_page import write_campaign
 from tests.campaign.flown import SMALL, fly, normal, short, small, uniform
 from tests.parts.files import ENVIRONMENT
 from tests.refusals import refused

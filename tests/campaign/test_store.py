@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.campaign import store as stores
+from starhold.campaign.campaign import digest
 from starhold.campaign.chunk import Chunk, merge
-from starhold.campaign.digest import digest
 from starhold.campaign.engines import Threads
 from starhold.campaign.extras import extra
 from starhold.campaign.manifest import Manifest, difference, plain

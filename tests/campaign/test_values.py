@@ -14,8 +14,8 @@ from starhold.campaign.dispersions import read_dispersions
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_text, load, parse
-from starhold.scenario.template import template_text
 from starhold.scenario.values import _filled, accepted, locate, width_at
+from starhold.scenario.writing import template_text
 from tests.refusals import refused
 
 NOISE = load("three-laws-noise")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from starhold.campaign.campaign import digest
 from starhold.campaign.chunk import Chunk
-from starhold.campaign.digest import digest
 from starhold.campaign.engines import Scheduler, Threads, Workers, flying
 from starhold.campaign.manifest import Manifest
 from starhold.campaign.store import Store

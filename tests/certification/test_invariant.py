@@ -9,8 +9,7 @@ import pytest
 
 from starhold.algebra.scalar import clip, less, maximum, where
 from starhold.certification.invariant import InvariantProblem, System, WantedSet, builtin_names, certify, prove
-from starhold.certification.invariant.candidate import Candidate
-from starhold.certification.invariant.search import Values
+from starhold.certification.invariant.search import Candidate, Values
 from starhold.certification.invariant.wording import OBLIGATIONS, evidence, limit, sentence, size
 from tests.certification.invariants import SQUARE, claim, expression, fractions, outcomes, proved, system
 
@@ -197,7 +196,7 @@ def test_v_that_has_no_least_value_at_the_equilibrium_leads_into_a_proved_set():
 @pytest.mark.parametrize(
     ("V", "core", "rates"),
     [
-        # V does not fall up to its zero; the core holds less than that; the core does not attract.
+        # V does not decrease up to its zero; the core holds less than that; the core does not attract.
         (f"{ROUND} - 2", ROUND, ("-x + x**3", "-y")),
         (f"{ROUND} - 1/2", f"({ROUND})*(1 - 4*({ROUND}))", ("-x", "-y")),
         (f"{ROUND} - 1", ROUND, (f"-x*({ROUND} - 1/2)", f"-y*({ROUND} - 1/2)")),

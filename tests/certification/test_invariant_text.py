@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.invariant import load, parse
-from starhold.certification.invariant.recording import program
 from starhold.certification.invariant.text import ExpressionError, as_written, read
+from starhold.certification.invariant.theorems import program
 from starhold.errors import InputError
 from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, var

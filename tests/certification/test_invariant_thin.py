@@ -7,8 +7,7 @@ import pytest
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.invariant import InvariantProblem, System, WantedSet, certify, parse, write
-from starhold.certification.invariant.candidate import Candidate
-from starhold.certification.invariant.search import closed_cells
+from starhold.certification.invariant.search import Candidate, closed_cells
 from starhold.checker import check_file, passed
 from tests.certification.invariants import ORIGIN as AT_ORIGIN
 from tests.certification.invariants import SQUARE, claim, expression, file, fractions, system

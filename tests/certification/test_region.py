@@ -9,7 +9,7 @@ from starhold.algebra.vector import ZERO, add
 from starhold.analysis.departure import start_inside
 from starhold.analysis.trial import draw, fly_claims
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.mixed import Shape
+from starhold.certification.evidence.isotropic import Shape
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.scenario.building import build

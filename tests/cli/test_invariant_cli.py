@@ -41,7 +41,7 @@ def test_what_is_proved(tmp_path):
 def test_a_refuted_claim_ends_with_three_and_its_state(tmp_path):
     done = written(tmp_path, more="level = 2")
     assert done.returncode == 3
-    assert "needed, but refuted: V never rises on the set" in " ".join(done.stdout.split()).replace(" │ │ │ ", " ")
+    assert "needed, but refuted: V is non-increasing on the set" in " ".join(done.stdout.split()).replace(" │ │ │ ", " ")
     assert (tmp_path / "out" / "invariant.png").stat().st_size > 10_000
 
 

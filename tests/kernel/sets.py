@@ -7,7 +7,7 @@ from functools import cache
 from starhold.algebra.polynomial import Polynomial
 from starhold.algebra.scalar import clip, less, maximum, sign, where
 from starhold.certification.invariant.prover import Attempt, proved, scales
-from starhold.certification.invariant.recording import program
+from starhold.certification.invariant.theorems import program
 from starhold.kernel.programs import digest
 
 SQUARE = {"x": (-2, 2), "y": (-2, 2)}

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 import starhold as sh
-from starhold.certification.evidence.bundle import kernel_bundle
+from starhold.certification.certificate import kernel_bundle
 from starhold.kernel.check import check
 from starhold.laws.program import law_digest
 from starhold.scenario.building import build

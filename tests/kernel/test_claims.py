@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import starhold as sh
-from starhold.certification.evidence.bundle import kernel_bundle
+from starhold.certification.certificate import kernel_bundle
 from starhold.kernel.check import check, main
 from starhold.kernel.numbers import WORK, Account
 from starhold.kernel.sentences import ASSUMPTIONS

@@ -10,12 +10,11 @@ from pydantic import ValidationError
 from starhold.cli import reproduce as command
 from starhold.cli.arguments import FAILED_CHECK
 from starhold.publications.desk import Desk
-from starhold.publications.drawing import draw
 from starhold.publications.figure import Curve, Figure, Panel
-from starhold.publications.page import index_page
 from starhold.publications.paper import PAPERS, Paper, folder_of, read_paper, scenario_files
 from starhold.publications.reproduction import Judged, Reproduction, measure_of, reproduce
 from starhold.publications.verdicts import VERDICTS, Finding, judge
+from starhold.publications.writing import draw, index_page
 from starhold.scenario.reading import parse
 from tests.browser import Browser
 from tests.running import starhold

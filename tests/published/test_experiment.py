@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from starhold.analysis.metrics import stays_within
+from starhold.analysis.meter import stays_within
 from starhold.analysis.rigid_body import METRICS, measure
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, parse

@@ -9,10 +9,8 @@ import pytest
 
 from starhold.campaign.results import CampaignResult, LawResult
 from starhold.campaign.verdicts import judge, percent
-from starhold.report.campaign_page import render, write_page
-from starhold.report.campaign_plots import envelopes, histograms
-from starhold.report.campaign_units import Wording, count_text, figure
-from starhold.report.campaign_words import headline
+from starhold.report.campaign_page import envelopes, histograms, render, write_page
+from starhold.report.campaign_units import Wording, count_text, figure, headline
 from tests.browser import Browser
 from tests.report import flown
 from tests.report.campaign_made import ASKED, indices, law, result, spread

@@ -12,9 +12,8 @@ from PIL import Image
 from starhold.algebra.cosines import to_angles
 from starhold.analysis.rigid_body import METRICS
 from starhold.report.attitude_plots import KNOWN, collect, early, roll_pitch_yaw, until
-from starhold.report.colours import COLOURS, colour
 from starhold.report.figures import WORD_ROWS, word_rows
-from starhold.report.plots import Mark, recorded_plots, thin, thin_times
+from starhold.report.plots import COLOURS, Mark, colour, recorded_plots, thin, thin_times
 from starhold.report.text import number_text
 from starhold.scenario.building import build
 from starhold.scenario.reading import load

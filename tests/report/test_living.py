@@ -14,8 +14,7 @@ import pytest
 
 from starhold.analysis.rigid_body import METRICS
 from starhold.report.body import Sampling
-from starhold.report.living import living_data
-from starhold.report.page import render, write_page
+from starhold.report.page import living_data, render, write_page
 from starhold.scenario.reading import Scenario, builtin_text, load, parse
 from starhold.studies import compare as studies
 from starhold.studies.flight import Flight

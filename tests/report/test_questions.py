@@ -10,11 +10,10 @@ from starhold.algebra.structure import mapped
 from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.studies.questions import UNASKED, Question
+from starhold.studies.questions import UNASKED, Question, record_check
 from starhold.studies.reflight import Reflight, reflight
 from starhold.trace.handles import RecordingError
 from starhold.trace.machine import load
-from starhold.trace.refusals import record_check
 
 HEAD = """
 name = "asked"

@@ -7,10 +7,9 @@ import pytest
 from PIL import Image
 
 from starhold.analysis.libration_point import METRICS
-from starhold.report.colours import colour
 from starhold.report.page import render
-from starhold.report.path_plots import collect
-from starhold.report.phase_portrait import phase_portrait
+from starhold.report.path_plots import collect, phase_portrait
+from starhold.report.plots import colour
 from tests.report.flown import draw, told
 from tests.report.flown import stations as flights
 from tests.report.reader import Reader

@@ -8,7 +8,7 @@ from copy import deepcopy
 
 from starhold.scenario.bodies import bodies
 from starhold.scenario.reading import builtin_names, builtin_text
-from starhold.scenario.template import template_text
+from starhold.scenario.writing import template_text
 
 ODD = [
     *(True, False, 0, 1, -1, 2, 3, 0.5, 7, 90, 1000, 2**31, 2**63, 10**30, 10**50),

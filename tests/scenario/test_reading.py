@@ -16,7 +16,7 @@ from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
-from starhold.scenario.template import template_text
+from starhold.scenario.writing import template_text
 from starhold.simulation.lane import fly
 from tests.making import built
 from tests.refusals import refused, replaced, rows

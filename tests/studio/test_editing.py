@@ -6,7 +6,7 @@ import pytest
 
 from starhold.scenario.reading import builtin_text
 from starhold.studio import editing
-from starhold.studio.documents import Documents, RefusedError
+from starhold.studio.checker import Documents, RefusedError
 
 
 @pytest.mark.parametrize(

@@ -4,20 +4,7 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from starhold.algebra.scalar import (
-    Scalar,
-    Truth,
-    absolute,
-    both,
-    clip,
-    divide,
-    less,
-    maximum,
-    minimum,
-    sign,
-    sqrt,
-    where,
-)
+from starhold.algebra.scalar import Scalar, Truth, absolute, both, clip, divide, less, maximum, minimum, sign, sqrt, where
 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
@@ -127,11 +114,7 @@ def column(m: Matrix, a: Vector) -> Vector:
 
 def transpose(m: Matrix) -> Matrix:
     """Return the transposed matrix."""
-    return (
-        (m[0][0], m[1][0], m[2][0]),
-        (m[0][1], m[1][1], m[2][1]),
-        (m[0][2], m[1][2], m[2][2]),
-    )
+    return ((m[0][0], m[1][0], m[2][0]), (m[0][1], m[1][1], m[2][1]), (m[0][2], m[1][2], m[2][2]))
 
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
@@ -141,11 +124,7 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
     """Return the matrix c a + d b."""
-    return (
-        add(scale(c, a[0]), scale(d, b[0])),
-        add(scale(c, a[1]), scale(d, b[1])),
-        add(scale(c, a[2]), scale(d, b[2])),
-    )
+    return (add(scale(c, a[0]), scale(d, b[0])), add(scale(c, a[1]), scale(d, b[1])), add(scale(c, a[2]), scale(d, b[2])))
 
 
 def skew(a: Vector) -> Matrix:

@@ -1,9 +1,6 @@
 """A call of a law costs the time that it takes when the states of a run are shown to the compiled law again."""
 
-from __future__ import annotations
-
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +8,7 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Numbers, make_kernel, numbers_of, replay
-from starhold.simulation.lane import recorded
-
-if TYPE_CHECKING:
-    from starhold.simulation.lane import Recording
+from starhold.simulation.lane import Recording, recorded
 
 CALLS = 50_000
 """Calls timed at most, as many as the published table timed."""
@@ -60,8 +54,7 @@ def call_costs(loop: ClosedLoop, states: NDArray[np.float64], calls: int = CALLS
     """Return median and worst processor time (s) of a call, over chunks of calls that replay the states of a flight in
     order.
 
-    The figures are latencies, see `Replay`.
-    """
+    The figures are latencies, see `Replay`."""
     repeat = Replay(loop, states)
     few = min(1000, len(states))
 

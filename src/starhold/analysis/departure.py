@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import relative
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, subtract
-from starhold.analysis.metrics import ALMOST, on_limit
+from starhold.analysis.meter import ALMOST, on_limit
 from starhold.analysis.rigid_body import error_angle
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.evidence.attitude import Loop
@@ -102,8 +102,7 @@ def departures(
 
     loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not),
     as `change` tells.
-    That torque is held between samples counts unless it is proved that it may be.
-    """
+    That torque is held between samples counts unless it is proved that it may be."""
     span = Span(loop, run, first, last)
     common = [] if span.changes is None else [Departure(span.changes, change)]
     if not len(span["time"]):

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from starhold.algebra.scalar import absolute, less, maximum, minimum, sqrt, where
 from starhold.algebra.structure import places
 from starhold.algebra.vector import ZERO, Vector, dot, subtract
-from starhold.analysis.meter import INSTANT, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
-from starhold.analysis.metrics import LAST
+from starhold.analysis.meter import INSTANT, LAST, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.parts.bodies.libration_point import Units
 
@@ -113,8 +112,7 @@ def make_meter(
 ) -> Meter:
     """The meter of flights of so many steps of a period (scaled), or of samples at such intervals, in SI.
 
-    limit: how the control is limited; tolerance: scaled distance that counts as near.
-    """
+    limit: how the control is limited; tolerance: scaled distance that counts as near."""
     circle = isinstance(goal, CircleGoal)
     given = Goal(*((goal.radius, ZERO) if circle else (0.0, goal.place)), tolerance, float(steps))
     first = Noted(-1.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0, 0.0)

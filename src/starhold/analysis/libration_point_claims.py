@@ -1,12 +1,10 @@
 """Claims about laws near a libration point against flights: when and how a flight leaves them, whether a start lies in their
 sets, and flights of random states of a certified set, which test the certifier and are no part of any proof."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +13,12 @@ from starhold.analysis.departure import LOST, Departure, Span
 from starhold.analysis.trial import FLIGHTS, LEGS, BrokenClaimError, Trial
 from starhold.analysis.trial import SLACK as RISE
 from starhold.certification.assumptions import IN_THE_PLANE
+from starhold.certification.certificate import Certificate, Claim
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.libration_point import ROWS, PointMeasurement
+from starhold.simulation.lane import Recording
 from starhold.simulation.lanes import simulate_many
 from starhold.trace.straight_line import evaluated
-
-if TYPE_CHECKING:
-    from starhold.certification.certificate import Certificate, Claim
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.simulation.lane import Recording
 
 SLACK = 1e-6
 """The integration moves V, scaled distances and velocities by so much in a motion along a border."""

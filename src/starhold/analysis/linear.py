@@ -73,8 +73,7 @@ class Linear:
 
     Continuous: `plant`, `law` (of one with a memory what its differences are over a period). Sampled: `stepped`, exact for
     a command that is held for a period and acts `delay` (s) later, and for a disturbance that is held, and `stepped_law`.
-    `left_out` names what flies and is not in the matrices.
-    """
+    `left_out` names what flies and is not in the matrices."""
 
     plant: System
     law: System

@@ -1,7 +1,5 @@
 """Gain, phase and delay margins of a linear loop about each body axis, read off its sampled frequency response."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple

@@ -21,13 +21,42 @@ from starhold.algebra.scalar import less, less_equal, sqrt, where
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import dot, most
 from starhold.algebra.words import number_of
-from starhold.analysis.metrics import ALMOST, KEPT, LAST
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step, over_samples
 from starhold.trace.program import Program
 
 if TYPE_CHECKING:
     from starhold.simulation.lane import Recording
+
+
+LAST = 0.25
+"""Share of the run over which chatter and the final error are measured."""
+ALMOST = 1.0 - 1e-9
+"""A share of a limit from which on it counts as reached."""
+KEPT = 0.1
+"""Share of the run at its end in which nothing counts as settled: a motion that goes to and fro, or that a longer run
+would show to leave again, is within its bounds there by chance."""
+
+
+def stays_within(values: Any, bound: float) -> int | None:
+    """The index from which all values are at most the bound, or None."""
+    outside = np.flatnonzero(~(np.asarray(values) <= bound))
+    first = int(outside[-1]) + 1 if outside.size else 0
+    return first if first < len(values) else None
+
+
+def too_late(index: float, count: int, kept: float = KEPT) -> bool:
+    """Whether the sample of this index, of so many, lies within the last share of a run."""
+    return index > (1.0 - kept) * (count - 1)
+
+
+def on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
+    """Tell which samples (n, components) are on their limit; none where there is none."""
+    if kind == "none" or not np.isfinite(limit):
+        return np.zeros(len(u), dtype=bool)
+    size = np.linalg.norm(u, axis=1) if kind == "norm" else np.abs(u).max(axis=1)
+    return size >= limit * ALMOST
+
 
 Array: TypeAlias = NDArray[np.float64]
 Metrics: TypeAlias = dict[str, Array]
@@ -60,8 +89,7 @@ class Metric(NamedTuple):
     over: the count of instants it is a mean over, "samples" or "tail" (changes between those of the last quarter), with a
     factor; since: the rows are of windows, and the largest counts from here on, "start", "half" or "tail"; final: it says
     how a flight ends, so that one that diverges has none; kept: the share of the flight, at its end, in which nothing
-    counts as settled.
-    """
+    counts as settled."""
 
     unit: str
     kind: str

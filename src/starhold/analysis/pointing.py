@@ -3,8 +3,6 @@
 Errors are rotation vectors (rad, body axes), small ones, so that they add up: arrays (runs, instants, 3).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -71,8 +69,7 @@ def shortfall(apart: int, length: int) -> float:
     """By what share, at most, the largest relative error is too small where windows begin so many instants apart.
 
     A window and the next one taken that holds an instant too differ by k < apart instants at either end. With M the largest
-    relative error of all windows their means differ by at most 2 k M / (length - k).
-    """
+    relative error of all windows their means differ by at most 2 k M / (length - k)."""
     return min(1.0, 2.0 * (apart - 1) / (length - apart + 1))
 
 

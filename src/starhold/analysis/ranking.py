@@ -1,7 +1,5 @@
 """Ranks laws by their metrics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -17,8 +17,7 @@ from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
 from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
-from starhold.analysis.meter import INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
-from starhold.analysis.metrics import ALMOST
+from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 
 if TYPE_CHECKING:
@@ -34,9 +33,7 @@ WHEEL = ("wheel_momentum", "wheel_command", "wheel_available")
 
 MEASURES: dict[str, Measure] = {
     "settling_time": Measure(
-        "settling",
-        "s",
-        "time after which attitude and rate stay within their tolerances, the last tenth at least",
+        "settling", "s", "time after which attitude and rate stay within their tolerances, the last tenth at least"
     ),
     "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3, likewise"),
     "overshoot": Measure("overshoot", "%", "largest turn beyond the target, of the initial angle", 100.0),
@@ -137,8 +134,7 @@ def make_meter(
 
     limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
     that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
-    rest; wheels: the body has some.
-    """
+    rest; wheels: the body has some."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
@@ -283,12 +279,7 @@ AGAINST_LIMITS = {
     **dict.fromkeys(("peak_acceleration", "peak_accelerations", "acceleration_limit"), "rad/s^2"),
 }
 """Further metrics of a transient, with their units."""
-UNITS = {
-    "diverged_at": "s",
-    **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units,
-    **AGAINST_LIMITS,
-    **COSTS,
-}
+UNITS = {"diverged_at": "s", **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units, **AGAINST_LIMITS, **COSTS}
 """The metrics with their units, SI."""
 METRICS = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"), units=UNITS)
 """Settled before unsettled, then sooner, then more accurate, then more sparing."""

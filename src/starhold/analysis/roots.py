@@ -1,8 +1,6 @@
 """The root of the modal law that slews fastest within limits is searched over the initial angle, and a fit put through
 it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -132,8 +130,7 @@ def search(
     """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no narrower.
 
     Every root is flown: until it leaves the eased limits, or until it has taken longer than the best so far, or to the end.
-    `notice` hears how many angles are done, and how many there are.
-    """
+    `notice` hears how many angles are done, and how many there are."""
     answers: list[Found] = []
     work = partial(_best, problem, problem.watcher(), np.sort(np.asarray(roots, dtype=float)), limits, eased)
     with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
@@ -190,8 +187,7 @@ def fit(angles: ArrayLike, roots: ArrayLike) -> TwoPieceFit | None:
     """Return the two pieces, and the split half-way between two angles, of the least rms relative error; None for too few
     angles.
 
-    angles: (n,), increasing (rad); roots: (n,), below zero (1/s).
-    """
+    angles: (n,), increasing (rad); roots: (n,), below zero (1/s)."""
     x, y = np.asarray(angles, dtype=float), np.asarray(roots, dtype=float)
     if len(x) < 2 * PIECE:
         return None

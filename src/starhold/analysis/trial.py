@@ -1,7 +1,5 @@
 """Flies random states of a certified set against the claim: a test of the certifier, and no part of any proof."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
@@ -93,12 +91,7 @@ def _limited(claim: Claim) -> bool:
 
 
 def _falling(
-    free: ClosedLoop,
-    certificate: Certificate,
-    claim: Claim,
-    states: Array,
-    value: Height,
-    floor: float,
+    free: ClosedLoop, certificate: Certificate, claim: Claim, states: Array, value: Height, floor: float
 ) -> Generator[tuple[Batch, float]]:
     """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one rises by
     more than a little of it and `floor`."""

@@ -1,8 +1,6 @@
 """Campaigns: many runs with dispersions, their verdicts and what drives them. Called, this package is `starhold.campaign`, a
 function of the Python interface."""
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from types import ModuleType

@@ -1,7 +1,5 @@
 """Flies single runs of a campaign again, each by its own scenario."""
 
-from __future__ import annotations
-
 import hashlib
 from contextlib import suppress
 from functools import lru_cache

@@ -1,18 +1,21 @@
 """Flies a campaign into a folder, or goes on with one."""
 
-from __future__ import annotations
-
+import hashlib
 import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from starhold.campaign.again import hashes
-from starhold.campaign.digest import digest
+from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.engines import Block, Engine, Threads, Workers, flying
 from starhold.campaign.job import Job, Source
 from starhold.campaign.manifest import FILE, Manifest
@@ -24,9 +27,6 @@ from starhold.errors import InputError
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import show
 from starhold.scenario.reading import Scenario
-
-if TYPE_CHECKING:
-    from starhold.campaign.dispersions import Dispersion
 
 CHUNK, SMALL = 16384, 512
 """Runs of a block: where many runs' numbers are made at once, and where each is made by itself."""
@@ -86,8 +86,7 @@ def fly_campaign(
     """Fly the campaign of a scenario's [campaign] table into a folder, for one law or all, and say what it comes to.
 
     InputError for whatever is wrong with it, and where something stands in its way: what was flown until then is kept, and
-    `resume` goes on from there. The results are the same for any engine and any chunk.
-    """
+    `resume` goes on from there. The results are the same for any engine and any chunk."""
     laws = tuple(entry.name for entry in scenario.laws) if law is None else (scenario.pick(law).name,)
     job = begin(scenario, laws)
     table, engine = job.table, options.engine or Threads(os.cpu_count() or 1)
@@ -210,3 +209,47 @@ def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
     clauses += [words for name, words in options.items() if getattr(given, name)]
     clauses += ["not known to the law"] if dispersion.nominal_tables and not given.known_to_law else []
     return ", ".join([given.distribution, *clauses])
+
+
+def digest(store: Store, runs: int | None = None) -> str:
+    """SHA-256, in hexadecimal, of the results: law by law in the manifest's order, column by column in the order of names,
+    run by run; numbers as little-endian bytes, text as lengths and UTF-8; then counts and extremes. runs: the number of runs
+    of each law, where fewer than planned are flown. InputError where a chunk is missing or one too many is stored."""
+    wanted = store.manifest.runs if runs is None else runs
+    whole = hashlib.sha256(b"starhold campaign 1\n")
+    for law in store.manifest.laws:
+        covered = 0
+        for file in store.files(law):
+            covered = file.last + 1 if file.first == covered else -1
+        if covered != wanted:
+            allowed = "all of them; --resume flies what is missing"
+            raise InputError(str(store.folder), "", f"not {wanted} runs of {law}", allowed)
+        for part in chain([_named(law, np.array(wanted))], _columns(store, law), _envelopes(store, law)):
+            whole.update(part)
+    return whole.hexdigest()
+
+
+def _columns(store: Store, law: str) -> Iterator[bytes]:
+    names = sorted(store.manifest.columns.get(law, ()))
+    return map(_named, names, store.each_column(names, law))
+
+
+def _envelopes(store: Store, law: str) -> Iterator[bytes]:
+    counts, extremes = store.envelopes(law)
+    for kind in (counts, extremes):
+        yield from (_named(name, values) for name, values in sorted(kind.items()))
+
+
+def _named(name: str, values: NDArray[Any]) -> bytes:
+    """An array with its name, type and shape, so that no two different results give the same bytes."""
+    kind = values.dtype.kind
+    if kind in "OU":
+        kind = "text"
+        words = [str(word).encode() for word in values.tolist()]
+        data = np.array([len(word) for word in words], "<i8").tobytes() + b"".join(words)
+    else:
+        if kind == "f":
+            values = np.where(np.isnan(values), np.nan, values)
+        data = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
+    head = f"{len(name.encode())} {name} {kind} {values.shape} {len(data)}\n"
+    return head.encode() + data

@@ -1,7 +1,5 @@
 """A chunk is a block of consecutive runs of one law: a row of numbers a run, and what adds up over runs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
@@ -22,8 +20,7 @@ class Chunk:
     rows: columns by name, each an array of one element a run: float64 (NaN: the run has no such value), int64, bool or
         text. The column `run` holds the runs' numbers in order.
     counts: histograms of any shapes by name; those of several chunks add up.
-    extremes: arrays of any shapes in any unit by name, which ends in `.least` or `.most`; NaN where nothing was measured.
-    """
+    extremes: arrays of any shapes in any unit by name, which ends in `.least` or `.most`; NaN where nothing was measured."""
 
     law: str
     first: int
@@ -49,8 +46,7 @@ class Chunk:
 def merge(parts: Iterable[tuple[Counts, Extremes]]) -> tuple[Counts, Extremes]:
     """The counts and extremes of several chunks as one: the same bits for any order and grouping of the parts.
 
-    Raises ValueError where two parts have different names or shapes.
-    """
+    Raises ValueError where two parts have different names or shapes."""
     counts: Counts = {}
     extremes: Extremes = {}
     for number, (more, others) in enumerate(parts):

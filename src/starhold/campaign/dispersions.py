@@ -1,8 +1,6 @@
 """Dispersions: the keys of a scenario that runs of a campaign differ in, with the distributions that their values are drawn
 from."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -69,8 +69,7 @@ class Workers:
 class Scheduler:
     """A Dask cluster that runs already, by its scheduler's address such as `tcp://host:8786`.
 
-    patience: seconds to wait for a worker where there is none, at the start and after all were lost.
-    """
+    patience: seconds to wait for a worker where there is none, at the start and after all were lost."""
 
     address: str
     patience: float = 60.0
@@ -89,8 +88,7 @@ def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
 
     InputError where a job raises one or fails; where workers cannot be started or reached, have other versions of what
     takes part, or compute other bits; and where all of them, or the scheduler, are lost: what was given is whole then, as
-    it is after KeyboardInterrupt.
-    """
+    it is after KeyboardInterrupt."""
     if isinstance(engine, Threads):
         with ThreadPool(engine.count) as pool:
             yield lambda blocks: _fly_here(job, blocks, pool)

@@ -1,7 +1,5 @@
 """Envelopes over time: histograms of what was noted in each window, which add up over any blocks of runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +20,14 @@ from starhold.campaign.lanes import Lanes, Lot
 from starhold.campaign.requirements import Requirement, cones_of, extras_of, read_requirements
 from starhold.campaign.sampling import Plan
 from starhold.errors import InputError
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
+from starhold.simulation.batched import begin_metered
+from starhold.simulation.lane import Progress
 from starhold.simulation.lanes import ThreadPool
-from starhold.simulation.metered import begin_metered
 from starhold.studies.body import study_of
-
-if TYPE_CHECKING:
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.simulation.lane import Progress
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,7 @@ class Lanes:
     """The lanes of one law of a scenario under a plan of draws.
 
     moved: places of the numbers that each dispersion moves among those of a loop; at_once: whether numbers of many runs are
-    made at once; flown: names of the numbers that are read back from what flies.
-    """
+    made at once; flown: names of the numbers that are read back from what flies."""
 
     def __init__(self, scenario: Scenario, law: str, plan: Plan) -> None:
         self.scenario, self.law, self.plan = scenario, law, plan

@@ -37,8 +37,7 @@ class Manifest:
     extensible: whether the draws of a run are the same for any number of runs, which Latin hypercubes are not.
     columns: names of the columns of each law, known once its first chunk is stored.
     folder, allow_unstable: what file names in the text are relative to, and whether gains known to be unstable are taken;
-        results depend on neither.
-    """
+        results depend on neither."""
 
     scenario: str
     text: str

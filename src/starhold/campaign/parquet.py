@@ -4,8 +4,6 @@ A missing number (NaN) is stored as null, so that every reader of Parquet leaves
 compressed but the counts: results are random in nearly all of their bits.
 """
 
-from __future__ import annotations
-
 import json
 import zlib
 from base64 import b64decode, b64encode

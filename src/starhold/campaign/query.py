@@ -26,8 +26,7 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
     """The answer to one SELECT about `runs`: a row for each stored run of each law, with the campaign's columns and `law`.
 
     Columns that a law does not have are null in its rows, as are numbers that a run does not have. Chunks that are unusable
-    are left out, with a line to `tell`; without it they are an InputError. InputError too for whatever DuckDB refuses.
-    """
+    are left out, with a line to `tell`; without it they are an InputError. InputError too for whatever DuckDB refuses."""
     store = Store.open(folder)
     duckdb, dataset = extra("duckdb"), extra("pyarrow.dataset")
     files = {law: [str(file.path) for file in store.files(law)] for law in store.manifest.laws}

@@ -1,7 +1,5 @@
 """Requirements: bounds that runs must keep, each with its margin."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

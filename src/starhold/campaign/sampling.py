@@ -1,8 +1,6 @@
 """Plans of a campaign: which numbers each run draws. They are the same however the runs are cut into chunks, and whoever
 draws them."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -40,8 +38,7 @@ class Plan:
     crossings of pairs of points for Sobol indices (see `sensitivity.saltelli_design`).
 
     InputError where there is no such sampling, or where the number of runs does not fit its design; `where` names the
-    scenario in it.
-    """
+    scenario in it."""
 
     dispersions: tuple[Dispersion, ...]
     sampling: str

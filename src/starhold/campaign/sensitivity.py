@@ -11,8 +11,6 @@ says. So a design is made of `SCRAMBLINGS` sequences that are scrambled independ
 of them is left out gives the half-widths (the jackknife over groups; A. B. Owen, Monte Carlo theory, 2013, chapter 17).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -45,8 +43,7 @@ class Morris:
     magnitude `mu_star` with the half-width of its interval of `confidence`, and the standard deviation `sigma`, which is
     not small against mu_star where an input acts unevenly or together with others. All (inputs,).
 
-    Of the `trajectories` flown, `dropped` had a run without a value.
-    """
+    Of the `trajectories` flown, `dropped` had a run without a value."""
 
     names: tuple[str, ...]
     mu: Array

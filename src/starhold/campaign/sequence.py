@@ -20,8 +20,6 @@ A share of 99.73 % with 90 % confidence is decided by 1104 runs without a failur
 needs 852; by 2128, 2916, 4907 and 7793 runs with 1, 2, 5 and 10 failures, where it needs 1440, 1970, 3433 and 5704.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -77,8 +75,7 @@ def _log_evidence(failures: ArrayLike, runs: ArrayLike, rate: float, tail: Any, 
 def bounds(failures: int, runs: int, confidence: float) -> Bounds:
     """Bound the failure probability at all numbers of runs at once: each bound by itself holds with the confidence.
 
-    Both together hold with confidence 2 `confidence` - 1. The interval holds failures/runs; without runs it is (0, 1).
-    """
+    Both together hold with confidence 2 `confidence` - 1. The interval holds failures/runs; without runs it is (0, 1)."""
     require_share("confidence", confidence)
     require_counts(failures, runs)
     enough = -math.log1p(-confidence)
@@ -96,8 +93,7 @@ def decided(failures: int, runs: int, share: float, confidence: float) -> Litera
     ("missed").
 
     None: fly on. Asked after every run, and stopped at the first answer, each answer is wrong with probability 1 -
-    `confidence` at most.
-    """
+    `confidence` at most."""
     require_share("share", share)
     require_share("confidence", confidence)
     require_counts(failures, runs)

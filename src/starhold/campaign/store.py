@@ -51,8 +51,7 @@ class ChunkFile:
 class Store:
     """A campaign's folder, open for reading; made by `create`, or after `resume`, for writing too.
 
-    notices: one line for each chunk that was found unusable.
-    """
+    notices: one line for each chunk that was found unusable."""
 
     def __init__(self, folder: Path, manifest: Manifest, writing: bool = False) -> None:
         self.folder, self.manifest, self.notices = folder, manifest, list[str]()
@@ -98,8 +97,7 @@ class Store:
         """This campaign, to be flown on, with the new manifest's numbers of runs and of runs a chunk.
 
         InputError with the first difference where the new manifest would give other results or fewer runs, and where another
-        process writes into the folder.
-        """
+        process writes into the folder."""
         try:
             _claim(self.folder)
         except OSError as error:
@@ -122,8 +120,7 @@ class Store:
         """The sound chunks of a law in the order of their runs.
 
         The first call reads all of them, to compare their bytes with their hashes, and adds a line to `notices` for each
-        that is unusable; a store that writes removes those.
-        """
+        that is unusable; a store that writes removes those."""
         if law not in self._files:
             kept: list[ChunkFile] = []
             for file in sorted(self._listed(law), key=lambda file: (file.first, file.last)):
@@ -150,8 +147,7 @@ class Store:
     def put(self, chunk: Chunk) -> None:
         """Write a chunk, so that it outlasts a crash from here on. InputError where the disk is full or fails.
 
-        Raises ValueError where its law, its runs or its columns are not those of the campaign.
-        """
+        Raises ValueError where its law, its runs or its columns are not those of the campaign."""
         if not self._writing:
             raise ValueError("this store is open for reading only")
         file = self._fit(chunk)
@@ -180,8 +176,7 @@ class Store:
     def columns(self, names: Sequence[str], law: str) -> dict[str, NDArray[Any]]:
         """Columns by name, one element for each stored run in the order of runs.
 
-        Holds these columns and one chunk of them in memory. InputError where the law has no such column.
-        """
+        Holds these columns and one chunk of them in memory. InputError where the law has no such column."""
         self._check_known(names, law)
         files = self.files(law)
         whole: dict[str, NDArray[Any]] = {}
@@ -217,7 +212,7 @@ class Store:
         return merge(parquet.added_up(file.path) for file in self.files(law))
 
     def finish(self, digest: str, totals: Mapping[str, Any]) -> Path:
-        """Write `campaign.json`: the digest (see `starhold.campaign.digest`), how many runs of each law are stored, and the
+        """Write `campaign.json`: the digest (see `campaign.digest`), how many runs of each law are stored, and the
         totals as JSON. Returns its path."""
         runs = {law: sum(file.last - file.first + 1 for file in self.files(law)) for law in self.manifest.laws}
         content = {"digest": digest, "fingerprint": self._fingerprint, "runs": runs, **totals}

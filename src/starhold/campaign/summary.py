@@ -1,7 +1,5 @@
 """From the stored runs of a campaign to what it says: column by column, for no memory holds all of many runs."""
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Mapping, Sequence

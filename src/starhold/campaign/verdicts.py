@@ -10,8 +10,6 @@ A margin is kept where it is 0 or more. A margin that is NaN or minus infinity, 
 any other.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -33,8 +31,7 @@ PARTS = 4
 def failure_bounds(failures: int, runs: int, confidence: float, sides: int = 2) -> Bounds:
     """Bound a failure probability from the failures among a fixed number of independent runs (Clopper-Pearson, exact).
 
-    With two `sides` both bounds together hold with the confidence; with one each bound holds with it by itself.
-    """
+    With two `sides` both bounds together hold with the confidence; with one each bound holds with it by itself."""
     require_share("confidence", confidence)
     require_counts(failures, runs)
     tail = (1.0 - confidence) / sides
@@ -56,8 +53,7 @@ def runs_needed(share: float, risk: float, failures: int) -> int:
     `risk`.
 
     A share of 99.73 % and a risk of 10 % need 852, 1440, 1970, 3433 and 5704 runs for 0, 1, 2, 5 and 10 failures (Hanson
-    and Beard).
-    """
+    and Beard)."""
     require_share("share", share)
     require_share("risk", risk)
     return sequence.least(lambda runs: acceptance(share, runs, failures) <= risk, failures)
@@ -76,8 +72,7 @@ def quantile_bound(values: ArrayLike, share: float, confidence: float) -> float 
 
     It is an order statistic of the values (n,), whatever their distribution: the one above as many as may fail by
     `allowed_failures`. Less is worse; NaN is worst and counts as minus infinity. Give the negative of a metric of which
-    more is worse. A requirement is met by a fixed number of runs just where this bound of its margin is 0 or more.
-    """
+    more is worse. A requirement is met by a fixed number of runs just where this bound of its margin is 0 or more."""
     values = _worst_first(values)
     allowed = allowed_failures(share, 1.0 - confidence, len(values))
     return None if allowed is None else float(np.partition(values, allowed)[allowed])
@@ -112,8 +107,7 @@ class Verdict(Part):
     are parts, as the runs that fall in a part are not chosen. `worst_margin` is flown by the run numbered `worst_run`;
     `margin_bound` is a margin that at least `share` of all flights keep, with the confidence, by order statistics (None: too
     few runs, or no fixed number of them). `parts` are the conditions known before flight, `worst_part` the one that speaks
-    most against the requirement.
-    """
+    most against the requirement."""
 
     share: float
     confidence: float
@@ -175,8 +169,7 @@ def judge(
 
     `independent` says whether runs are drawn independently; with Sobol' points or a Latin hypercube the binomial law does
     not hold, and only the observed share is told. `until_decided` says that the number of runs was not fixed beforehand; the
-    verdict then rests on `sequence` and may be taken any number of times.
-    """
+    verdict then rests on `sequence` and may be taken any number of times."""
     require_share("share", share)
     require_share("confidence", confidence)
     margins = _worst_first(margins)

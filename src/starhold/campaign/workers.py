@@ -1,8 +1,6 @@
 """Processes of this machine that fly blocks. Each talks to this one alone, through a pipe that nobody else can open, and
 ends when this one does."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal
@@ -154,8 +152,7 @@ def _undisturbed() -> Generator[None]:
     """Hold requests to end back until processes are started, for one that is half started would complain.
 
     What is started takes no notice of interrupts from the keyboard: they reach all processes of a terminal, of which this
-    one ends the others.
-    """
+    one ends the others."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -6,8 +6,10 @@ the independent checker verifies.
 
 from __future__ import annotations
 
+import io
 import json
 import platform
+import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib import metadata
@@ -15,6 +17,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
+from starhold import kernel
 from starhold.version import __version__
 
 FORMAT = "starhold certificate 3"
@@ -24,7 +27,7 @@ NOTE = (
     "Any other claim carries no proof, and is undecided."
 )
 Outcome = Literal["proved", "refuted", "undecided"]
-EXACT, BALLS, LASALLE = "exact identity", "ball arithmetic", "LaSalle"
+EXACT, BALLS = "exact identity", "ball arithmetic"
 EXACT_SIGN = "exact inequality"
 SQUARES, LYAPUNOV = "sum of squares", "Lyapunov's inequality"
 
@@ -167,3 +170,18 @@ def _plain(certificate: Certificate, places: Iterator[int]) -> dict[str, Any]:
     about = {"outcome": certificate.outcome, "subject": certificate.subject, "kinds": kinds}
     proof = {} if certificate.proof is None else {"proof": [next(places) for _ in certificate.proof["claims"]]}
     return {"name": certificate.name, **about, "claims": claims, **proof}
+
+
+_RUN = "import sys\nfrom kernel.check import main\nsys.exit(main(sys.argv[1:]))\n"
+
+
+def kernel_bundle() -> bytes:
+    """Return the bytes of kernel.pyz: python3 -I -S kernel.pyz certificate.json."""
+    folder, content = Path(kernel.__file__).parent, io.BytesIO()
+    files = {f"kernel/{path.relative_to(folder).as_posix()}": path.read_bytes() for path in folder.rglob("*.py")}
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
+        for name, data in sorted((files | {"__main__.py": _RUN.encode()}).items()):
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            entry.create_system, entry.external_attr = 3, 0o644 << 16
+            archive.writestr(entry, data)
+    return content.getvalue()

@@ -1,7 +1,5 @@
 """All claims about one closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, isinf
@@ -31,8 +29,7 @@ class Wanted:
     rate: convergence from every attitude and rates up to this (rad/s; inf for any); turn: torque within its limit on every
     turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of a torque nobody models (N m);
     momentum: norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; pointing: how
-    near to the target the loop comes as it flies, which takes seconds, and is wanted with a disturbance in any case.
-    """
+    near to the target the loop comes as it flies, which takes seconds, and is wanted with a disturbance in any case."""
 
     rate: float | None = None
     slew_angle: float | None = None

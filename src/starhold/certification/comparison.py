@@ -1,7 +1,5 @@
 """Compares a proof with a loop: whether its programs and numbers are those that fly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from math import inf, isfinite
@@ -26,31 +24,26 @@ def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = 
     """Return how a claim, which the kernel has checked, is about another loop than this one, or about less than another mode
     hands over, up to its ends; nothing where it is not."""
     own = Loop(make_subject(loop))
-    return [*_programs(claim, own), *_numbers(claim, own), *_words(claim, own), *_handed_over(claim, ends)]
+    apart = [*_programs(claim, own.roles, own.subject), *_numbers(claim, own)]
+    return [*apart, *_words(claim, own), *_handed_over(claim, ends)]
 
 
 def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
     """Return the same of a claim about keeping a craft near a libration point."""
     own, limit = Station(loop).claim(claim["theorem"]), loop.saturation_limit()
-    roles = [role for role, digest in own["programs"].items() if claim["programs"][role] != digest]
-    names = [n for n, x in claim["subject"].items() if n not in own["subject"] or rational(own["subject"][n]) != rational(x)]
     kinds = {"limit.axis": "axis", "limit.norm": "norm", "limit": "axis"}
     told = {kinds[name]: rational(x) for name, x in claim["numbers"].items() if name in kinds}
     other = any(kind != loop.limit or not isfinite(limit) or x != Fraction(limit) for kind, x in told.items())
-    return [
-        *(f"the program of the {role} is another one" for role in roles),
-        *(f"{name} is another number" for name in names),
-        *(["the limit is another one"] if other else []),
-    ]
+    return [*_programs(claim, own["programs"], own["subject"]), *["the limit is another one"] * other]
 
 
-def _programs(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
+def _programs(claim: Mapping[str, Any], programs: Mapping[str, str], subject: Mapping[str, str]) -> Iterator[str]:
     # A theorem refuses a claim that lacks a program which it is about.
-    for role, digest in own.roles.items():
+    for role, digest in programs.items():
         if claim["programs"].get(role, digest) != digest:
             yield f"the program of the {role} is another one"
     for name, x in claim["subject"].items():
-        if name not in own.subject or rational(own.subject[name]) != rational(x):
+        if name not in subject or rational(subject[name]) != rational(x):
             yield f"{name} is another number"
 
 

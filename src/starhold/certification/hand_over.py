@@ -1,8 +1,6 @@
 """The claim that a law takes over every motion that another one hands to it: where that one ends, by the condition of the
 switch, lies in the set from which this one brings the body to rest on target."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TypeAlias
 

@@ -3,8 +3,6 @@
 A matrix is a list of rows of rationals (`fmpq`) or balls (`arb`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 

@@ -1,7 +1,5 @@
 """Claims that the kernel has proved, as sentences, departures, trials and pages read them."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,15 +10,7 @@ from typing import Any
 from flint import fmpq
 
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
-from starhold.certification.certificate import (
-    EXACT,
-    EXACT_SIGN,
-    LYAPUNOV,
-    SQUARES,
-    Claim,
-    Obligation,
-    Proof,
-)
+from starhold.certification.certificate import EXACT, EXACT_SIGN, LYAPUNOV, SQUARES, Claim, Obligation, Proof
 from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import certificate, obligations

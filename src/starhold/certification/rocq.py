@@ -1,8 +1,6 @@
 """Prints what the kernel checked for Rocq (Coq 8.16 and later): each obligation is a lemma about real numbers, proved from
 its evidence by the rules in rocq.v. Polynomials are multiplied by positive numbers, so that their coefficients are whole."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -104,7 +102,7 @@ def _form(a: Rows, p: Poly | None = None, cofactors: Sequence[Poly] = (), zeros:
 
 
 def _contracting(o: rules.Contracts, P: Rows) -> Iterator[Lemma]:
-    """Yield that x'Px is positive, and that where y = Ax it is less for y than rate^2 times that for x, or falls."""
+    """Yield that x'Px is positive, and that where y = Ax it is less for y than rate^2 times that for x, or decreases."""
     x, y, PA = _vector("x", len(P)), _vector("y", len(P)), times(P, o.A)
     Ax, Px, Py = apply(o.A, x), apply(P, x), apply(P, y)
     zeros = [b - a for a, b in zip(Ax, y, strict=True)]

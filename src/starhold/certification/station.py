@@ -1,8 +1,6 @@
 """Certificates of station-keeping loops: what they speak of, and which claims are made. What a law declares to make
 attractive decides that: errors that vanish there, with their V, or a place of rest."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable

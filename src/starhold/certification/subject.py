@@ -1,7 +1,5 @@
 """The loop a certificate speaks of, and bounds on what acts on it from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, cast
@@ -32,8 +30,7 @@ class Subject:
 
     modelled: bound on each axis of the torque the models know (N m); target_rate, target_acceleration: bounds on the
     target's motion (rad/s, rad/s2), zero for one at rest; disturbance: bound on the norm of any further torque (N m);
-    total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels.
-    """
+    total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels."""
 
     loop: ClosedLoop
     disturbance: Any

@@ -1,7 +1,5 @@
 """Certificates in sentences. Every number in them comes from the claim."""
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Mapping, Sequence

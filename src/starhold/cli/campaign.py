@@ -1,7 +1,5 @@
 """The commands `campaign`, `query` and `rerun`."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -51,7 +49,7 @@ def campaign(
     from starhold.campaign.engines import engine_of
     from starhold.cli.console import console
     from starhold.cli.show_campaign import flying_campaign, print_campaign
-    from starhold.report.campaign_files import write_campaign
+    from starhold.report.campaign_page import write_campaign
     from starhold.scenario.reading import load
 
     engine = engine_of(threads, workers, scheduler)
@@ -93,7 +91,7 @@ def query(
         table.add_row(*(_shown(value) for value in row))
     console.print(table, markup=False)
     if len(frame) > MOST_ROWS:
-        console.print(f"the first {MOST_ROWS} of {len(frame)} rows; --csv gives all", highlight=False)
+        console.print(f"the first {MOST_ROWS} of {len(frame)} rows; --csv gives all")
 
 
 MOST_ROWS = 60

@@ -1,7 +1,5 @@
 """The commands `certify` and `check`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
@@ -32,8 +30,7 @@ def certify(
 ) -> None:
     """Prove what each law guarantees on this spacecraft: a table and certificate.json.
 
-    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
-    """
+    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided."""
     from starhold.certification.wording import recheck
     from starhold.cli.console import console
     from starhold.cli.show_certificates import print_certificate
@@ -69,12 +66,11 @@ def check(
 ) -> None:
     """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims.
 
-    Proofs are checked by the kernel, which kernel.pyz beside the file holds too; other claims are derived again.
-    """
+    Proofs are checked by the kernel, which kernel.pyz beside the file holds too; other claims are derived again."""
     import hashlib
     from contextlib import ExitStack
 
-    from starhold.certification.evidence.bundle import kernel_bundle
+    from starhold.certification.certificate import kernel_bundle
     from starhold.checker import check_file, passed
     from starhold.checker.check import BY_THE_KERNEL
     from starhold.cli.console import console

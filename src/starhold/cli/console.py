@@ -3,7 +3,7 @@
 from rich.console import Console
 
 WIDE = 132
-console = Console()
+console = Console(highlight=False)
 if not console.is_terminal:
     # A file or a pipe has no width to keep to.
-    console = Console(width=WIDE)
+    console = Console(width=WIDE, highlight=False)

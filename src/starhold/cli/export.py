@@ -67,7 +67,7 @@ def aem(
     if output.exists() and not force:
         raise InputError(str(output), "", "a file already there", "another one with -o, or --force")
     words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
-    console.print(f"{export_aem(run, output, version=version, **words)}", highlight=False, soft_wrap=True)  # type: ignore
+    console.print(f"{export_aem(run, output, version=version, **words)}", soft_wrap=True)  # type: ignore
 
 
 def print_exported(exported: Exported, folder: Path) -> None:
@@ -77,24 +77,17 @@ def print_exported(exported: Exported, folder: Path) -> None:
     from starhold.cli.console import console
 
     code, work = exported.code, exported.code.work
-    console.print(f"[bold]{code.name}[/bold]: {', '.join(exported.files)} in {folder}", highlight=False, soft_wrap=True)
+    console.print(f"[bold]{code.name}[/bold]: {', '.join(exported.files)} in {folder}", soft_wrap=True)
     shown = f"{work.arithmetic} + - * / and roots, {work.comparisons} comparisons"
-    console.print(f"  a step at the most: {shown}, every {code.flight.loop.period:g} {code.time_unit}", highlight=False)
+    console.print(f"  a step at the most: {shown}, every {code.flight.loop.period:g} {code.time_unit}")
     for cost in exported.costs:
-        console.print(
-            f"  {cost.target}: {cost.flash} bytes of flash, {cost.stack} of stack ({cost.compiler} -O2)", highlight=False
-        )
+        console.print(f"  {cost.target}: {cost.flash} bytes of flash, {cost.stack} of stack ({cost.compiler} -O2)")
     if exported.proof.warning:
         for line in exported.proof.warning.splitlines():
-            console.print(f"  [red]warning[/red] {escape(line)}", highlight=False)
+            console.print(f"  [red]warning[/red] {escape(line)}")
     else:
-        console.print(
-            f"  [green]proved[/green], {exported.proof.file}, sha256 {exported.proof.digest}",
-            highlight=False,
-            soft_wrap=True,
-        )
+        console.print(f"  [green]proved[/green], {exported.proof.file}, sha256 {exported.proof.digest}", soft_wrap=True)
     console.print(
         f"Test it: cmake -S {folder} -B {folder}/build && cmake --build {folder}/build && ctest --test-dir {folder}/build",
-        highlight=False,
         soft_wrap=True,
     )

@@ -27,7 +27,7 @@ from starhold.cli.arguments import (
     ScenarioFile,
     Unstable,
 )
-from starhold.cli.outlet import Outlet, open_outlets
+from starhold.cli.study import Outlet, open_outlets
 from starhold.errors import InputError, InterruptedByUserError
 from starhold.report.commands import names
 
@@ -185,7 +185,7 @@ def new(
     from starhold.cli.console import console
     from starhold.files import atomic_write
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
-    from starhold.scenario.template import template_text
+    from starhold.scenario.writing import template_text
 
     given = {"--wheels": wheels, "--libration": libration, "--from": start is not None}
     options = [option for option, there in given.items() if there]

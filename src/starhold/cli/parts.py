@@ -97,9 +97,9 @@ def check_part(
     for verdict in examine(examined) if isinstance(examined, Law) else examine_part(examined):
         failed += verdict.outcome == "failed"
         colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
-        console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {escape(verdict.name)}", highlight=False)
+        console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {escape(verdict.name)}")
         if verdict.reason:
-            console.print(f"{'':16}{verdict.reason}", highlight=False, markup=False)
+            console.print(f"{'':16}{verdict.reason}", markup=False)
     if failed:
         raise typer.Exit(FAILED_CHECK)
 
@@ -175,9 +175,9 @@ def _field_blocks(title: str, fields: Iterable[Field]) -> list[Block]:
     """Parameters with their units, bounds and defaults under a title."""
     rows: list[tuple[str, ...]] = []
     for item in fields:
-        gain, default = item.gain, item.default
+        gain = item.gain
         allowed = ", ".join(gain.choices) or _bounds(gain)
-        default = "required" if item.required else str(gain.choices[default] if gain.choices else default)
+        default = "required" if item.required else str(item.written(item.default))
         rows.append((item.name, gain.unit, allowed, default, gain.text))
     return ["", Heading(title), _table(("key", "unit", "allowed", "default", "meaning"), rows)]
 

@@ -52,17 +52,17 @@ def print_outcome(flights: Sequence[Flight]) -> None:
         if flight.lost is not None:
             console.print(f"{flight.name} diverged at {lost_text(flight)}; its results end there", style="red")
         if said := unknown_text(flight):
-            console.print(said, style="red", markup=False, highlight=False)
+            console.print(said, style="red", markup=False)
         if flight.metrics.get("solver_budget_hits"):
             hits, calls = flight.metrics["solver_budget_hits"], flight.metrics["solver_calls"]
             console.print(f"{flight.name}: the solver used up its budget in {hits} of {calls} calls", style="yellow")
         if "step_error" in flight.metrics:
-            console.print(_step_text(flight), highlight=False, markup=False)
+            console.print(_step_text(flight), markup=False)
         if "limits_kept" in flight.metrics:
             from starhold.report.transients import transient_text
 
             said, kept = transient_text(flight), flight.metrics["limits_kept"]
-            console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False, highlight=False)
+            console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False)
 
 
 def _step_text(flight: Flight) -> str:
@@ -101,17 +101,16 @@ def print_table(flights: Sequence[Flight]) -> None:
     console.print()
     console.print(table)
     if late := metric_set.late(results):
-        console.print(late, highlight=False)
+        console.print(late)
     if len(flights) > 1:
         console.print(
-            f"Ranked by {', then '.join(metric_set.headings(results))}; [bold green]*[/bold green] best of its kind.",
-            highlight=False,
+            f"Ranked by {', then '.join(metric_set.headings(results))}; [bold green]*[/bold green] best of its kind."
         )
     for flight in flights:
         if flight.modes:
             first, *later = flight.modes
             stretches = "".join(f", {one.mode} from {metric_set.moment(one.time, 6)}" for one in later)
-            console.print(escape(f"Modes of {flight.name}: {first.mode}{stretches}."), highlight=False)
+            console.print(escape(f"Modes of {flight.name}: {first.mode}{stretches}."))
 
 
 def _cell(text: str, best: bool) -> str:
@@ -124,9 +123,9 @@ def print_blocks(blocks: Iterable[Block]) -> None:
         if isinstance(block, Rows):
             print_rows(block)
         elif isinstance(block, Heading):
-            console.print(f"[bold]{escape(block.name)}[/bold]{escape(block.rest)}", highlight=False, soft_wrap=True)
+            console.print(f"[bold]{escape(block.name)}[/bold]{escape(block.rest)}", soft_wrap=True)
         else:
-            console.print(block, highlight=False, markup=False)
+            console.print(block, markup=False)
 
 
 def print_rows(what: Rows, apart: bool = False) -> None:
@@ -142,3 +141,8 @@ def print_rows(what: Rows, apart: bool = False) -> None:
     if apart:
         console.print()
     console.print(table)
+
+
+def printable(text: str) -> str:
+    """Text from a file without characters that steer a terminal."""
+    return "".join(c if c.isprintable() or c == "\N{NARROW NO-BREAK SPACE}" else ascii(c)[1:-1] for c in text)

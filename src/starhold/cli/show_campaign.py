@@ -12,12 +12,10 @@ from rich.progress import TimeRemainingColumn as TimeLeft
 from rich.text import Text
 
 from starhold.cli.console import console
-from starhold.cli.show import print_rows
+from starhold.cli.show import print_rows, printable
 from starhold.errors import InputError
-from starhold.report.campaign_drivers import drivers, indices
-from starhold.report.campaign_tables import Section, again, brackets, metrics, verdicts
-from starhold.report.campaign_units import Wording, counted, figure
-from starhold.report.campaign_words import headline, outcome_of
+from starhold.report.campaign_tables import Section, again, brackets, drivers, indices, metrics, verdicts
+from starhold.report.campaign_units import Wording, counted, figure, headline, outcome_of
 from starhold.report.commands import Cell
 
 if TYPE_CHECKING:
@@ -42,27 +40,20 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
     """Show a bar for each law, of so many runs, with the rate and the time left; yields what is to be called with a law and
     how many more of its runs are done, from any thread. Where an error ends it before any run, nothing of it stays. drawn:
     whether runs differ in more than their noise."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("runs"),
-        Rate(),
-        TimeLeft(),
-    )
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"), Rate(), TimeLeft())
     titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]
     if not drawn:
         titles[0] += "; nothing is drawn, so they differ by their random numbers alone, if there are any"
     bars = Progress(*columns, console=console)
     tasks: dict[str, TaskID] = {}
     for law in laws:
-        tasks[law] = bars.add_task(f"{escape(_plain(law))} (compiling)", total=runs)
+        tasks[law] = bars.add_task(f"{escape(printable(law))} (compiling)", total=runs)
 
     def notice(law: str, more: int) -> None:
         with suppress(IndexError):
-            console.print(titles.pop(), highlight=False)
+            console.print(titles.pop())
             bars.start()
-        bars.update(tasks[law], advance=more, description=escape(_plain(law)))
+        bars.update(tasks[law], advance=more, description=escape(printable(law)))
 
     if console.is_terminal:
         bars.start()
@@ -84,8 +75,8 @@ def print_campaign(result: CampaignResult, body: str) -> None:
     for law in result.laws:
         outcome = outcome_of(law)
         shown = f"{marked(Cell(outcome, outcome))}  " if outcome else ""
-        text = escape(_plain(headline(law, result.sampling, words)))
-        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {text}", highlight=False)
+        text = escape(printable(headline(law, result.sampling, words)))
+        console.print(f"{shown}[bold]{marked(law.law)}[/bold] {text}")
     _print(verdicts(result, words), columns=7)
     _print(metrics(result, words, METRICS), with_note=False)
     _print(brackets(result, words), with_note=result.contradicted)
@@ -96,11 +87,11 @@ def print_campaign(result: CampaignResult, body: str) -> None:
             causes = drivers(law.drivers, words, DRIVERS)
             _print(causes._replace(heading=law.law, note=f"{law.law}: {causes.note}"))
     _print(again(result, AGAIN), with_note=False)
-    console.print(f"\ndigest {result.digest}", highlight=False)
+    console.print(f"\ndigest {result.digest}")
     if result.flown and result.seconds > 0.0:
         rate = figure(result.flown / result.seconds, 3)
         flown = f"{counted(result.flown, 'run')} flown in {result.seconds:.3g} s, {rate} runs/s"
-        console.print(flown, highlight=False)
+        console.print(flown)
 
 
 def _print(section: Section | None, columns: int | None = None, with_note: bool = True) -> None:
@@ -113,16 +104,11 @@ def _print(section: Section | None, columns: int | None = None, with_note: bool 
         title = "" if section.heading == "Verdicts" else marked(section.heading)
         print_rows(table._replace(columns=table.columns[:columns], rows=rows, title=title), apart=True)
     if with_note and section.note:
-        console.print(marked(section.note), highlight=False)
-
-
-def _plain(text: str) -> str:
-    """Text from a file without characters that steer a terminal."""
-    return "".join(c if c.isprintable() or c == "\N{NARROW NO-BREAK SPACE}" else ascii(c)[1:-1] for c in text)
+        console.print(marked(section.note))
 
 
 def marked(cell: Any) -> str:
     """Words as they can be printed, without markup of their own or characters that steer a terminal; outcomes in colour."""
-    text = escape(_plain(f"{cell}"))
+    text = escape(printable(f"{cell}"))
     colour = COLOURS.get(cell.kind, "") if isinstance(cell, Cell) else ""
     return f"[{colour}]{text}[/{colour}]" if colour else text

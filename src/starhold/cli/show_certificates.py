@@ -23,7 +23,7 @@ from starhold.certification.wording import (
     unclaimed,
 )
 from starhold.cli.console import console
-from starhold.cli.show import print_rows
+from starhold.cli.show import print_rows, printable
 from starhold.report.commands import Column
 from starhold.report.commands import Table as Rows
 from starhold.report.text import left_text
@@ -51,11 +51,11 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
     why claims that are not proved are not. why: how each was shown, too, and all assumptions."""
     certificate, trial, inside = tried
     subject = certificate.subject
-    console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}", highlight=False)
+    console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}")
     if not certificate.claims:
-        console.print(f"  no claim: {_safe(unclaimed(subject))}", highlight=False)
+        console.print(f"  no claim: {_safe(unclaimed(subject))}")
     for heading, claims in grouped(certificate).items():
-        console.print(f"  [dim]{_safe(heading)}:[/dim]", highlight=False)
+        console.print(f"  [dim]{_safe(heading)}:[/dim]")
         table = _grid()
         for claim in claims:
             how = f" [dim]({methods(claim)})[/dim]" if why else ""
@@ -65,28 +65,26 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
                 table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
             for line in reasons(claim):
                 table.add_row("", "", _safe(line))
-        console.print(table, highlight=False)
+        console.print(table)
     if why and certificate.claims:
-        console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]", highlight=False)
+        console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]")
     outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
     if outside:
-        console.print(f"  this scenario starts outside the sets of: {', '.join(outside)}", highlight=False)
+        console.print(f"  this scenario starts outside the sets of: {', '.join(outside)}")
     if trial is not None:
-        console.print(
-            f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]", highlight=False
-        )
+        console.print(f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]")
     console.print()
 
 
 def print_proved(flights: Sequence[Flight]) -> None:
     """The claim of each law that leaves out the least, the names of the others, and until when they cover a flight."""
-    console.print("\nCertified on this spacecraft (starhold certify --why tells how):", highlight=False)
+    console.print("\nCertified on this spacecraft (starhold certify --why tells how):")
     table = _grid()
     for flight in flights:
         for place, certificate in enumerate(flight.certificates):
             for left, outcome, text in _summary(flight, place, certificate):
                 table.add_row(f"  {_safe(left)}", outcome, _safe(text))
-    console.print(table, highlight=False)
+    console.print(table)
 
 
 def _grid() -> Table:
@@ -145,11 +143,11 @@ def assumptions(certificate: Certificate) -> str:
 def print_compared(others: Sequence[str], scenario: str | None) -> None:
     """Print whether the proofs are about the loops of a scenario; None: they were not compared with any."""
     if scenario is None:
-        console.print("The programs of its proofs were not compared with those of a scenario.", highlight=False)
+        console.print("The programs of its proofs were not compared with those of a scenario.")
     elif not others:
-        console.print(f"The programs of its proofs are those of {_safe(scenario)}.", highlight=False)
+        console.print(f"The programs of its proofs are those of {_safe(scenario)}.")
     for text in others:
-        console.print(f"[red]another loop[/red]  {_safe(text)}", highlight=False)
+        console.print(f"[red]another loop[/red]  {_safe(text)}")
 
 
 def print_findings(findings: Sequence[Finding]) -> None:
@@ -166,14 +164,12 @@ def print_findings(findings: Sequence[Finding]) -> None:
     print_rows(Rows([*map(Column, ("certificate", "claim", "obligations", "verdict"))], rows))
     failed = [finding for finding in findings if finding.verdict == "fails"]
     for f in failed:
-        console.print(f"[red]fails[/red]  {_where(f)}", highlight=False)
+        console.print(f"[red]fails[/red]  {_where(f)}")
     left = [finding for finding in findings if finding.verdict == "not checked"]
     for f in left:
-        console.print(f"[yellow]not checked[/yellow]  {_where(f)}", highlight=False)
+        console.print(f"[yellow]not checked[/yellow]  {_where(f)}")
     claimed = sum(finding.verdict == "holds" for finding in findings)
-    console.print(
-        f"{claimed} obligations hold, {len(failed)} fail{f', {len(left)} are not checked' if left else ''}.", highlight=False
-    )
+    console.print(f"{claimed} obligations hold, {len(failed)} fail{f', {len(left)} are not checked' if left else ''}.")
 
 
 def _where(finding: Finding) -> str:
@@ -183,7 +179,7 @@ def _where(finding: Finding) -> str:
 
 def _safe(text: str) -> str:
     """Text from a file as one that can be printed: no markup, nothing that steers a terminal, no half of a character."""
-    plain = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    plain = printable(text)
     return escape(plain if len(plain) <= LONGEST else f"{plain[:LONGEST]} …")
 
 

@@ -1,7 +1,5 @@
 """The command that serves the studio."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -24,7 +22,7 @@ def studio(
     from starhold.cli.console import console
     from starhold.files import read_text
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
-    from starhold.scenario.template import template_text
+    from starhold.scenario.writing import template_text
 
     if find_spec("starlette") is None or find_spec("uvicorn") is None:
         raise InputError("studio", "", "no starlette and uvicorn installed", EXTRA)
@@ -46,7 +44,7 @@ def studio(
     from starhold.studio.server import serve
 
     def announce(address: str) -> None:
-        console.print(f"Studio: {address}", soft_wrap=True, highlight=False, markup=False)
-        console.print("Nothing leaves this machine. Ctrl-C ends it.", highlight=False)
+        console.print(f"Studio: {address}", soft_wrap=True, markup=False)
+        console.print("Nothing leaves this machine. Ctrl-C ends it.")
 
     serve(path, name, text, port, announce, browser)

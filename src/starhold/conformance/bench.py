@@ -1,7 +1,5 @@
 """The spacecraft, states and loops that laws are examined on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

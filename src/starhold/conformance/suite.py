@@ -1,7 +1,5 @@
 """The checks for laws of a body are run over a law."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Physics in other units: everything a law takes is rescaled by its declared unit."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -11,6 +9,9 @@ from starhold.laws.interface import Measurement
 from starhold.parts.craft import Craft
 from starhold.parts.part import Part
 from starhold.scenario.units import unit_registry
+
+SYSTEMS = ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0))
+"""Units of mass, length and time, in kg, m and s, in which physics must be the same."""
 
 
 def rescaled(

@@ -1,7 +1,5 @@
 """A check's verdict, and the helpers that the checks of parts of all roles share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -98,7 +96,7 @@ def declares_itself(law: Law) -> None:
     for gains in law.examples():
         require(isinstance(gains, law.gains), f"the example {gains} is not a Gains")
         for item, value in zip(declared, gains, strict=True):
-            shown = item.gain.choices[value] if item.gain.choices else value
-            require(item.gain.check(shown) == value, f"the example's {item.name} = {value} changes when it is read")
+            same = item.gain.check(item.written(value)) == value
+            require(same, f"the example's {item.name} = {value} changes when it is read")
     if law.card.claims != "none":
         require(bool(law.card.assumptions), "a law that claims stability states its assumptions")

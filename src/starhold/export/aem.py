@@ -4,8 +4,6 @@ Versions 1.0 (CCSDS 504.0-B-1) and 2.0 (504.0-B-2). The quaternion Q1 Q2 Q3 QC o
 REF_FRAME_A into REF_FRAME_B as `starhold.algebra.quaternion` has it: a vector's components in A become those in B.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator
@@ -26,12 +24,7 @@ BODY = "SC_BODY"
 """How the names of frames fixed to the spacecraft begin."""
 OFF_UNIT = 1e-3
 """By how much the length of a quaternion may differ from 1: more is no rounding."""
-VALUES = {
-    "QUATERNION": 4,
-    "QUATERNION/DERIVATIVE": 8,
-    "QUATERNION/RATE": 7,
-    "QUATERNION/ANGVEL": 7,
-}
+VALUES = {"QUATERNION": 4, "QUATERNION/DERIVATIVE": 8, "QUATERNION/RATE": 7, "QUATERNION/ANGVEL": 7}
 """Types of attitude that are read, and the numbers of a line of theirs; all but the quaternion are passed over."""
 NAME = re.compile(r"[ -~]*[!-~][ -~]*")
 _EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")

@@ -1,7 +1,5 @@
 """The part of a closed loop that flies on a computer: from readings of sensors to the command, with all memories."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -12,7 +10,7 @@ from starhold.algebra.structure import buffers, leaves
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
-from starhold.export.copies import Copies
+from starhold.export.recording import Copies
 from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.contract import NoMemory

@@ -1,7 +1,5 @@
 """Shells over the same C, and their build files: templates filled with the names and numbers of a law."""
 
-from __future__ import annotations
-
 import io
 import re
 import uuid
@@ -76,8 +74,7 @@ def _basilisk(code: Code) -> dict[str, str]:
 def _fmu(code: Code) -> dict[str, bytes]:
     """Return a law as an FMU for co-simulation, FMI 3.0: an archive of sources.
 
-    The standard wants every function of its interface in a binary; those that a sampled law has no use for refuse.
-    """
+    The standard wants every function of its interface in a binary; those that a sampled law has no use for refuse."""
     inputs, outputs = variables(code)
     taken, given = 'causality="input" start="0.0"', 'causality="output" variability="discrete"'
     roles = [*((name, taken) for name in inputs), *((name, given) for name in outputs)]

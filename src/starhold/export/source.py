@@ -1,24 +1,65 @@
 """The texts of a law in C: header, source and the file that builds them."""
 
-from __future__ import annotations
-
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from starhold.algebra.operations import NUMBER
 from starhold.algebra.structure import leaves
 from starhold.algebra.structured import Buffer
+from starhold.certification.assumptions import texts as assumption_texts
+from starhold.certification.certificate import FILE, Certificate
+from starhold.certification.wording import HEADINGS, evidence, recheck, sentence, unclaimed
 from starhold.export.code import Code
-from starhold.export.proof import UNPROVED, Proof
 from starhold.export.types import Member, Type, comment
 from starhold.laws.program import law_digest
 from starhold.parts.contract import fields
 from starhold.trace.c99 import GUARD
 from starhold.trace.source import TIE
 from starhold.version import __version__
+
+
+class Proof(NamedTuple):
+    """The certificate's file and the digest of that (both empty for none), its outcome, a line for each claim, what they
+    assume, why nobody should fly the law unread (empty where all is proved), and the command that checks it again."""
+
+    file: str
+    digest: str
+    outcome: str
+    claims: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    warning: str
+    recheck: str = ""
+
+
+UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved of this law, because nobody asked for it.")
+
+
+def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
+    """Return the summary of the certificates of one law; digest: that of the file which holds them, as hexadecimal."""
+    claims: list[str] = []
+    wrong: list[str] = []
+    assumed: dict[str, None] = {}
+    for certificate in certificates:
+        if not certificate.claims:
+            wrong.append(f"NOTHING IS CLAIMED: {unclaimed(certificate.subject)}.")
+        for claim in certificate.claims:
+            whose = f"{certificate.name}: " if len(certificates) > 1 else ""
+            text = f"{whose}{HEADINGS[claim.kind]}: {sentence(claim, certificate.subject)}"
+            claims.append(f"{claim.outcome}: {text}")
+            assumed |= dict.fromkeys(assumption_texts(claim.assumptions))
+            if claim.outcome != "proved":
+                refutation = claim.refutation()
+                why = f" ({evidence(refutation)})" if refutation is not None else ""
+                wrong.append(f"{'REFUTED' if claim.outcome == 'refuted' else 'NOT DECIDED'}: {text}{why}.")
+    outcomes = {certificate.outcome for certificate in certificates}
+    outcome = next((one for one in ("refuted", "undecided") if one in outcomes), "proved")
+    if outcome != "proved" and not wrong:
+        wrong.append("NOT DECIDED where the motion ends: no claim is made of it.")
+    return Proof(FILE, digest, outcome, tuple(claims), tuple(assumed), "\n".join(wrong), recheck(certificates))
+
 
 WIDTH = 110
 
@@ -140,13 +181,8 @@ def _limit(loop: Any) -> str:
 
 def _choices(loop: Any) -> list[str]:
     """Return the gains that are constants of this code."""
-    choices: list[str] = []
-    for field in fields(type(loop.gains)):
-        value = getattr(loop.gains, field.name)
-        if field.gain.choices:
-            choices.append(f"{field.name} = {field.gain.choices[value]}")
-        elif field.gain.whole:
-            choices.append(f"{field.name} = {value}")
+    pairs = zip(fields(type(loop.gains)), loop.gains, strict=True)
+    choices = [f"{item.name} = {item.written(value)}" for item, value in pairs if item.gain.choices or item.gain.whole]
     return [f"Fixed in this code: {', '.join(choices)}."] if choices else []
 
 

@@ -1,7 +1,5 @@
 """Test vectors of a law, and the self-test in C that demands their bits."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -21,6 +21,8 @@ CARD = Card(
     claims="local",
 )
 
+LAYER = Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
+
 
 class Gains(NamedTuple):
     """The gains give the circle, how strongly it attracts, and the feedback along X; all scaled."""
@@ -32,9 +34,7 @@ class Gains(NamedTuple):
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
     k_velocity: Annotated[float, Gain(above=0.0, text="on the velocity along X")]
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
-    boundary_layer: Annotated[
-        float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
-    ] = 0.0
+    boundary_layer: Annotated[float, LAYER] = 0.0
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
 
 
@@ -45,9 +45,7 @@ class Best(NamedTuple):
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")] = 1.0
     k: Annotated[float, Gain(above=0.0, text="feedback on the velocity error; size of a relay's thrust")] = 1.0
     feedback: Annotated[int, Gain(choices=("smooth", "relay"), text="relay: k in the direction against the error")] = 0
-    boundary_layer: Annotated[
-        float, Gain(at_least=0.0, dimension="velocity", text="velocity error within which the relay is proportional")
-    ] = 0.0
+    boundary_layer: Annotated[float, LAYER] = 0.0
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
 
 

@@ -101,8 +101,7 @@ lyapunov = matrix_pd.lyapunov
 def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
     """Return gains of a form; ValueError where the weights or the inertia do not allow it.
 
-    The gains of forms I, II and III are exactly symmetric, and so are those of numeric weights that make them so.
-    """
+    The gains of forms I, II and III are exactly symmetric, and so are those of numeric weights that make them so."""
     inertia, share = tensor(craft.inertia), 0.0
     with np.errstate(all="ignore"):
         if isinstance(spec, FormI):
@@ -238,8 +237,7 @@ def balanced(moments: Array, spec: FormII | FormIII) -> tuple[Array, Array]:
     """Return weights q (6,) and r (3,) for moments (3,), moved to where kappa vanishes if `spec.balance` says so.
 
     ValueError where kappa vanishes for no value of the named weight (that of the middle moment's axis always can), and
-    where weights, given or moved, are not positive or differ by more than MOST_SPREAD.
-    """
+    where weights, given or moved, are not positive or differ by more than MOST_SPREAD."""
     q, r = positive(spec.q, 6, "q"), positive(spec.r, 3, "r")
     check_spreads(q[:3], q[3:], r)
     if BALANCES[spec.balance] != "none":

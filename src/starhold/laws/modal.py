@@ -63,11 +63,7 @@ class Fit(NamedTuple):
     ] = None
     below: Annotated[
         Vector, Gain("1", shape=(3,), spread=False, text="c, d, e of c exp(d angle) + e, 1/s, up to the split")
-    ] = (
-        -1.018,
-        -2.071,
-        -0.849,
-    )
+    ] = (-1.018, -2.071, -0.849)
     above: Annotated[Vector, Gain("1", shape=(3,), spread=False, text="the same beyond it")] = (-2.177, -0.726, -0.155)
     split: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="where the second piece begins")] = math.radians(
         85.0
@@ -149,8 +145,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
     """Return the control torque (N m, body).
 
     With x' = (q0', q') the level above gives K_0 x = K_1 x' - phi_0 (K_1 (q0 - 1, q) + J w) beside the known torque, whose
-    Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place.
-    """
+    Jacobians cancel. Nothing is divided by w: where it vanishes, the scalar part has no pole of its own to place."""
     q, w = vector_part(measurement.attitude), measurement.rate
     turning = derivative(measurement.attitude, w)
     steered = _upper(q, w, gains, craft, measurement.attitude[0] - 1.0, q)

@@ -65,8 +65,7 @@ class Memory(NamedTuple):
 def remember(gains: Gains, craft: Craft, period: float) -> Memory:
     """Return the memory of one trajectory, for control instants `period` apart (s).
 
-    Raises ValueError where the Riccati equation of the terminal weight has no solution in double precision.
-    """
+    Raises ValueError where the Riccati equation of the terminal weight has no solution in double precision."""
     terminal, tail = terminal_weight(gains, craft, period)
     memory = Memory(Buffer([0.0] * size(gains.horizon)))
     store = carve(program(gains, memory))
@@ -91,8 +90,7 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     """Return the weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is optimal for that move: u
     = -feedback x. For "riccati" they are those of the infinite horizon at w = 0 without gravity.
 
-    Raises ValueError where the Riccati equation has no solution in double precision.
-    """
+    Raises ValueError where the Riccati equation has no solution in double precision."""
     # In periods and in a typical torque, so that the weights of any craft are of comparable size.
     inertia = tensor(craft.inertia)
     typical = np.trace(inertia) / 3.0

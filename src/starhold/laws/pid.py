@@ -50,8 +50,7 @@ def check(gains: Gains, craft: Craft) -> None:
     """Raise ValueError where the linear loop is not stable.
 
     About a principal axis of moment J its polynomial is J s^3 + k_rate s^2 + k_attitude/2 s + k_integral/2; by Routh's
-    criterion it is stable where k_rate k_attitude > J k_integral, which is hardest about the axis of the largest moment.
-    """
+    criterion it is stable where k_rate k_attitude > J k_integral, which is hardest about the axis of the largest moment."""
     most = gains.k_rate * gains.k_attitude / principal_moments(craft.inertia)[2]
     if not gains.k_integral < most:
         allowed = f"k_rate k_attitude / J_max = {most:.6g} N m/s"

@@ -34,14 +34,14 @@ CARD = Card(
     claims="local",
 )
 
+SURFACE = Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")
+
 
 class Gains(NamedTuple):
     """The gains are the surface slope, the switching torque and, to trade chatter for accuracy, the thickness of a boundary
     layer."""
 
-    surface_gain: Annotated[
-        Matrix | Vector, Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")
-    ]
+    surface_gain: Annotated[Matrix | Vector, SURFACE]
     switching_gain: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="switching torque, above the disturbance")]
     boundary_layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
 
@@ -65,18 +65,13 @@ class Settling(NamedTuple):
         float | None, Gain("N m", above=0.0, text="switching torque; torque / (2 sqrt 3) if absent")
     ] = None
     boundary_layer: Annotated[float, Gain("rad/s", at_least=0.0, text="boundary layer; 0 switches by sign")] = 0.0
-    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm; all that is available if absent")] = None
-    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="of the wheels; all available if absent")] = None
-    attitude: Annotated[
-        Any,
-        Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent"),
-    ] = None
-    rate: Annotated[Any, Gain("rad/s", shape=(3,), spread=False, text="relative rate then; the scenario's if absent")] = None
-    wheel_momentum: Annotated[
-        Any, Gain("N m s", shape=(3,), spread=False, text="by wheels then, body axes; the scenario's if absent")
-    ] = None
-    attitude_tolerance: Annotated[float | None, Gain("rad", above=0.0, text="that of [settling] if absent")] = None
-    rate_tolerance: Annotated[float | None, Gain("rad/s", above=0.0, text="that of [settling] if absent")] = None
+    torque: Annotated[float | None, response.TORQUE] = None
+    momentum: Annotated[float | None, response.MOMENTUM] = None
+    attitude: Annotated[Any, response.TURN] = None
+    rate: Annotated[Any, response.RATE] = None
+    wheel_momentum: Annotated[Any, response.STORED] = None
+    attitude_tolerance: Annotated[float | None, response.ANGLE_LEFT] = None
+    rate_tolerance: Annotated[float | None, response.RATE_LEFT] = None
 
 
 FORMS: dict[str, Any] = {"bandwidth": Layered, "settling": Settling}

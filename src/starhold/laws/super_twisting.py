@@ -8,7 +8,7 @@ from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import absolute, sqrt
 from starhold.algebra.vector import ZERO, Matrix, Vector, add, apply, decays, scale, signs, subtract, times
 from starhold.laws.interface import Card, Gain, Measurement
-from starhold.laws.sliding import equivalent_torque
+from starhold.laws.sliding import SURFACE, equivalent_torque
 from starhold.parts.craft import Craft
 
 CARD = Card(
@@ -33,9 +33,7 @@ CARD = Card(
 class Gains(NamedTuple):
     """The gains are the surface slope and those of the reaching motion s' = -sqrt(k1 |s|) sign(s) + v + disturbance."""
 
-    surface_gain: Annotated[
-        Matrix | Vector, Gain("1/s", shape=(3, 3), text="K of the surface w + K q = 0, symmetric positive definite")
-    ]
+    surface_gain: Annotated[Matrix | Vector, SURFACE]
     k1: Annotated[Vector, Gain("rad/s^3", above=0.0, shape=(3,), text="under the root: s vanishes in about 2 sqrt(s/k1)")]
     k2: Annotated[Vector, Gain("rad/s^3", above=0.0, shape=(3,), text="slope of v, above the rate of the disturbance")]
 

@@ -23,15 +23,15 @@ CARD = Card(
     quaternion_sign="even",
 )
 
+SHARE = Gain("1", at_least=0.0, at_most=1.0, text="share of the gyroscopic, target and external torque compensated")
+
 
 class Gains(NamedTuple):
     """The gains are damping, stiffness, and the share of the modelled torque that is compensated."""
 
     k_rate: Annotated[float, Gain("N m s", above=0.0, text="damping")]
     k_attitude: Annotated[Vector, Gain("N m", above=0.0, shape=(3,), text="weights of 1 - a_ii, one for all or one each")]
-    compensation: Annotated[
-        float, Gain("1", at_least=0.0, at_most=1.0, text="share of the gyroscopic, target and external torque compensated")
-    ] = 1.0
+    compensation: Annotated[float, SHARE] = 1.0
 
 
 class Stability(NamedTuple):
@@ -41,9 +41,7 @@ class Stability(NamedTuple):
     momentum: Annotated[float, Gain("N m s", above=0.0, text="largest stored momentum about an axis; sets the unit of time")]
     angle: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="largest error angle at the start")]
     rate: Annotated[float, Gain("rad/s", at_least=0.0, text="largest rate at the start")]
-    compensation: Annotated[
-        float, Gain("1", at_least=0.0, at_most=1.0, text="share of the gyroscopic, target and external torque compensated")
-    ] = 1.0
+    compensation: Annotated[float, SHARE] = 1.0
 
 
 FORMS: dict[str, Any] = {"degree-of-stability": Stability}
@@ -109,8 +107,7 @@ def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
     """Return V = w.Jw/2 + sum k_i (1 - a_ii) = w.Jw/2 + 2 q.Mq (J); V' = -k_rate |w|2 with full compensation.
 
     At rest S = 0 also at half turns: about the three axes, or, where weights are equal, about any axis in their plane. V
-    decreases from each of them in some direction, so that they are unstable.
-    """
+    decreases from each of them in some direction, so that they are unstable."""
     q = vector_part(measurement.attitude)
     return 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate)) + 2.0 * dot(q, _twist(gains.k_attitude, q))
 

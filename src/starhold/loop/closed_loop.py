@@ -130,8 +130,7 @@ class ClosedLoop:
     """One law on one body in one environment; SI units and radians, or the body's scaled ones.
 
     craft: the numbers of the body; start: its state; parts: all other parts of the loop. The order of roles does not matter;
-    within a role, torques add up and the command passes through actuators in the order given.
-    """
+    within a role, torques add up and the command passes through actuators in the order given."""
 
     craft: Any
     law: Law

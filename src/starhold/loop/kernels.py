@@ -285,8 +285,7 @@ def over_samples(
     """The program that takes notes of `count` samples in `record`, from the instant `first` on, and keeps them in `noted`.
 
     note(noted, quantities, instant, limit, numbers) -> noted; first: the shape of the notes; numbers: those of the
-    notes, and the limit; columns: the recorded quantities with their shapes, () or (components,), in order.
-    """
+    notes, and the limit; columns: the recorded quantities with their shapes, () or (components,), in order."""
     recorder = Recorder()
     with recorder.recording():
         record, noted = recorder.memory("record"), recorder.memory("noted", writable=True)

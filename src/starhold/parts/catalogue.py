@@ -180,8 +180,7 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
     """The part in a file, which is executed; known: the installed parts of its role, of which it may be one.
 
     ValueError, one line, where the file is not Python, fails, lacks a part of the contract, or has the name of another
-    part that is installed. OSError where it cannot be read.
-    """
+    part that is installed. OSError where it cannot be read."""
     path = _real(path)
     same = next((part for part in known.values() if _is_of(part, path)), None)
     if same is not None:

@@ -175,6 +175,10 @@ class Field:
     required: bool
     default: Any = field(default=None)
 
+    def written(self, value: Any) -> Any:
+        """Return a value as a file has it: a choice by its word."""
+        return self.gain.choices[int(value)] if self.gain.choices else value
+
 
 @cache
 def fields(cls: Any, but: str = "") -> list[Field]:

@@ -43,8 +43,7 @@ def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EA
     """A validated craft from three principal moments or a 3x3 tensor (kg m2).
 
     Raises ValueError when the tensor is not symmetric, not positive definite, breaks the triangle inequality
-    J1 + J2 >= J3, which every real mass distribution obeys, or when the limit is not positive.
-    """
+    J1 + J2 >= J3, which every real mass distribution obeys, or when the limit is not positive."""
     full = check_inertia(inertia)
     if not torque_limit > 0.0:
         raise ValueError(f"the torque limit must be positive, not {torque_limit:g}")
@@ -96,8 +95,7 @@ def bare_inertia(inertia_total: Any, axial: NDArray[np.float64]) -> NDArray[np.f
     principal moments or 3x3); axial: the sum.
 
     J' is not the inertia of a body: it need not obey the triangle inequality. Raises ValueError where J is not an inertia
-    or J' is not positive definite.
-    """
+    or J' is not positive definite."""
     rest = check_inertia(inertia_total) - axial
     # What symmetric layouts leave of the products is rounding, and would cost the loop its diagonal inertia.
     rest[np.abs(rest) < 1e-15 * check_rest(compact(rest))] = 0.0

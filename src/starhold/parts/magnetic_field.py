@@ -90,8 +90,7 @@ def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> 
     """The numbers of the field for a flight that begins at an epoch (UTC), during which the coefficients are constant.
     period: the control period (s), for `field_at`.
 
-    ValueError for an epoch that is no date, or not from 2025 to 2030.
-    """
+    ValueError for an epoch that is no date, or not from 2025 to 2030."""
     days = _known(epoch)
     highest = max(row[0] for row in rows)
     pairs = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
@@ -107,8 +106,7 @@ def strongest(epoch: Date) -> float:
     """A bound of the field's strength (T) wherever the distance is at least `RADIUS`, at an epoch (UTC).
 
     In no direction do the harmonics of degree n give more than n + 1 times the root of the sum of their squared
-    coefficients, by the addition theorem. Errors as of `prepared`.
-    """
+    coefficients, by the addition theorem. Errors as of `prepared`."""
     days = _known(epoch)
     total = 0.0
     for degree in range(1, ROWS[-1][0] + 1):
@@ -149,8 +147,7 @@ def earth_fixed(position: Vector, params: Numbers) -> Vector:
     """The magnetic field (T) at a position (m), both in axes of the Earth: minus the gradient of the potential.
 
     The harmonics are those of Cunningham, made of x, y, z alone, so that no angle is needed and the poles are no
-    exception (Montenbruck and Gill, Satellite Orbits, 3.2.4).
-    """
+    exception (Montenbruck and Gill, Satellite Orbits, 3.2.4)."""
     highest = len(params.cosines) - 1
     inverse_square = 1.0 / dot(position, position)
     x, y, z = scale(RADIUS * inverse_square, position)

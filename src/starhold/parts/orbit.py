@@ -57,8 +57,7 @@ def from_elements(elements: Elements, gravity: float) -> tuple[Vector, Vector]:
     """Position (m) and velocity (m/s) in inertial axes, third axis along the pole (Vallado, Fundamentals of Astrodynamics
     and Applications, algorithm COE2RV).
 
-    ValueError where the semi-major axis does not fit the eccentricity, or a hyperbola has no such true anomaly.
-    """
+    ValueError where the semi-major axis does not fit the eccentricity, or a hyperbola has no such true anomaly."""
     a, e, i, node, periapsis, anomaly = elements
     if e == 1.0 or a * (1.0 - e) <= 0.0:
         raise ValueError("a positive semi-major axis for an eccentricity below 1, a negative one above")

@@ -13,10 +13,7 @@ SHORTEST, LONGEST = 0.5, 2.0
 """Lengths between which four numbers are taken for a direction among quaternions; [0, 1, 1, 1] is one."""
 ALLOWED = f"a quaternion of length 1, or between {SHORTEST:g} and {LONGEST:g} to be normalised"
 START = Parameter(
-    "1",
-    shape=(4,),
-    spread=False,
-    text="assumed attitude at the start: quaternion, inertial to body, scalar first",
+    "1", shape=(4,), spread=False, text="assumed attitude at the start: quaternion, inertial to body, scalar first"
 )
 """The declaration of the initial estimate, common to all estimators."""
 

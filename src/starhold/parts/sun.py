@@ -50,8 +50,7 @@ class Sun(NamedTuple):
 def prepared(epoch: Date) -> Numbers:
     """The numbers of the Sun for a flight that begins at an epoch (UTC).
 
-    ValueError for an epoch that is no date, or not from 1950 to 2050.
-    """
+    ValueError for an epoch that is no date, or not from 1950 to 2050."""
     days = days_of(epoch)
     if not 1950.0 <= epoch[0] <= 2050.0:
         raise ValueError(f"the Sun's place is known from 1950 to 2050, not at the epoch {date_text(epoch)}")
@@ -74,8 +73,7 @@ def in_view(position: Vector, seen: Sun) -> Scalar:
     """The share of the Sun's disc, from 0 to 1, that the Earth leaves in view at a position (m, inertial) outside it.
 
     The Earth's edge is taken for straight across the disc, which is small beside it: up to geostationary height that changes
-    the share by less than 0.4 %.
-    """
+    the share by less than 0.4 %."""
     square = dot(position, position)
     # In the form that the Earth's attraction has, so that a kernel computes it once.
     inverse = sqrt(1.0 / square)

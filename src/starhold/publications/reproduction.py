@@ -1,7 +1,5 @@
 """Every figure of a publication is made, and every row gets a verdict."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,18 +1,289 @@
 """Writes a reproduction: a page and a folder of scenario files a publication, an index and `summary.json`."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable, Sequence
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from starhold.files import atomic_write
-from starhold.publications.drawing import draw
-from starhold.publications.page import index_page, paper_page
-from starhold.publications.reproduction import Reproduction, reproduce
+from starhold.publications.figure import Curve, Figure, Panel
+from starhold.publications.paper import FigureItem, Paper, Section
+from starhold.publications.reproduction import Judged, Reproduction, reproduce
+from starhold.publications.verdicts import PLAIN, VERDICTS
+from starhold.report.figures import DPI, plain
+from starhold.report.page_parts import plain_document
+from starhold.report.plots import colour
 from starhold.report.results import INDEX, SUMMARY
+from starhold.report.text import number_text
 from starhold.version import __version__
+
+MOODS: dict[str, str] = {
+    "agrees": "good",
+    "holds": "good",
+    "close": "open",
+    "depends": "open",
+    "differs": "bad",
+    "fails": "bad",
+}
+
+
+def paper_page(made: Reproduction, pictures: Mapping[str, bytes]) -> str:
+    """The page of a publication, with its pictures (PNG) by the names of their figures."""
+    paper = made.paper
+    body = [
+        f"<h1>{escape(paper.letter)}. {escape(paper.title)}</h1>",
+        f'<p class="lead">{escape(paper.source)}</p>',
+        f"<p>{escape(paper.about)}</p>",
+        f"<p>{tally(made.rows.values())}</p>",
+        _changes(made.changed),
+        *(_section(section, made, pictures) for section in paper.section),
+        _files(made),
+        _reading(),
+        _footer(made),
+    ]
+    return plain_document(f"{paper.letter}. {paper.title}", body)
+
+
+def index_page(made: Sequence[Reproduction]) -> str:
+    """The page that leads to those of the publications, with all errata."""
+    rows = "".join(
+        f'<tr><th scope="row"><a href="{one.paper.letter}.html">{one.paper.letter}. {escape(one.paper.title)}</a>'
+        f"<small>{escape(one.paper.source)}</small></th><td>{len(one.figures)}</td><td>{len(one.rows)}</td>"
+        f"<td>{tally(one.rows.values())}</td></tr>"
+        for one in made
+    )
+    errata = [(judged, one.paper) for one in made for judged in one.rows.values() if judged.row.erratum is not None]
+    body = [
+        "<h1>Published and reproduced</h1>",
+        '<p class="lead">Every figure, table and numerical statement of the publications that starhold implements, made '
+        "again and laid beside what is printed.</p>",
+        _changes([judged for one in made for judged in one.changed]),
+        _grid(("publication", "figures", "rows", "verdicts"), rows, "wide titled"),
+        _errata(errata),
+        _reading(),
+        f"<footer>starhold {__version__}</footer>",
+    ]
+    return plain_document("Published and reproduced", body)
+
+
+def tally(rows: Any) -> str:
+    """The count of each verdict."""
+    counted = Counter(judged.verdict for judged in rows)
+    given = [verdict for verdict in VERDICTS if counted[verdict]]
+    return " ".join(f'<span class="count">{badge(verdict)} {counted[verdict]}</span>' for verdict in given)
+
+
+def badge(verdict: str) -> str:
+    """The word in its colour."""
+    return f'<span class="verdict {MOODS[verdict]}">{verdict}</span>'
+
+
+def value_words(judged: Judged) -> str:
+    """The measured value, in words."""
+    value, unit = judged.finding.value, judged.row.unit
+    if isinstance(value, dict):
+        yes = [name for name, true in value.items() if true]
+        no = [name for name, true in value.items() if not true]
+        cases = [f"true: {', '.join(yes)}"] * bool(yes) + [f"false: {', '.join(no)}"] * bool(no)
+        return "; ".join(cases)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    numbers = [value] if isinstance(value, (int, float)) else list(value)
+    return ", ".join(number_text(float(one)) for one in numbers) + (f" {unit}" if unit else "")
+
+
+def difference(judged: Judged) -> str:
+    """Our value less the printed, as a share of it, or their ratio if far apart; "" for bounds and statements."""
+    value = judged.finding.value
+    if isinstance(value, (bool, dict)):
+        return ""
+    numbers = [value] if isinstance(value, (int, float)) else list(value)
+    pairs = zip(judged.row.printed, numbers, strict=True)
+    differences = [_apart(one.value, float(ours)) for one, ours in pairs if not one.bound]
+    return "none" if differences and set(differences) == {"none"} else ", ".join(differences)
+
+
+def _apart(printed: float, ours: float) -> str:
+    if printed in (ours, 0.0):
+        return "none" if printed == ours else f"{ours:+.2g}"
+    ratio = ours / printed
+    return f"× {ratio:.2g}" if ratio > 3.0 or 0.0 < ratio < 1.0 / 3.0 else f"{100.0 * (ratio - 1.0):+.2g} %"
+
+
+def _section(section: Section, made: Reproduction, pictures: Mapping[str, bytes]) -> str:
+    figures = "".join(_figure(item, pictures[item.name]) for item in section.figure)
+    text = f"<p>{escape(section.text)}</p>" if section.text else ""
+    return f"<h2>{escape(section.title)}</h2>\n{text}{figures}{_table([made.rows[row.name] for row in section.row])}"
+
+
+def _figure(item: FigureItem, picture: bytes) -> str:
+    title = f"Figure {item.number}" if item.number else "Added here"
+    source = f"data:image/png;base64,{b64encode(picture).decode('ascii')}"
+    seen = f'<p class="note">{escape(item.seen)}</p>' if item.seen else ""
+    caption = f"<figcaption><b>{escape(title)}.</b> {escape(item.caption)}</figcaption>"
+    return (
+        f'<figure class="plot" id="{escape(item.name)}">{caption}'
+        f'<img src="{source}" alt="{escape(item.caption)}" loading="lazy">{seen}</figure>'
+    )
+
+
+def _table(rows: Sequence[Judged]) -> str:
+    if not rows:
+        return ""
+    if any(judged.row.published for judged in rows):
+        heads = ("what is printed", "published", "ours", "difference", "verdict")
+        return _grid(heads, "".join(_row(judged, True) for judged in rows), "wide rows")
+    return _grid(("what is printed", "ours", "verdict"), "".join(_row(judged, False) for judged in rows), "wide rows plain")
+
+
+def _grid(heads: Sequence[str], rows: str, kind: str = "wide") -> str:
+    head = "".join(f'<th scope="col">{word}</th>' for word in heads)
+    return f'<div class="{kind}"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+
+
+def _row(judged: Judged, numbers: bool) -> str:
+    """A row of a table, and one more where something is to be explained; with the columns of printed numbers or without."""
+    row = judged.row
+    mark = f"Erratum {row.erratum}. " if row.erratum is not None else ""
+    printed = ", ".join(row.published) + (f" {row.unit}" if row.unit and row.published else "")
+    note = f"<small>{escape(judged.finding.note)}</small>" if judged.finding.note else ""
+    changed = f"<small>recorded: {escape(row.verdict)}</small>" if judged.changed else ""
+    cells = [
+        f"<td>{escape(mark + row.says)}<small>{escape(row.where)}</small></td>",
+        f'<td data-head="published">{escape(printed)}</td>' * numbers,
+        f'<td data-head="ours">{escape(value_words(judged))}{note}</td>',
+        f'<td data-head="difference">{escape(difference(judged))}</td>' * numbers,
+        f"<td>{badge(judged.verdict)}{changed}</td>",
+    ]
+    why = f'<tr class="reason"><td colspan="{5 if numbers else 3}">{escape(row.why)}</td></tr>' if row.why else ""
+    return f'<tr id="{escape(row.name)}">{"".join(cells)}</tr>{why}'
+
+
+def _changes(changed: Sequence[Judged]) -> str:
+    if not changed:
+        return ""
+    verdicts = "; ".join(f"{judged.row.name}: {judged.row.verdict} is now {judged.verdict}" for judged in changed)
+    return f'<p class="alarm">Verdicts other than recorded: {escape(verdicts)}.</p>'
+
+
+def _errata(errata: Sequence[tuple[Judged, Paper]]) -> str:
+    if not errata:
+        return ""
+    numbered = sorted(errata, key=lambda pair: pair[0].row.erratum or 0)
+    rows = "".join(
+        f'<tr><td>{judged.row.erratum}</td><td><a href="{paper.letter}.html#{escape(judged.row.name)}">'
+        f"{paper.letter}, {escape(judged.row.where)}</a></td>"
+        f"<td>{escape(judged.row.says)}</td><td>{escape(judged.row.why or judged.finding.note)}</td></tr>"
+        for judged, paper in numbered
+    )
+    return f"<h2>Errata</h2>\n{_grid(('no.', 'where', 'printed', 'what is found instead'), rows)}"
+
+
+def _files(made: Reproduction) -> str:
+    if not made.files:
+        return ""
+    letter = made.paper.letter
+    parts = "".join(
+        f"<details><summary>{escape(name)}.toml</summary><pre>{escape(text)}</pre></details>"
+        for name, text in made.files.items()
+    )
+    return (
+        f"<h2>What was flown</h2>\n<p>The files lie in the folder {letter}, beside this page; "
+        f"<code>starhold compare {letter}/FILE.toml</code> flies each of them.</p>{parts}"
+    )
+
+
+def _reading() -> str:
+    items = "".join(f"<dt>{badge(word)}</dt><dd>{escape(meaning)}</dd>" for word, meaning in VERDICTS.items())
+    return f"<h2>How to read the verdicts</h2>\n<dl>{items}</dl>"
+
+
+def _footer(made: Reproduction) -> str:
+    plain = sum(judged.verdict in PLAIN for judged in made.rows.values())
+    return (
+        f"<footer>starhold {__version__}; {plain} of {len(made.rows)} rows as printed; "
+        f"<code>starhold reproduce {made.paper.letter}</code></footer>"
+    )
+
+
+WIDTH = 8.0
+"""Inches."""
+
+
+def draw(figure: Figure) -> bytes:
+    """The figure as a PNG file."""
+    from matplotlib.figure import Figure as Canvas
+
+    columns = min(figure.columns, len(figure.panels))
+    rows = -(-len(figure.panels) // columns)
+    height = _height(figure, columns)
+    canvas = Canvas(figsize=(WIDTH, height * rows), dpi=DPI, layout="constrained")
+    grid: Any = canvas.subplots(rows, columns, squeeze=False)
+    axes = grid.ravel()
+    for axis, panel in zip(axes, figure.panels, strict=False):
+        _panel(axis, panel)
+        if columns > 2 and not panel.log_x:
+            # In a narrow panel more numbers would run into one another.
+            axis.locator_params(axis="x", nbins=4)
+    for axis in axes[len(figure.panels) :]:
+        axis.set_visible(False)
+    file = BytesIO()
+    # No software entry, lest equal figures differ between releases.
+    canvas.savefig(file, metadata={"Software": None}, pil_kwargs={"compress_level": 6})
+    return file.getvalue()
+
+
+def _height(figure: Figure, columns: int) -> float:
+    if any(panel.equal for panel in figure.panels):
+        return max(2.6, WIDTH / columns * 0.82)
+    return {1: 3.3, 2: 2.9}.get(columns, 2.6)
+
+
+def _panel(axis: Any, panel: Panel) -> None:
+    plain(axis)
+    named = False
+    for number, curve in enumerate(panel.curves):
+        _curve(axis, curve, colour(number if curve.hue is None else curve.hue))
+        named = named or bool(curve.label)
+    for level in panel.levels:
+        axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
+    for x, y, words in panel.notes:
+        axis.text(x, y, words, fontsize=8.5, color="0.2", ha="center", va="center")
+    if panel.log_x:
+        axis.set_xscale("log")
+    if panel.log_y:
+        axis.set_yscale("log")
+    if panel.x_span is not None:
+        axis.set_xlim(*panel.x_span)
+    if panel.y_span is not None:
+        axis.set_ylim(*panel.y_span)
+    if panel.equal:
+        axis.set_aspect("equal", adjustable="box" if panel.x_span is not None else "datalim")
+    axis.set_xlabel(panel.x_label, fontsize=9)
+    axis.set_ylabel(panel.y_label, fontsize=9)
+    if panel.title:
+        axis.set_title(panel.title, fontsize=9.5)
+    if named:
+        axis.legend(fontsize=8, frameon=False, loc="best", ncols=2 if len(panel.curves) > 4 else 1)
+
+
+def _curve(axis: Any, curve: Curve, hue: str) -> None:
+    label = curve.label or None
+    if curve.style == "area":
+        axis.fill(curve.x, curve.y, color=hue, alpha=0.22, linewidth=0.0, label=label)
+    elif curve.style == "faint":
+        axis.plot(curve.x, curve.y, color="0.72", linewidth=0.7, zorder=1, label=label)
+    elif curve.style == "points":
+        axis.plot(curve.x, curve.y, color=hue, linestyle="", marker="o", markersize=3.2, label=label)
+    elif curve.style == "steps":
+        axis.plot(curve.x, curve.y, color=hue, linewidth=1.2, drawstyle="steps-post", label=label)
+    else:
+        lines = {"line": "-", "dashed": (0, (5, 3)), "dotted": ":"}
+        axis.plot(curve.x, curve.y, color=hue, linewidth=1.3, linestyle=lines[curve.style], label=label)
 
 
 def write_paper(letter: str, folder: Path, notice: Callable[[int, int], None] | None = None) -> Reproduction:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import stays_within
+from starhold.analysis.meter import stays_within
 from starhold.analysis.rigid_body import DECADES, acceleration, error_angle
 from starhold.parts.bodies import rigid_body
 from starhold.parts.effectors import wheels
@@ -111,8 +111,7 @@ def _begun(flights: Sequence[Flight]) -> list[Mark]:
 def steps_within(flight: Flight, kind: str) -> list[int | None]:
     """Control steps after which the error stays within 10^-k, for every k of `DECADES`.
 
-    kind: "" for the attitude, "rate_" for the rate.
-    """
+    kind: "" for the attitude, "rate_" for the rate."""
     return [flight.metrics.get(f"{kind}iterations_1e-{k}") for k in DECADES]
 
 

@@ -1,14 +1,12 @@
 """Figures of bars: a row for each thing, a panel for each quantity."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from starhold.report.colours import COLOURS
 from starhold.report.figures import framed, plain, shortened
+from starhold.report.plots import COLOURS
 
 ACROSS = 4
 """Panels in a row."""
@@ -42,8 +40,7 @@ def draw_bars(
     """Draw a figure.
 
     note: below the title. rows: their names; hues: the numbers of their colours, which `kinds` names in the legend. dashed:
-    what the dashed lines are. label: of the rows. struck: words in place of the bars of some rows, which `why` explains.
-    """
+    what the dashed lines are. label: of the rows. struck: words in place of the bars of some rows, which `why` explains."""
     from matplotlib.lines import Line2D
 
     struck = struck or {}

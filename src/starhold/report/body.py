@@ -43,7 +43,7 @@ class PageParts(NamedTuple):
 
 
 class BodyReport(Protocol):
-    """The hooks of a body for pictures and pages; `starhold.report.bodies` holds one `REPORT` a module."""
+    """The hooks of a body for pictures and pages, functions of its module in `starhold.report.bodies`."""
 
     def picture(self, flights: Sequence[Flight], scenario: Scenario) -> Picture:
         """Gather what the figures show."""
@@ -56,4 +56,4 @@ class BodyReport(Protocol):
 
 def report_of(body: str) -> BodyReport:
     """The report of a body of this name, or that of any body where there is none of its own."""
-    return body_module("starhold.report.bodies", body).REPORT
+    return body_module("starhold.report.bodies", body)

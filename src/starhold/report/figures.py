@@ -1,21 +1,16 @@
 """Figures as PNG files, every law in every figure, and the helpers that draw them."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, TypeAlias
 
 from starhold.files import atomic_write
-from starhold.report.colours import colour
-from starhold.report.plots import Mark, Plot, back_to_front
+from starhold.report.plots import Mark, Plot, back_to_front, colour
 from starhold.report.text import lost_text
-
-if TYPE_CHECKING:
-    from starhold.studies.flight import Flight
+from starhold.studies.flight import Flight
 
 DPI = 110
 NOTHING: Any = None
@@ -24,12 +19,8 @@ POINTS = 2000
 """Samples of a curve, about two for each column of pixels."""
 
 
-class Picture(Protocol):
-    """All that the figures show, without the runs it was taken from: small, and quickly sent to another process."""
-
-    def makers(self) -> dict[str, Callable[[], Any]]:
-        """Return the function that draws each figure, by the name of its file."""
-        ...
+Picture: TypeAlias = dict[str, Callable[[], Any]]
+"""What draws each figure, by the name of its file, without the runs: small, and quickly sent to another process."""
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:
@@ -42,7 +33,7 @@ def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        return [save(make(), folder / f"{key}.png") for key, make in list(what.makers().items())[part]]
+        return [save(make(), folder / f"{key}.png") for key, make in list(what.items())[part]]
 
 
 def warm_up() -> None:
@@ -140,8 +131,7 @@ def headed(
 ) -> tuple[Any, float, float]:
     """A figure with its title and its legend, how high it is (inches), and up to where axes may reach, a gap (inches) below.
 
-    All is placed by fixed distances, for layout engines draw everything twice.
-    """
+    All is placed by fixed distances, for layout engines draw everything twice."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 

@@ -1,15 +1,13 @@
 """The phase portrait of a system with the sets that were certified, one panel a claim."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from starhold.certification.invariant.wording import down
-from starhold.report.colours import COLOURS
 from starhold.report.figures import framed
+from starhold.report.plots import COLOURS
 from starhold.studies.phase_portraits import Portrait
 
 INSIDE, SET, AGAINST, TRUE = COLOURS[5], COLOURS[0], COLOURS[1], COLOURS[2]

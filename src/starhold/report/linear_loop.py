@@ -1,25 +1,21 @@
 """The section of the page on the linear loop near the target: its margins, and Bode and Nichols plots."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from starhold.analysis.linear import AXES, Linear
 from starhold.analysis.margins import Margins, Response, margins, response
 from starhold.errors import InputError
-from starhold.report.colours import colour
+from starhold.report.plots import colour
 from starhold.report.proved import swatch
 from starhold.report.text import number_text
+from starhold.scenario.reading import Scenario
+from starhold.studies.flight import Flight
 from starhold.studies.linear import linear_of
-
-if TYPE_CHECKING:
-    from starhold.scenario.reading import Scenario
-    from starhold.studies.flight import Flight
 
 NOTE = (
     "The loop near rest on target, the target standing still, exact between control instants under the held torque, at "

@@ -1,14 +1,21 @@
-"""The page of a comparison; it opens offline and loads nothing."""
+"""The page of a comparison, which opens offline and loads nothing, and the data by which it flies its scenario again."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from starhold.algebra.structure import flatten
+from starhold.analysis.rigid_body import recorded_meter
+from starhold.certification.assumptions import standing
+from starhold.laws.interface import Gain
 from starhold.report.body import report_of
-from starhold.report.living import living_data
 from starhold.report.page_parts import (
     columns_list,
     document,
@@ -20,12 +27,175 @@ from starhold.report.page_parts import (
     ranking,
     settings,
     versions,
+    with_units,
 )
+from starhold.report.plots import colour
 from starhold.report.proved import section as proved
+from starhold.scenario.checking import read_toml
+from starhold.scenario.quantity import LEAST, MOST, declared
+from starhold.scenario.reading import Scenario
+from starhold.studies.flight import Flight
+from starhold.studies.questions import NEAR, RANGE
+from starhold.studies.reflight import Reflight, Reflown, reflight
+from starhold.trace.javascript import JavaScript
 
 if TYPE_CHECKING:
-    from starhold.scenario.reading import Scenario
-    from starhold.studies.flight import Flight
+    from starhold.report.body import Sampling
+    from starhold.trace.program import Program
+
+
+LABELS = {
+    "spacecraft.inertia": "inertia",
+    "fault[1].inertia": "true inertia",
+    "spacecraft.torque_limit": "torque limit",
+    "initial.attitude": "attitude",
+    "initial.rate": "rate",
+}
+
+
+def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | str:
+    """The data of the page's sliders; where nothing can be moved, why not."""
+    made = reflight(scenario)
+    numbers = {flight.name: number for number, flight in enumerate(flights)}
+    laws = [law for law in made.laws if law.name in numbers]
+    if not any(law.follows for law in laws):
+        return "; ".join(sorted({*made.grounded.values(), *(why for law in laws for why in law.unfollowed.values())}))
+    table = scenario.table
+    transient = getattr(table, "transient", None)
+    keys = [key for key in made.dials if key not in made.gains or key.partition(".")[2].rpartition(".")[0] in numbers]
+    return {
+        "dials": [_dial(made, key) for key in keys],
+        "asked": [
+            {"law": one.law, "keys": one.keys, "program": _script(one.program), "refusals": one.refusals}
+            for one in made.checks.questions
+        ],
+        "ranged": made.checks.ranged,
+        "ranges": {"near": NEAR, "range": RANGE, "least": LEAST, "most": MOST},
+        "linked": dict(scenario.hooks.linked),
+        "file": [piece._asdict() for piece in made.pieces],
+        "laws": {str(numbers[law.name]): _law(law) | _measured(law, flights[numbers[law.name]], table) for law in laws},
+        "grounded": {str(numbers[name]): why for name, why in made.grounded.items() if name in numbers},
+        "every": table.simulation.record_every,
+        "factor": sampling.factor,
+        "early": None if sampling.early is None else dict(zip(("samples", "factor"), sampling.early, strict=True)),
+        "transient": None if transient is None else {"angle_end": transient.angle_end, "rate_end": transient.rate_end},
+        "claims": _claims(flights, {law.name: law for law in laws}),
+        "ranking": _ranking(flights),
+    }
+
+
+def _dial(made: Reflight, key: str) -> dict[str, Any]:
+    """A key that can be moved: its numbers, bounds and words."""
+    item = made.gains.get(key)
+    gain = _declared(made.scenario, key) if item is None else item.gain
+    bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
+    unit = "" if gain.unit == "1" else gain.unit.replace("^2", "²")
+    dial: dict[str, Any] = {"key": key, "value": made.dials[key], "unit": unit} | bounds
+    if item is None:
+        dial["degrees"] = unit.startswith("rad") and "deg" in _written(made.scenario, key, made.dials[key])
+        return dial | {"label": LABELS.get(key, key), "law": None, "text": ""}
+    return dial | {"label": item.name, "law": key.partition(".")[2].rpartition(".")[0], "text": gain.text}
+
+
+def _declared(scenario: Scenario, key: str) -> Gain:
+    """The declaration of a key of the scenario's own tables; that of a fault is the craft's."""
+    table, _, name = key.replace("fault[1]", "spacecraft").partition(".")
+    return declared(type(getattr(scenario.table, table)).model_fields[name]) or Gain()
+
+
+def _written(scenario: Scenario, key: str, value: Any) -> str:
+    """Return the file's text for a key of its own tables, where that has units; else ""."""
+    table, _, name = key.partition(".")
+    return with_units(read_toml(scenario.text, scenario.where).get(table, {}).get(name), value)
+
+
+def _law(law: Reflown) -> dict[str, Any]:
+    """The data by which the page flies a law; numbers are the bytes of 64-bit floats."""
+    return {
+        "name": law.name,
+        "fly": _script(law.program),
+        "derive": None if law.derive is None else _script(law.derive),
+        "follows": law.follows,
+        "held": law.unfollowed,
+        "places": law.places,
+        "carried": law.carried,
+        "numbers": _bytes(law.numbers),
+        "tables": _bytes(law.tables),
+        "memories": [memory.name for memory in law.program.memories],
+        "lost": law.lost_place,
+        "columns": law.columns,
+        "steps": law.steps,
+        "seed": [law.seed >> 32, law.seed & 0xFFFFFFFF],
+        "run": [law.run >> 32, law.run & 0xFFFFFFFF],
+        "period": law.period,
+    }
+
+
+def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
+    """Give the page the equations of the metrics of a law's flights; numbers that a slider or the flight's length changes go
+    by name."""
+    run, settling = flight.recording, table.settling
+    every, limit = table.simulation.record_every, run.attrs["limit"]
+    meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)
+    program = meter.program(tuple((name, run[name].shape[1:]) for name, _ in law.columns), 0.0)
+    known = {
+        "memories": [memory.name for memory in program.memories],
+        "first": flatten(meter.first),
+        "numbers": [*flatten(meter.numbers._replace(tail="tail", last="last")), "limit"],
+        "windows": [window.row for window in meter.windows.values()],
+        "table": {name: metric._asdict() for name, metric in meter.table.items()},
+    }
+    return {"note": _script(program), "meter": known}
+
+
+def _script(program: Program) -> dict[str, str]:
+    """A program's text, and what in it is called."""
+    text = JavaScript(program)
+    return {"text": str(text), "name": text.name}
+
+
+def _bytes(numbers: Any) -> str:
+    return base64.b64encode(np.asarray(numbers, dtype="<f8").tobytes()).decode()
+
+
+def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
+    """Tell under which conditions each claim of the page stands."""
+    claims: list[dict[str, Any]] = []
+    for number, flight in enumerate(flights):
+        if flight.name not in laws:
+            continue
+        for place, certificate in enumerate(flight.certificates):
+            for i, claim in enumerate(certificate.claims):
+                conditions = asdict(standing(claim, laws[flight.name].reads))
+                moments = (
+                    [certificate.subject["inertia"][k][k] for k in range(3)] if "inertia" in certificate.subject else []
+                )
+                claims.append({"mark": f"{number}:{place}:{i}", "law": flight.name, "moments": moments, **conditions})
+    return claims
+
+
+def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
+    """The measures that the page ranks laws by, and the metrics that the table began with."""
+    metric_set = flights[0].metric_set
+    metrics = metric_set.columns({flight.name: flight.metrics for flight in flights})
+    shown = [{"name": name, "scale": metric_set.measures[name].scale} for name in metrics]
+    rows = [
+        {
+            "name": flight.name,
+            "law": flight.law,
+            "colour": colour(number),
+            "metrics": {name: flight.metrics.get(name) for name in (*metrics, "diverged_at", "cut_off")},
+            "limit": _limit(flight),
+        }
+        for number, flight in enumerate(flights)
+    ]
+    return {"measures": shown, "order": list(metric_set.order), "rows": rows}
+
+
+def _limit(flight: Flight) -> dict[str, Any]:
+    attrs = flight.recording.attrs
+    limit = float(attrs["torque_limit"])
+    return {"kind": attrs["limit"], "size": limit if np.isfinite(limit) else None}
 
 
 def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> None:

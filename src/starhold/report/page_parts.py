@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from starhold.report.colours import colour
-from starhold.report.plots import Mark, Panel, Plot, back_to_front
+from starhold.report.commands import Cell, Column, Table
+from starhold.report.plots import Mark, Panel, Plot, back_to_front, colour
 from starhold.report.proved import swatch
+from starhold.report.tables import titled
 from starhold.report.text import lost_text, number_text, unknown_text, value_text
 from starhold.scenario.checking import read_toml
 from starhold.studies.flight import Flight
@@ -156,12 +157,11 @@ def over_time(plot: Plot, flights: Sequence[Flight], marks: Sequence[Mark] = ())
     """A plot over time for the script that draws it."""
     order = back_to_front(flights, plot)
     panels = [panel_data(panel, order, thin=plot.chatters) for panel in plot.panels]
-    label = f"time, {plot.clock}"
     return {
         "name": plot.name,
         "title": plot.title,
         "dashed": plot.dashed,
-        "xlabel": label,
+        "xlabel": f"time, {plot.clock}",
         "panels": panels,
         "marks": [(mark.time, mark.word) for mark in marks],
     }
@@ -213,26 +213,18 @@ def ranking(flights: Sequence[Flight]) -> str:
 
 def plot_box(plot: Mapping[str, Any]) -> str:
     """The box of a plot, which a script fills."""
-    dashed = f"<span>– – {escape(plot['dashed'])}</span>" if plot["dashed"] else ""
-    return f'<div class="plot"><h3>{escape(plot["title"])}{dashed}</h3><div id="{plot["name"]}"></div></div>'
+    notes = plot["notes"] if "notes" in plot else [f"– – {plot['dashed']}"] * bool(plot["dashed"])
+    spans = "".join(f"<span>{escape(note)}</span>" for note in notes)
+    return f'<div class="plot"><h3>{escape(plot["title"])}{spans}</h3><div id="{plot["name"]}"></div></div>'
 
 
 def laws_table(flights: Sequence[Flight]) -> str:
     """The laws with their gains."""
-    rows = "".join(
-        f'<tr><th scope="row">{swatch(number)}{escape(flight.name)}</th><td>{escape(flight.law)}</td>'
-        f"<td>{_gains(flight) or '—'}</td></tr>"
-        for number, flight in enumerate(flights)
-    )
-    head = '<th scope="col">name</th><th scope="col">type</th><th scope="col">gains</th>'
-    return (
-        f'<h2>Laws</h2>\n<div class="wide"><table class="text"><thead><tr>{head}</tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>"
-    )
-
-
-def _gains(flight: Flight) -> str:
-    return ", ".join(f"{escape(name)} = {escape(value_text(*gain))}" for name, gain in flight.gains.items())
+    rows: list[list[Any]] = []
+    for number, flight in enumerate(flights):
+        gains = ", ".join(f"{name} = {value_text(*gain)}" for name, gain in flight.gains.items())
+        rows.append([Cell(flight.name, "name", number), flight.law, gains or "—"])
+    return titled("Laws", Table([*map(Column, ("name", "type", "gains"))], rows))
 
 
 def settings(scenario: Scenario, title: str) -> str:
@@ -302,7 +294,7 @@ def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         if item.gain.shared in shared:
             continue
-        text = item.gain.choices[value] if item.gain.choices else _value(value)
+        text = _value(item.written(value))
         unit = "" if item.gain.unit == "1" or item.gain.choices else f" {item.gain.unit}"
         rows.append(_row(item.name, with_units(written.get(item.name), value) or text + unit, item.gain.text))
     return _section(f"{fitted.part.role} {fitted.called}", rows)

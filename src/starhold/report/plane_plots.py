@@ -1,21 +1,16 @@
 """Plots in a plane: paths of the laws over one another, and lines to judge them by; as figures, and as data of a page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from starhold.report.colours import colour
 from starhold.report.figures import headed, plain, width_of
 from starhold.report.page_parts import plot_box, rounded
-from starhold.report.plots import Curve
-
-if TYPE_CHECKING:
-    from starhold.studies.flight import Flight
+from starhold.report.plots import Curve, colour
+from starhold.studies.flight import Flight
 
 CORNERS = 181
 """Points of a circle that is drawn."""

@@ -1,8 +1,7 @@
 """Plots over time, whoever draws them: panels with a curve for each law."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Sequence
+from colorsys import hls_to_rgb
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeAlias
 
@@ -10,6 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.studies.flight import Flight
+
+COLOURS = (
+    *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A"),
+    *("#7B3FA0", "#A6761D", "#E7298A", "#66A61E", "#4D5BD6", "#B3001B", "#2F8F9D"),
+)
+"""Okabe and Ito's palette, distinct to colour-blind readers, without what white or black paper swallows; then seven
+more that differ from these and from one another."""
+GOLDEN = 0.5 * (3.0 - 5.0**0.5)
+"""Share of a full turn: hues that are such a step apart fill the circle evenly, however many they are."""
+
+
+def colour(number: int) -> str:
+    """The colour of the law at this place of a comparison, the same in every picture."""
+    if number < len(COLOURS):
+        return COLOURS[number]
+    extra = number - len(COLOURS)
+    red, green, blue = hls_to_rgb(GOLDEN * extra % 1.0, (0.38, 0.58)[extra % 2], 0.62)
+    return "#" + "".join(f"{round(255.0 * part):02X}" for part in (red, green, blue))
+
 
 Curve: TypeAlias = NDArray[np.float64]
 
@@ -75,8 +93,7 @@ def thin(values: Curve, factor: int) -> Curve:
     """Two of every `factor` samples, to be drawn over `thin_times`.
 
     Where the samples left out swing further than those kept, the least and the greatest take their places: chatter
-    stays as high as it is, and moves by less than `factor` periods.
-    """
+    stays as high as it is, and moves by less than `factor` periods."""
     if factor == 1 or not len(values):
         return values
     groups = np.pad(values, (0, -len(values) % factor), mode="edge").reshape(-1, factor)

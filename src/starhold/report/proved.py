@@ -1,7 +1,5 @@
 """The section of the page on claims: which are proved of each law, which are not, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -10,7 +8,7 @@ from starhold.certification.assumptions import texts
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, evidence, grouped, methods, recheck, statement, unclaimed
-from starhold.report.colours import colour
+from starhold.report.plots import colour
 from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight
 
@@ -36,9 +34,9 @@ SYMBOLS = {
     "reach": ("|x|, at most", ""),
     "epsilon": ("ε in V + ε q·Jω", ""),
     "rho": ("share of V that the added term stays within", ""),
-    "rate_bound": ("rate up to which V is shown to fall", "rad/s"),
+    "rate_bound": ("rate up to which V is shown to be non-increasing", "rad/s"),
     "tau": ("τ: a torque M does work of at most τ |Wᵀω + εq|² + M²/(4τ)", ""),
-    "beta": ("β: share of V + ε q·Jω that is left of the fall", "1/s"),
+    "beta": ("β: share of V + ε q·Jω that is left of the decrease", "1/s"),
     "shift": ("p in |ω × Jω| ≤ |ω| |(J + p)ω|", ""),
     "weight": ("c in |ω| |(J + p)ω| ≤ (c |ω|² + |(J + p)ω|²/c)/2", ""),
     "momentum": ("total angular momentum, at most", "N m s"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import re
@@ -10,13 +11,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.certification.certificate import KERNEL
 from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished
 from starhold.report import commands
-from starhold.report.netcdf import write_netcdf
 from starhold.scenario.checking import cut
 from starhold.scenario.reading import LONGEST_PATH
 from starhold.version import __version__
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
     from starhold.simulation.lane import Recording
     from starhold.studies.flight import Flight
+
 
 SUMMARY, PAGE = "summary.json", "report.html"
 INDEX = "index.html"
@@ -135,9 +138,9 @@ def write_summary(scenario: str, results: dict[str, Any], path: Path) -> None:
 def _finite(value: Any) -> Any:
     """A value in which what is no finite number is None."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in cast(dict[Any, Any], value).items()}
+        return {key: _finite(item) for key, item in cast("dict[Any, Any]", value).items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in cast(list[Any], value)]
+        return [_finite(item) for item in cast("list[Any]", value)]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -184,7 +187,7 @@ def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -
 
 
 def _write_kernel(folder: Path) -> None:
-    from starhold.certification.evidence.bundle import kernel_bundle
+    from starhold.certification.certificate import kernel_bundle
 
     with atomic_write(folder / KERNEL) as hidden:
         hidden.write_bytes(kernel_bundle())
@@ -202,3 +205,55 @@ def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path) -
     with atomic_write(page) as hidden:
         write_page(hidden, scenario, flights)
     return page
+
+
+BLOCK = 65_536
+"""Samples that are copied at a time."""
+
+
+class _Sink(io.FileIO):
+    """A file that notes why it could not be written and lets the writer go on: the HDF5 library does not survive an error
+    while it closes a file."""
+
+    failure: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        whole, done = memoryview(data).cast("B"), 0
+        try:
+            while self.failure is None and done < len(whole):
+                done += super().write(whole[done:])
+        except OSError as error:
+            self.failure = error
+        return len(whole)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return size or 0
+
+
+def write_netcdf(run: Recording, path: Path) -> None:
+    """A run as a new file. OSError where it cannot be written."""
+    # Loaded here, where alone it is needed; and not xarray, which takes longer to load than most flights.
+    import h5netcdf
+    import h5py
+
+    variables, coordinates = run.variables()
+    with _Sink(path, "w+b") as sink:
+        with h5netcdf.File(sink, "w") as file:
+            for name, values in (coordinates | variables).items():
+                data = np.asarray(values.data)
+                for dimension, size in zip(values.dimensions, data.shape, strict=True):
+                    if dimension not in file.dimensions:
+                        file.dimensions[dimension] = size
+                text = data.dtype.kind == "U"
+                made = file.create_variable(name, values.dimensions, h5py.string_dtype() if text else data.dtype)
+                for first in range(0, len(data), BLOCK):
+                    part = data[first : first + BLOCK]
+                    made[first : first + len(part)] = part.astype(object) if text else part
+                made.attrs.update(values.attrs)
+            file.attrs.update(run.attrs)
+        if sink.failure is not None:
+            raise sink.failure

@@ -1,7 +1,5 @@
 """The decay rate (degree of stability) over the gains, with the mode that decides it, the torque budget and the optimum."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +22,7 @@ class StabilityMap(NamedTuple):
     """All that the map shows.
 
     K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: torque asked for over the budget, of the
-    same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given.
-    """
+    same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given."""
 
     K_a: Any
     K_w: Any
@@ -54,8 +51,7 @@ def draw_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> An
     """A figure of the map of eta(K_a, K_w). Equal arguments give equal files.
 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
-    L. ValueError as `optimum` raises it.
-    """
+    L. ValueError as `optimum` raises it."""
     from matplotlib.figure import Figure
 
     what = stability_map(ratios, alpha, omega, budget)

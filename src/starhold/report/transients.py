@@ -1,16 +1,11 @@
 """The transient of each law against the limits of its scenario, in words and as a section of the page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from html import escape
-from typing import TYPE_CHECKING
 
-from starhold.report.proved import swatch
-
-if TYPE_CHECKING:
-    from starhold.studies.flight import Flight
+from starhold.report.commands import Cell, Column, Table
+from starhold.report.tables import titled
+from starhold.studies.flight import Flight
 
 
 def transient_text(flight: Flight) -> str:
@@ -23,17 +18,9 @@ def section(flights: Sequence[Flight]) -> str:
     """The section of the page; empty where no limits were given."""
     if not all("limits_kept" in flight.metrics for flight in flights):
         return ""
-    rows = "".join(
-        f'<tr><th scope="row">{swatch(number)}{escape(flight.name)}</th>'
-        f"{''.join(f'<td>{escape(cell)}</td>' for cell in _cells(flight))}</tr>"
-        for number, flight in enumerate(flights)
-    )
+    rows = [[Cell(flight.name, "name", number), *_cells(flight)] for number, flight in enumerate(flights)]
     heads = ("law", "transient", "peak rate", "peak accelerations x, y, z", "limits")
-    head = "".join(f'<th scope="col">{name}</th>' for name in heads)
-    return (
-        f'<h2>The transient and its limits</h2>\n<div class="wide"><table class="text"><thead><tr>{head}</tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>"
-    )
+    return titled("The transient and its limits", Table([*map(Column, heads)], rows))
 
 
 def _cells(flight: Flight) -> tuple[str, str, str, str]:

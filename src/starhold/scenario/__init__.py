@@ -1,7 +1,5 @@
 """Scenarios are files, or made in Python: called, this package is `make_scenario`, for `sh.scenario({...})`."""
 
-from __future__ import annotations
-
 import sys
 from types import ModuleType
 from typing import Any

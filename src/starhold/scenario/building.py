@@ -1,7 +1,5 @@
 """Closed loops are built from a scenario."""
 
-from __future__ import annotations
-
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.modes import loop_of_mode

@@ -1,7 +1,5 @@
 """The gains that formulas give the laws of a scenario, with figures to judge them by."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -57,16 +55,13 @@ def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:
             figures = dict(entry.law.explain(scenario.known.craft, entry.spec))
     except ValueError as error:
         raise InputError(scenario.where, f"law {entry.name}", "", f"figures cannot be computed: {error}") from None
-    inputs, gains = _named(entry.law.fields(form), entry.spec), _named(entry.law.fields(), entry.gains)
+    inputs, gains = written(entry.law.fields(form), entry.spec), written(entry.law.fields(), entry.gains)
     return Design(entry.name, entry.law.name, form, inputs, gains, figures)
 
 
-def _named(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
+def written(items: Iterable[Field], values: Iterable[Any]) -> dict[str, Any]:
     """Values by name, as a file would hold them."""
-    return {
-        item.name: item.gain.choices[value] if item.gain.choices else value
-        for item, value in zip(items, values, strict=True)
-    }
+    return {item.name: item.written(value) for item, value in zip(items, values, strict=True)}
 
 
 def map_inputs(scenario: Scenario, law: str | None = None) -> tuple[Any, float, float, float]:

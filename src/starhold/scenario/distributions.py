@@ -234,8 +234,7 @@ class CorrelatedNormal(Relative):
 class Rotations(Distribution):
     """An attitude, uniform on the rotation group: both signs of each quaternion are as likely, for laws may tell them apart.
 
-    Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992): the subgroup algorithm.
-    """
+    Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992): the subgroup algorithm."""
 
     BOUNDED = True
     distribution: Literal["rotations"]
@@ -351,8 +350,6 @@ def _read(given: Any) -> Distribution:
 
 
 Dispersed: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(_read),
-    WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]}),
+    Any, BeforeValidator(_read), WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]})
 ]
 """The table of one dispersion, by its distribution."""

@@ -1,7 +1,5 @@
 """The JSON Schema of scenario files, with laws and parts as they are installed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from starhold.scenario.bodies import bodies, others

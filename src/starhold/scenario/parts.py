@@ -1,8 +1,6 @@
 """The [[part]] tables of a scenario are read: parts of any role that stand in a file of their own, here or in another
 package."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -26,8 +24,7 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.schema import columns
-from starhold.scenario.shared import own_fields, refuse_own, values_of
-from starhold.scenario.tables import Name, Table
+from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts that stand in [[part]] tables; a law has its own, and so has the body."""
@@ -124,7 +121,7 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
             try:
                 text = read_text(folder / given)
                 lines = [line.split(",") for line in text.splitlines() if line.strip() and not line.startswith("#")]
-                if lines and not _is_number(lines[0][0]):
+                if lines and number_in(lines[0][0]) is None:
                     lines = lines[1:]
                 if any(len(line) != len(item.gain.columns) for line in lines):
                     raise ValueError(f"a line without {len(item.gain.columns)} columns")
@@ -136,12 +133,12 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
     return filled
 
 
-def _is_number(text: str) -> bool:
+def number_in(text: str) -> float | None:
+    """The number that a cell of a CSV file holds; None for words."""
     try:
-        float(text)
+        return float(text)
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def check_fit(loop: ClosedLoop, where: str) -> None:

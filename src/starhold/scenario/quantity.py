@@ -1,7 +1,5 @@
 """Quantities in scenario files: plain numbers are SI, strings carry units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

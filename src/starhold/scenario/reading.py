@@ -14,18 +14,10 @@ from starhold.laws.catalogue import Law
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies import body_of
 from starhold.scenario.bodies.interface import Body, Made
-from starhold.scenario.checking import (
-    LONGEST_TEXT,
-    cut,
-    free_name,
-    numbered,
-    read_toml,
-    validate,
-)
+from starhold.scenario.checking import LONGEST_TEXT, cut, free_name, numbered, read_toml, validate
 from starhold.scenario.checking import nearest as nearest
-from starhold.scenario.gains import read_gains
 from starhold.scenario.making import changed, plain
-from starhold.scenario.modes import has_modes, read_modes
+from starhold.scenario.modes import has_modes, read_gains, read_modes
 from starhold.scenario.parts import read_parts
 from starhold.scenario.schema import APART
 from starhold.scenario.writing import toml_text

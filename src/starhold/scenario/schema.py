@@ -16,8 +16,7 @@ from starhold.laws.interface import Gain
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import MOST_SUBSTEPS
 from starhold.scenario.quantity import any_quantity, quantity
-from starhold.scenario.shared import own_fields
-from starhold.scenario.tables import Name, Table, at_key
+from starhold.scenario.tables import Name, Table, at_key, own_fields
 
 APART = ("law", "part")
 """Arrays of tables that are read one by one, each by the type that it names."""
@@ -105,7 +104,7 @@ def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
     """The keys, for pydantic's `create_model`, of a table that takes the declared parameters of a law or another part."""
     keys: dict[str, Any] = {}
     for item in declared:
-        written = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
+        written = item.default if item.required else item.written(item.default)
         # A key may be left out whose default is None or infinite.
         written = None if isinstance(written, float) and not math.isfinite(written) else written
         kind = Annotated[Any, *any_quantity(item.gain), Field(validate_default=written is not None)]

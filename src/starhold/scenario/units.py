@@ -1,8 +1,6 @@
 """Texts such as "0.01 N m" become numbers. Number and unit are read here, by a grammar that computes nothing; the units
 library only gives the worth of these units."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections import Counter
@@ -136,8 +134,7 @@ def unit_registry() -> Any:
     """The registry of units (pint), read from a cache on the disk where there can be one.
 
     Pint's own cache folder is shared by every environment of the user, and its entries name files of the environment that
-    wrote them: when that one is deleted, all others fail. So this environment has a folder of its own.
-    """
+    wrote them: when that one is deleted, all others fail. So this environment has a folder of its own."""
     import pint
     import platformdirs
 

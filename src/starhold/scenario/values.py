@@ -3,8 +3,6 @@
 Keys are told as `Scenario.with_` takes them. Values are validated ones: SI or scaled, as plain numbers in the file would be.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,8 +24,7 @@ from starhold.scenario.parts import part_model
 from starhold.scenario.quantity import declared, reader
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import law_model
-from starhold.scenario.shared import refuse_own
-from starhold.scenario.tables import Table
+from starhold.scenario.tables import Table, refuse_own
 
 SHARED = ("name", "description", "campaign", "simulation", "certify")
 """Tables and keys that all runs of a campaign share."""

@@ -1,7 +1,5 @@
 """Laws and parts are written as TOML."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -16,7 +14,7 @@ from starhold.parts.contract import Field
 from starhold.parts.part import Part
 from starhold.scenario.bodies import bodies, body_for
 from starhold.scenario.checking import read_toml
-from starhold.scenario.shared import shared_values
+from starhold.scenario.tables import shared_values
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -62,9 +60,8 @@ def law_table(law: Law, gains: Any) -> str:
     which = f'type = "{law.name}"' if law.file is None else f"file = {json.dumps(str(law.file))}"
     lines = ["[[law]]", which]
     for item, value in _own(law.fields(), gains, body_for(law).tables.SHARED):
-        shown = item.gain.choices[value] if item.gain.choices else value
         # JSON's strings, integers, finite floats and arrays are TOML's too.
-        lines.append(f"{item.name} = {json.dumps(shown, allow_nan=False)}")
+        lines.append(f"{item.name} = {json.dumps(item.written(value), allow_nan=False)}")
     return "\n".join(lines) + "\n"
 
 
@@ -90,10 +87,15 @@ def part_table(part: Part, params: Any) -> dict[str, Any]:
     for item, value in _own(part.fields(), params, body.tables.SHARED if body else ()):
         if isinstance(value, float) and not math.isfinite(value):
             continue
-        table[item.name] = item.gain.choices[int(value)] if item.gain.choices else json.loads(json.dumps(value))
+        table[item.name] = json.loads(json.dumps(item.written(value)))
     return table
 
 
 def _own(declared: list[Field], values: Iterable[Any], shared: Collection[str]) -> list[tuple[Field, Any]]:
     """The parameters, with their values, that a table of their own gives."""
     return [(item, value) for item, value in zip(declared, values, strict=True) if item.gain.shared not in shared]
+
+
+def template_text(body: str) -> str:
+    """A commented scenario, of the body of this name, that runs as it is and names every key."""
+    return bodies()[body].template

@@ -1,7 +1,5 @@
 """Loops that differ only in numbers fly as batches, a vector of lanes at a time; each is recorded as `fly` does it."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,10 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import buffers, flatten, mapped, places
-from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Arguments, Kernel, Numbers, form, make_kernel, make_step, numbers_of, one, state_of
+from starhold.loop.closed_loop import ClosedLoop, Phase
+from starhold.loop.kernels import (
+    Arguments,
+    Kernel,
+    Numbers,
+    Observer,
+    form,
+    make_kernel,
+    make_step,
+    numbers_of,
+    one,
+    state_of,
+)
 from starhold.simulation.lane import Progress, fly
-from starhold.simulation.lanes import stacked
+from starhold.simulation.lanes import RunningBatch, ThreadPool, stacked
 from starhold.trace.machine import aligned, widest
 
 FEW = 3
@@ -168,3 +177,72 @@ class _Vector:
             groups, each, place = count // self.every, self.every, 0
         kernel(memories, first, groups, each, place, -(-first // self.every), self.seed, self.run)
         return groups * each
+
+
+Array = NDArray[np.float64]
+
+
+PIECES = 2
+"""Pieces of a batch for each thread; few, for each is called once a window."""
+
+
+class Metered(NamedTuple):
+    """The results of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted numbers
+    of windows (windows, quantities, lanes)."""
+
+    ends: Array
+    notes: Array
+    windows: Array
+
+
+def begin_metered(
+    loop: ClosedLoop,
+    carries: Array,
+    phases: Sequence[Phase],
+    first_run: int | NDArray[np.int64],
+    observers: tuple[Observer, Observer],
+    noted: Array,
+    cuts: Sequence[int],
+    late: int,
+    rows: Sequence[int],
+    pool: ThreadPool,
+) -> Callable[..., Metered]:
+    """Begin to fly lanes through phases, and note the instant after the last step too, at which a command is decided
+    and not flown. Returns a function that waits for the end and reports progress.
+
+    carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on;
+    noted: notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless
+    it is 0, the last, which takes the last instant in, at the end of the flight or after it; rows: noted numbers that
+    begin anew in each window, at 0."""
+    batch = RunningBatch(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
+    for phase in phases:
+        for observer in observers:
+            batch.prepare(phase, observer)
+    by_window = np.empty((len(cuts), len(rows), batch.count, batch.width))
+    end, kept = phases[-1].last, list(rows)
+
+    def work(piece: range) -> None:
+        span, done = slice(piece.start, piece.stop), 0
+        for window, cut in enumerate(cuts):
+            observer = observers[done >= late]
+            for phase in phases:
+                first, last = max(done, phase.first), min(cut, phase.last)
+                if first < last:
+                    batch.fly(phase, piece, first, last - first, observer)
+            done = cut
+            if window == len(cuts) - 1:
+                carried = batch.x[span].copy()
+                batch.fly(phases[-1], piece, end, 1, observers[1])
+                batch.x[span] = carried
+            seen = batch.noted[span]
+            by_window[window, :, span] = seen[:, kept].swapaxes(0, 1)
+            seen[:, kept] = 0.0
+
+    wait = pool.share(work, batch.count, PIECES)
+
+    def finish(progress: Progress | None = None) -> Metered:
+        wait(progress)
+        windows = by_window.reshape(len(cuts), len(rows), -1)[:, :, : carries.shape[1]]
+        return Metered(batch.carries(), batch.notes(), windows)
+
+    return finish

@@ -1,7 +1,5 @@
 """Many trajectories fly at once: blocks of lanes, divided among threads."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -84,8 +82,7 @@ def simulate_many(
     width: lanes in flight at once on a core.
 
     The result is the same, bit for bit, for any number of threads and any width, and equals that of `simulate` lane by lane
-    until the motion diverges.
-    """
+    until the motion diverges."""
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T
     cut = list(loop.phases(steps) if phases is None else phases)
@@ -109,8 +106,7 @@ class RunningBatch:
     """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it.
 
     carries: (numbers, lanes), see `carry_columns`; first_run: the run number of lane 0, or those of all lanes (lanes,);
-    noted: (numbers, lanes).
-    """
+    noted: (numbers, lanes)."""
 
     def __init__(
         self,
@@ -257,8 +253,7 @@ def _differ(loop: ClosedLoop) -> bool:
 def stacked(values: Sequence[Any]) -> Any:
     """One structure for many lanes from one of each: numbers that differ become arrays (lanes,).
 
-    Raises ValueError where more than numbers differ: the form, whole numbers, tables.
-    """
+    Raises ValueError where more than numbers differ: the form, whole numbers, tables."""
     first = values[0]
     if isinstance(first, (tuple, list)):
         if any(type(value) is not type(first) or len(value) != len(first) for value in values):

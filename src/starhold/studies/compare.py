@@ -1,21 +1,20 @@
 """Flies the laws of a scenario, whatever its body is, and measures and certifies them."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
+import numpy as np
+
+from starhold.analysis.ranking import MetricSet
+from starhold.analysis.rigid_body import error_angle
 from starhold.scenario.building import build as build
+from starhold.scenario.reading import Scenario
 from starhold.simulation.lane import Progress, Recording, fly
 from starhold.studies.body import study_of
 from starhold.studies.flight import Flight
 from starhold.studies.modes import modes_flown
 from starhold.version import __version__
-
-if TYPE_CHECKING:
-    from starhold.analysis.ranking import MetricSet
-    from starhold.scenario.reading import Scenario
 
 Notice: TypeAlias = Callable[[str, int, int], None]
 """Called with a law's name, the control steps done and those in all."""
@@ -29,7 +28,7 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
     run = name_samples(scenario, loop, samples, carry)
     metrics = study.metrics_of(run) | _law_counters(entry, carry.memory)
     gains = {
-        item.name: (item.gain.choices[value], "1") if item.gain.choices else (value, item.gain.unit)
+        item.name: (item.written(value), "1" if item.gain.choices else item.gain.unit)
         for item, value in zip(entry.law.fields(), entry.gains, strict=True)
     }
     values, modes = gains | study.resources(entry), modes_flown(entry.law, run)
@@ -52,7 +51,6 @@ def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight) -> Flight:
 
 def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress | None = None) -> Flight:
     """The flight with the change of its metrics under half the integration step."""
-    from starhold.analysis.step_check import halved, step_error
 
     finer = record(scenario, halved(loop), progress)
     errors = step_error(flight.recording, finer, study_of(scenario.body).state_names(finer))
@@ -102,3 +100,30 @@ def _law_counters(entry: Any, memory: Any) -> dict[str, Any]:
         "solver_iterations_worst": worst,
         "solver_budget_hits": hits,
     }
+
+
+Loop = TypeVar("Loop")
+
+
+def halved(loop: Loop) -> Loop:
+    """The loop with twice as many integration steps, each half as long; its control steps and random numbers stay."""
+    known: Any = loop
+    return replace(known, substeps=2 * known.substeps)
+
+
+def step_error(run: Recording, finer: Recording, names: Iterable[str]) -> dict[str, float | None]:
+    """Largest differences of some quantities between a run and the one of the `halved` loop: of quaternions the angle
+    between them (rad), else norms in the units of the recording. All are None if one of the two diverged before the
+    other, for from then on there is nothing to compare."""
+    same = len(run["time"]) == len(finer["time"])
+    return {name: _difference(run, finer, name) if same else None for name in names}
+
+
+def _difference(run: Recording, finer: Recording, name: str) -> float:
+    ours, theirs = run[name], finer[name]
+    if run.columns[name].dimension == "quaternion":
+        # The vector part of conj(p) q, in which small angles keep their digits.
+        p0, p, q0, q = ours[:, :1], ours[:, 1:], theirs[:, :1], theirs[:, 1:]
+        scalar = np.sum(ours * theirs, axis=1, keepdims=True)
+        return float(error_angle(np.hstack([scalar, p0 * q - q0 * p - np.cross(p, q)])).max())
+    return float(np.linalg.norm(np.reshape(ours - theirs, (len(ours), -1)), axis=1).max())

@@ -6,26 +6,25 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.rigid_body import measure
 from starhold.errors import InputError
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
+from starhold.scenario.designing import written
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
 from starhold.studies.bodies.rigid_body import certify_law
 from starhold.synthesis.stability_degree import degree, scale
-
-if TYPE_CHECKING:
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.scenario.reading import LawEntry, Scenario
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -63,8 +62,7 @@ class Failure:
     proved to meet its limit on the way to the target; None where that is not proved.
     momentum_share: largest |h| over its limit among working wheels during the flight. flown: length of the flight (s).
     orbit: its period (s), None without one. refused: why the law cannot fly with what is left; then nothing
-    is told of a flight.
-    """
+    is told of a flight."""
 
     lost: tuple[int, ...]
     lacking: tuple[tuple[float, ...], ...]
@@ -101,8 +99,7 @@ def study(
 
     The loss comes at time 0 and is known at once: the torque is shared out among the wheels left and, where the law was
     designed for a degree of stability, its gains are designed for the torque left. `notice` hears the number done, that of
-    all, and the loss that comes next. InputError where the scenario has no wheels.
-    """
+    all, and the loss that comes next. InputError where the scenario has no wheels."""
     wheels = require_wheels(scenario)
     count = len(wheels.axes)
     losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
@@ -205,10 +202,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         known = replace(known, wheel=working[known.wheel - 1] + 1)
     return replace(
         failure,
-        gains={
-            item.name: item.gain.choices[value] if item.gain.choices else value
-            for item, value in zip(entry.law.fields(), gains, strict=True)
-        },
+        gains=written(entry.law.fields(), gains),
         eta=_degree(scenario, entry, gains),
         settling=metrics["settling_time"],
         diverged_at=lost_at,

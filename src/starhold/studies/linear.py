@@ -9,16 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.analysis.linear import (
-    COMMAND,
-    DISTURBANCE,
-    Linear,
-    LinearityError,
-    System,
-    closed,
-    in_series,
-    linearise,
-)
+from starhold.analysis.linear import COMMAND, DISTURBANCE, Linear, LinearityError, System, closed, in_series, linearise
 from starhold.analysis.margins import Margins, margins
 from starhold.errors import InputError
 from starhold.scenario.building import build

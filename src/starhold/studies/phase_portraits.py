@@ -1,7 +1,5 @@
 """Phase portraits of a system with the sets that were certified, one a claim."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +9,7 @@ import numpy as np
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.invariant import InvariantProblem, System, WantedSet
-from starhold.certification.invariant.candidate import Candidate, Floats
-from starhold.certification.invariant.search import Values
+from starhold.certification.invariant.search import Candidate, Floats, Values
 from starhold.certification.invariant.theorems import common, indicator
 
 POINTS = 400

@@ -11,29 +11,27 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
 from starhold.errors import InputError
+from starhold.laws.interface import Field
 from starhold.laws.modes import mode_laws
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import Arguments, Numbers, make_step, numbers_of, one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
 from starhold.scenario.making import changed, plain, variants
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import recorded
 from starhold.studies.flat import Flat
 from starhold.studies.questions import Asked, ask
 from starhold.trace.calling import record_call
 from starhold.trace.handles import Handle
 from starhold.trace.program import Load, Program, statements
-
-if TYPE_CHECKING:
-    from starhold.laws.interface import Field
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.scenario.reading import LawEntry, Scenario
 
 Array: TypeAlias = NDArray[np.float64]
 Values: TypeAlias = dict[str, Any]
@@ -58,8 +56,7 @@ class Reflown:
     the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all as the scenario has them;
     unfollowed: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the
     recorded quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia"
-    or "torque_limit".
-    """
+    or "torque_limit"."""
 
     name: str
     program: Program
@@ -163,7 +160,7 @@ def _explicit(scenario: Scenario) -> Scenario:
         changes |= {f"law[{place}].{item.name}": None for item in entry.law.fields(entry.form)}
         changes[f"law[{place}].form"] = None
         for item, value in zip(entry.law.fields(), entry.gains, strict=True):
-            changes[f"law[{place}].{item.name}"] = item.gain.choices[value] if item.gain.choices else value
+            changes[f"law[{place}].{item.name}"] = item.written(value)
     return changed(scenario, changes)
 
 

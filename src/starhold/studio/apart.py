@@ -1,7 +1,5 @@
 """Processes that work for a studio."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -1,7 +1,5 @@
 """An editor is told where in a file an error stands, and which keys and values fit a place."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any, cast

@@ -1,7 +1,5 @@
 """Things that were asked of the studio, each a process with a folder of results; they go when the studio does."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import threading

@@ -1,7 +1,5 @@
 """The studio's server: on this machine alone, for whoever has the token that it was started with."""
 
-from __future__ import annotations
-
 import json
 import secrets
 import socket
@@ -23,8 +21,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starhold.errors import InputError
 from starhold.scenario.reading import builtin_names, builtin_text
 from starhold.studio import editing
-from starhold.studio.checker import Checker
-from starhold.studio.documents import Documents, RefusedError
+from starhold.studio.checker import Checker, Documents, RefusedError
 from starhold.studio.jobs import Jobs
 from starhold.studio.worker import KINDS, RERUN
 

@@ -1,8 +1,6 @@
 """Does one thing that the studio was asked for, in a process of its own: tells its progress and its result, and leaves its
 files in a folder."""
 
-from __future__ import annotations
-
 import base64
 import shutil
 import time
@@ -12,15 +10,12 @@ from functools import partial
 from html import escape
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from starhold.errors import InputError
 from starhold.report import commands
-from starhold.scenario.reading import parse
+from starhold.scenario.reading import Scenario, parse
 from starhold.studio.apart import begin
-
-if TYPE_CHECKING:
-    from starhold.scenario.reading import Scenario
 
 PULSE = 0.2
 """Seconds between two lines of progress at least."""
@@ -37,7 +32,6 @@ def _compare(scenario: Scenario, folder: Path, tell: Tell) -> str:
 
 
 def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
-    from starhold.report.page_parts import document, versions
     from starhold.report.proved import section
     from starhold.report.results import write_proofs
     from starhold.scenario.building import build
@@ -56,8 +50,7 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
         certificates = tuple(one.certificate for one in tried)
         flights.append(Flight(entry.name, entry.law.name, run, {}, {}, study.metric_set(run), certificates))
     write_proofs([certificate for flight in flights for certificate in flight.certificates], scenario.name, folder)
-    text = document(scenario, [section(flights)], {"laws": [], "plots": []}, (), f"{versions()}.")
-    return _page(folder, text)
+    return _document(scenario, folder, [section(flights)])
 
 
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
@@ -82,7 +75,7 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
 def _block(block: commands.Block) -> str:
     from rich.text import Text
 
-    from starhold.report.html_tables import table_html
+    from starhold.report.tables import table_html
 
     if isinstance(block, commands.Heading):
         return f"<h2>{escape(block.name + block.rest)}</h2>"
@@ -119,7 +112,9 @@ def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
 def _document(scenario: Scenario, folder: Path, parts: list[str]) -> str:
     from starhold.report.page_parts import document, versions
 
-    return _page(folder, document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}."))
+    text = document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}.")
+    (folder / "report.html").write_text(text, encoding="utf-8", newline="\n")
+    return "report.html"
 
 
 def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
@@ -134,7 +129,7 @@ def _rerun(campaign: Path, law: str, run: int, folder: Path, tell: Tell) -> str:
 def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
-    from starhold.report.campaign_files import write_campaign
+    from starhold.report.campaign_page import write_campaign
 
     scenario = with_campaign(scenario, {})
     total, done = scenario.table.campaign.runs * len(scenario.laws), [0]
@@ -146,11 +141,6 @@ def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
     result = fly_campaign(scenario, folder, None, Options(engine_of(None, None, None), force=True), notice)
     tell(0, 0, "the report is written")
     return write_campaign(scenario, result).name
-
-
-def _page(folder: Path, text: str) -> str:
-    (folder / "report.html").write_text(text, encoding="utf-8", newline="\n")
-    return "report.html"
 
 
 KINDS = {

@@ -73,8 +73,7 @@ class Placement(NamedTuple):
 
     spectra: Phi_k (r_k, r_k) of each level, the inputs' first, complex only where two levels share a pair of poles;
     directions: R_k; strength: the smallest singular value of each B_k beside the size of the balanced A (of the first:
-    beside its own largest), zero if the pair is not controllable; error: of the poles that K reaches, see `displacement`.
-    """
+    beside its own largest), zero if the pair is not controllable; error: of the poles that K reaches, see `displacement`."""
 
     K: Array
     spectra: tuple[NDArray[Any], ...]
@@ -86,8 +85,7 @@ class Placement(NamedTuple):
 class _Level(NamedTuple):
     """A level is written in bases where Bhat is `rows` transposed: a (size, size), rows (r, size), p (size - r, size).
 
-    B = Bhat across and across right = E (r, r). The Bhat_k of the formulas is Bhat scale, up to a positive factor.
-    """
+    B = Bhat across and across right = E (r, r). The Bhat_k of the formulas is Bhat scale, up to a positive factor."""
 
     a: Array
     rows: Array
@@ -130,8 +128,7 @@ def place(
     orthonormal basis of the space of its rows, which is the pseudo-inverse of T_k in the skeleton B_k = Bhat_k T_k.
 
     ValueError where an argument is not as said or the error of the poles reached is more than `allowed`, which is so
-    for pairs near uncontrollable ones, long chains from few inputs and poles of many sizes; `UncontrollableError`.
-    """
+    for pairs near uncontrollable ones, long chains from few inputs and poles of many sizes; `UncontrollableError`."""
     a, b = _pair(A, B)
     if (poles is None) == (spectra is None):
         raise ValueError("give either poles or spectra")
@@ -167,8 +164,7 @@ def place(
 def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
     """Return eigenvalues (n,) of A - B K for the very numbers given, A (n, n), B (n, m), K (m, n), by their real part.
 
-    Rounding of K alone spreads a pole of multiplicity k by about the k-th root of that rounding.
-    """
+    Rounding of K alone spreads a pole of multiplicity k by about the k-th root of that rounding."""
     from flint import acb_mat, ctx
 
     with ctx.workprec(BITS // 4):
@@ -184,8 +180,7 @@ def displacement(A: ArrayLike, B: ArrayLike, K: ArrayLike, poles: ArrayLike) -> 
     degree k - j, by the j-th power of their size. Where that is zero: that of the largest pole, or else of A.
 
     These changes a are the numerators of the partial fractions of (reached - wanted) / wanted, characteristic polynomials
-    of exact coefficients. With n simple poles each one reached is surely within n |a| of a wanted one (Gershgorin).
-    """
+    of exact coefficients. With n simple poles each one reached is surely within n |a| of a wanted one (Gershgorin)."""
     a, b = _pair(A, B)
     return _displacement(a, b, np.asarray(K, float), _checked_poles(poles, len(a)))
 

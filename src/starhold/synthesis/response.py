@@ -38,6 +38,14 @@ ON_TARGET = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
 IN_HAND = 0.99
 """Share of the required settling time that designs use: with a held torque the loop settles a little later."""
 
+TORQUE = Gain("N m", above=0.0, text="largest norm; all that is available if absent")
+MOMENTUM = Gain("N m s", above=0.0, text="of the wheels; all available if absent")
+TURN = Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent")
+RATE = Gain("rad/s", shape=(3,), spread=False, text="relative rate then; the scenario's if absent")
+STORED = Gain("N m s", shape=(3,), spread=False, text="by wheels then, body axes; the scenario's if absent")
+ANGLE_LEFT, RATE_LEFT = (Gain(unit, above=0.0, text="that of [settling] if absent") for unit in ("rad", "rad/s"))
+"""The declarations of what every form that settles in time may be given."""
+
 
 class Bandwidth(NamedTuple):
     """The form asks for the natural frequency and damping of the linear loop: exact about the axis of the largest moment of
@@ -53,20 +61,13 @@ class Settling(NamedTuple):
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
     damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
-    torque: Annotated[float | None, Gain("N m", above=0.0, text="largest norm; all that is available if absent")] = None
-    momentum: Annotated[float | None, Gain("N m s", above=0.0, text="of the wheels; all available if absent")] = None
-    attitude: Annotated[
-        Quaternion | None,
-        Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent"),
-    ] = None
-    rate: Annotated[
-        Vector | None, Gain("rad/s", shape=(3,), spread=False, text="relative rate then; the scenario's if absent")
-    ] = None
-    wheel_momentum: Annotated[
-        Any, Gain("N m s", shape=(3,), spread=False, text="by wheels then, body axes; the scenario's if absent")
-    ] = None
-    attitude_tolerance: Annotated[float | None, Gain("rad", above=0.0, text="that of [settling] if absent")] = None
-    rate_tolerance: Annotated[float | None, Gain("rad/s", above=0.0, text="that of [settling] if absent")] = None
+    torque: Annotated[float | None, TORQUE] = None
+    momentum: Annotated[float | None, MOMENTUM] = None
+    attitude: Annotated[Quaternion | None, TURN] = None
+    rate: Annotated[Vector | None, RATE] = None
+    wheel_momentum: Annotated[Any, STORED] = None
+    attitude_tolerance: Annotated[float | None, ANGLE_LEFT] = None
+    rate_tolerance: Annotated[float | None, RATE_LEFT] = None
 
 
 FORMS: dict[str, Any] = {"bandwidth": Bandwidth, "settling": Settling}
@@ -109,17 +110,12 @@ def fastest(craft: Craft, gains: Any) -> float:
 
 
 def settle(
-    torque: Callable[..., Any],
-    gains_of: Callable[[float], Any],
-    rate_of: Callable[[Any], float],
-    craft: Craft,
-    spec: Any,
+    torque: Callable[..., Any], gains_of: Callable[[float], Any], rate_of: Callable[[Any], float], craft: Craft, spec: Any
 ) -> tuple[Any, Turn]:
     """Return the gains of the least scale x (1/s) that settle in time, and their slew.
 
     gains_of(x): the gains; rate_of(gains): the fastest rate (1/s) of the loop, which the integration must resolve.
-    ValueError names the possible time where the torque or the momentum does not allow the required one.
-    """
+    ValueError names the possible time where the torque or the momentum does not allow the required one."""
     if any(getattr(spec, name, 0) is None for name in Start.__dataclass_fields__ if name != "wheel_momentum"):
         raise ValueError("a design that settles in time needs the start, the tolerances and the torque")
     if not any(spec.attitude):

@@ -66,8 +66,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
 
     Doubles give a small moment only to the rounding of the largest, and axes to that over the difference of their
     moments. So they are refined as by Ogita and Aishima (Japan Journal of Industrial and Applied Mathematics 35, 2018).
-    Axes of equal moments, which are arbitrary, are left as they come.
-    """
+    Axes of equal moments, which are arbitrary, are left as they come."""
     from flint import arb_mat, ctx
 
     if not is_full(inertia):
@@ -97,8 +96,7 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
 
     Newton's method in Kleinman's form (IEEE Transactions on Automatic Control 13, 1968): each step solves a Lyapunov
     equation for the cost P of a stable feedback and goes on with the feedback of P, which decreases and in the end
-    converges quadratically. ValueError where numbers overflow or no solution is reached.
-    """
+    converges quadratically. ValueError where numbers overflow or no solution is reached."""
     from flint import ctx
 
     with ctx.workprec(BITS):

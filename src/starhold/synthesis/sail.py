@@ -78,8 +78,7 @@ def force(normal: Vector, area: Scalar, sail: Sail) -> Vector:
     """Return the force (N) on a flat panel of this area (m2) whose unit normal points away from the Sun, normal_x >= 0.
 
     With c the cosine of the cone angle: pressure area c ((1 - specular) X + (2 specular c + 2/3 diffuse) normal)
-    (McInnes, Solar Sailing, 2.6; without the recoil of its heat).
-    """
+    (McInnes, Solar Sailing, 2.6; without the recoil of its heat)."""
     c = normal[0]
     strength = sail.pressure * area * c
     along = scale(strength * (2.0 * sail.specular * c + LAMBERT * sail.diffuse), normal)
@@ -108,8 +107,7 @@ def set_for(wanted: Vector, sail: Sail) -> Setting:
     """Return the panel of the least area that gives this force (N). In closed form for a mirror, else by bisection of
     the cone angle.
 
-    ValueError where the force points too far from the light, or needs more area than the sail has.
-    """
+    ValueError where the force points too far from the light, or needs more area than the sail has."""
     across = math.hypot(wanted[1], wanted[2])
     if across == 0.0 == wanted[0]:
         return Setting(0.0, 0.0, 0.0)

@@ -52,8 +52,7 @@ class Scale(NamedTuple):
     """The equations have no dimension in these units.
 
     moment: J_x (kg m2); t0: H_max / Hdot_max (s); L: the wheel's torque, Hdot_max t0^2 / J_x, which is also its momentum
-    in units of J_x / t0; ratios: J_axis / J_x of the three axes.
-    """
+    in units of J_x / t0; ratios: J_axis / J_x of the three axes."""
 
     moment: float
     t0: float
@@ -88,8 +87,7 @@ def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
     """Return the decay rate (degree of stability), -max Re l over the axes (1/t0), of scaled gains of any sign.
 
     K_a and K_w have any shapes (...) that broadcast; ratios is (n,), or (..., n) with one set of ratios for each pair of
-    gains. Returns (...). ValueError where a ratio is not positive.
-    """
+    gains. Returns (...). ValueError where a ratio is not positive."""
     i = np.asarray(ratios, dtype=float)
     if i.ndim == 0 or i.shape[-1] == 0 or not (i > 0.0).all():
         raise ValueError("ratios must be positive, one for each axis")
@@ -115,8 +113,7 @@ def optimum(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Opt
 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0);
     budget: L. ValueError where ratios or the budget are not positive, where alpha or omega are negative or both zero, for
-    then nothing bounds the gains, and where the gains leave the range of floats.
-    """
+    then nothing bounds the gains, and where the gains leave the range of floats."""
     a, b = _extremes(ratios)
     alpha, omega, budget = _demands(alpha, omega, budget)
     # The positive root of (2 b - a) alpha h^2 + 2 b omega h = L, in the form that holds for alpha = 0 too.
@@ -162,8 +159,7 @@ def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, po
 def scale(moments: ArrayLike, torque: float, momentum: float) -> Scale:
     """Return units for principal moments (3,) (kg m2), a wheel's largest torque Hdot_max (N m) and momentum H_max (N m s).
 
-    ValueError where these are not positive and finite, or no rigid body has these moments.
-    """
+    ValueError where these are not positive and finite, or no rigid body has these moments."""
     if np.shape(moments) != (3,):
         raise ValueError(f"moments must be three numbers, not an array of shape {np.shape(moments)}")
     x, y, z = (float(moment) for moment in np.diagonal(check_inertia(moments)))
@@ -181,8 +177,7 @@ def design_gains(moments: ArrayLike, torque: float, momentum: float, angle: floa
     moments: principal, (3,) (kg m2); torque: Hdot_max (N m) and momentum: H_max (N m s) of each axis' wheel; angle: largest
     initial error (rad, at most pi); rate: largest initial rate (rad/s). ValueError as `scale` and `optimum` raise it. A
     momentum J rate above H_max, which no wheel started at rest can take up, is not refused: no gains change that. H_max sets
-    the unit of time alone; the gains in N m and N m s do not depend on it.
-    """
+    the unit of time alone; the gains in N m and N m s do not depend on it."""
     units = scale(moments, torque, momentum)
     angle, rate = _not_negative("angle", angle), _not_negative("rate", rate)
     if angle > math.pi:

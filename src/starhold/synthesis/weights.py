@@ -30,8 +30,7 @@ def balance(moments: Array, q: Array, r: Array, how: str) -> tuple[Array, Array]
     """Return weights q (6,) and r (3,) for moments (3,) moved to where kappa vanishes: the one that `how` names, or all
     least.
 
-    ValueError where kappa vanishes for no value of the named weight; that of the middle moment's axis always can.
-    """
+    ValueError where kappa vanishes for no value of the named weight; that of the middle moment's axis always can."""
     share = np.roll(moments, -2) - np.roll(moments, -1)
     parts = share / np.sqrt(q[3:] / r)
     if abs(parts.sum()) <= 4.0 * np.finfo(float).eps * np.abs(parts).sum():

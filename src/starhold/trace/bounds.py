@@ -92,8 +92,7 @@ class Bounds(NamedTuple):
 def work(program: Program, counts: Mapping[str, int | Interval]) -> Bounds:
     """Return the bounds of a program for such counts, each a number or an interval, whatever the memories hold.
 
-    Work is that of plain Python and C, which do not ask whether a loop is done when its turns are used up.
-    """
+    Work is that of plain Python and C, which do not ask whether a loop is done when its turns are used up."""
     return _Walk(program, counts, None).bounds()
 
 

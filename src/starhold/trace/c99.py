@@ -5,8 +5,6 @@ It is given the memories as pointers, then counts as `long` and words as `uint64
 doubles are IEEE doubles and the compiler contracts nothing (`-std=c99 -ffp-contract=off`, never `-ffast-math`).
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 from starhold.algebra.operations import INDEX, NUMBER, TRUTH, UNIFORM, WORD

@@ -1,7 +1,5 @@
 """One equation is compiled, to be called with numbers or over columns of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any

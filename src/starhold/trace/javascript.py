@@ -4,8 +4,6 @@ It is given the memories as Float64Arrays, then counts as numbers and words as p
 words are everywhere here. It needs neither a library nor a module, and gives the bits that plain Python gives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, ClassVar
 

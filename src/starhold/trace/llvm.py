@@ -4,8 +4,6 @@ No operation is reassociated or contracted. Lanes go through loops together: a l
 hold and writes nothing, by masks.
 """
 
-from __future__ import annotations
-
 import struct
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Programs are compiled for this processor and called."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from functools import cache
@@ -57,8 +55,7 @@ def load(program: Program, width: int, passes: bool | None = None) -> Callable[.
     of lanes holds `width` numbers for each index, aligned to their size), then counts and words. It releases the GIL.
 
     passes: whether LLVM optimises the printed text before it makes code of it; None: where that has been measured to
-    pay, on one lane, and on many where registers are plenty and nothing is called.
-    """
+    pay, on one lane, and on many where registers are plenty and nothing is called."""
     calls = any(isinstance(s, Call) for s in statements(program.main.body))
     if passes is None:
         passes = width == 1 or (_is_wide() and not calls)

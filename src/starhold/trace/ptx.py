@@ -5,8 +5,6 @@ No test runs it on a GPU. The text for LLVM is run on the processor at hand, one
 that LLVM makes of it is checked: every operation rounds to nearest and none is fused.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 
@@ -22,8 +20,7 @@ class Threads(Llvm):
     """The lanes of this program are the threads of a kernel; threads beyond the number of lanes do nothing.
 
     It is given the memories (a memory of lanes holds a number of each lane for each index), counts and words, and last the
-    number of lanes, which may be started in blocks along x of any size.
-    """
+    number of lanes, which may be started in blocks along x of any size."""
 
     convention = "ptx_kernel "
     passed = ("%.lanes", "%.thread")

@@ -4,8 +4,6 @@ An operation that is read once is written where it is read, unless the text grow
 not from memory that may be written to in between. Loops of the trace are loops, and those of one turn are branches.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import textwrap

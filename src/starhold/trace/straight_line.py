@@ -1,8 +1,6 @@
 """Prints an equation as a straight-line program for the proof kernel: inputs by name, steps, places of outputs; and reads
 such programs in floats."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from typing import Any

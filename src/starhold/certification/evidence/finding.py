@@ -1,7 +1,5 @@
 """Finds the evidence for what a theorem asks to be shown about a claim."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from fractions import Fraction

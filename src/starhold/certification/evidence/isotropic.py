@@ -1,7 +1,6 @@
 """Finds the claim about a loop that knows no axis: a V with a mixed term, the largest level, and evidence for the kernel."""
 
-from __future__ import annotations
-
+from bisect import bisect
 from fractions import Fraction
 from math import acos, sqrt
 from typing import Any, NamedTuple, cast
@@ -9,17 +8,69 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import dot
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import rounded
-from starhold.certification.mixed import SIGNED, Shape, near
 from starhold.kernel.loops import HYSTERESIS, SHORTEST
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.rules import Sum
+
+
+class Shape(NamedTuple):
+    """The numbers of V. Where p > 0, p + 2 c2 > 0 and p + 4 c2 > 0 the attitude's part rises with the turn."""
+
+    p: float
+    c2: float
+    g: float
+    m: float
+
+    @property
+    def other_equilibrium(self) -> float:
+        """V (1/s2) at rest on the other quaternion of the target."""
+        return 2.0 * self.p + 4.0 * self.c2
+
+    def value(self, attitude: Any, rate: Any) -> Any:
+        """V (1/s2) of attitude and rate (rad/s), numbers or columns."""
+        q, u = vector_part(attitude), 1.0 - attitude[0]
+        return dot(rate, rate) * 0.5 + (self.p + self.c2 * u) * u + (self.g + self.m * u) * dot(q, rate)
+
+    def room(self, bound: float, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """{V <= bound} at u is a ball of rates: its radius squared, below zero where it is empty."""
+        return 2.0 * (bound - self.p * u - self.c2 * u * u) + (self.g + self.m * u) ** 2 * u * (2.0 - u)
+
+    def volume(self, bound: float) -> float:
+        """The volume of {V <= bound} among attitudes and rates, up to a factor."""
+        u = np.linspace(0.0, 2.0, 201)
+        return float(np.sum(np.maximum(self.room(bound, u), 0.0) ** 1.5 * np.sqrt(u * (2.0 - u))))
+
+
+SHAPES = (
+    Shape(6.62, -0.62, 2.56, 0.59),
+    Shape(7.07, -0.58, 2.64, 0.62),
+    Shape(9.69, -0.9, 3.09, 0.72),
+    Shape(11.16, -0.65, 3.3, 0.75),
+    Shape(19.24, -1.97, 3.99, -0.45),
+    Shape(23.14, 0.0, 3.48, -0.44),
+    Shape(22.28, -0.02, 2.74, -1.22),
+    Shape(20.69, -0.03, 2.36, -1.18),
+)
+LIMITS = (0.01, 0.02, 0.045, 0.07, 0.12, 0.2, 0.4)
+"""The shapes are near the largest sets for ab of up to these, and from 1 on, from a search among points of a grid."""
+SIGNED = (Shape(4.0, 0.0, 0.02, 0.0), Shape(4.0, 0.0, 0.1, 0.0), Shape(5.0, 0.0, 0.7, -0.7))
+"""Where the sign of the quaternion is chosen: with a mixed term so small that a change of sign lowers V."""
+
+
+def near(beta: float) -> tuple[Shape, ...]:
+    """Return the shape for ab and its neighbours."""
+    place = bisect(LIMITS, beta)
+    return SHAPES[max(place - 1, 0) : place + 2]
+
 
 ISOTROPIC = "converges without a preferred axis"
 LESS = (3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
@@ -27,14 +78,14 @@ LESS = (3e-3, 1e-2, 2e-2, 3e-2, 0.1, 0.2, 0.3)
 
 
 class Reach(NamedTuple):
-    """A V that was recorded, what the kernel asks of its fall for the level 1, and about the largest level (1/s2)."""
+    """A V that was recorded, what the kernel asks of its decrease for the level 1, and about the largest level (1/s2)."""
 
     shape: Shape
     V: str
     asked: Sum
     level: float
 
-    def falls(self, level: float) -> bool:
+    def decreases(self, level: float) -> bool:
         """Whether floats have a sum for a level."""
         inside, *others = self.asked.known
         asked = Sum(self.asked.p, [inside - 1 + Fraction(level), *others], (), self.asked.strict)
@@ -57,7 +108,7 @@ def find_isotropic(loop: Loop) -> None:
     for one in sorted(found, key=lambda one: -one.shape.volume(one.level)):
         for level in (short(one.level * (1.0 - less)) for less in LESS):
             claim = loop.claim(ISOTROPIC, words(loop), one.V, level=level, **contents(loop, one.shape, level))
-            if one.falls(level) and loop.try_to_show(claim, loop.scales(one.V, level) | units(level)):
+            if one.decreases(level) and loop.try_to_show(claim, loop.scales(one.V, level) | units(level)):
                 return
 
 
@@ -82,7 +133,7 @@ def in_seconds(shape: Shape, a: float) -> Shape:
 
 
 def reach(loop: Loop, shape: Shape) -> Reach:
-    """Record V, and find about the largest level (1/s2) below which V falls, by points of a grid."""
+    """Record V, and find about the largest level (1/s2) below which V decreases, by points of a grid."""
 
     def height(measurement: Any) -> Scalar:
         return shape.value(measurement.attitude, measurement.rate)
@@ -98,8 +149,8 @@ def reach(loop: Loop, shape: Shape) -> Reach:
     fastest = max(abs(shape.g), abs(shape.g + 2.0 * shape.m)) + sqrt(2.0 * top + shape.g**2)
     u, x, v = np.meshgrid(np.linspace(0.0, 2.0, 61)[1:], np.linspace(-1.0, 1.0, 31), np.linspace(0.0, fastest, 61)[1:])
     at = {"u": u, "v": v, "t": x * np.sqrt(u * (2.0 - u))}
-    heights, falls = 1.0 - values(asked.known[0], at), values(asked.p, at)
-    return Reach(shape, V, asked, min(top * (1.0 - 1e-6), float(heights[falls <= 0.0].min(initial=np.inf))))
+    heights, slopes = 1.0 - values(asked.known[0], at), values(asked.p, at)
+    return Reach(shape, V, asked, min(top * (1.0 - 1e-6), float(heights[slopes <= 0.0].min(initial=np.inf))))
 
 
 def values(p: Poly, at: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:

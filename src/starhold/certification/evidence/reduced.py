@@ -1,8 +1,6 @@
 """Guesses of what the theorem on loops that know no axis asks for, in u = 1 - q0, the rate v, and t, the part of q along the
 rate: sums of squares times products of level - V and of |q|^2 - t^2."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
@@ -14,7 +12,7 @@ from starhold.kernel.rules import Sum
 LEAST: dict[tuple[int, ...], tuple[int, int]] = {(): (1, 2), (0,): (0, 1)}
 FALLS: dict[tuple[int, ...], tuple[int, int]] = {(): (2, 3), (1,): (2, 2), (0,): (1, 2), (0, 1): (1, 1)}
 """The highest powers of v, and of u and t together, by places of what is known: for V that is least on target |q|^2 - t^2,
-for V that falls level - V and |q|^2 - t^2."""
+for V that decreases level - V and |q|^2 - t^2."""
 
 
 class Reduced(Guess):

@@ -1,7 +1,5 @@
 """Finds states at which what a claim about an attitude loop needs fails, in floats, for the kernel to refute it by."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import product

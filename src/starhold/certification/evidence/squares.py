@@ -4,8 +4,6 @@ All of them are linear in the polynomial. In floats the matrix is made as defini
 are about one; rounded to short numbers, what is then amiss is put on the matrix, monomial by monomial.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction

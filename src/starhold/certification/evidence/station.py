@@ -1,7 +1,5 @@
 """Claims about a craft near a libration point for the kernel: its programs as they fly, numbers, and evidence."""
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction

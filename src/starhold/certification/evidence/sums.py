@@ -4,8 +4,6 @@ In floats the matrices are made as definite as can be, in units (powers of two) 
 to few binary digits they still are; what is then amiss is put on the matrix that has no factor.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -36,11 +34,8 @@ from starhold.kernel.rules import Sum
 
 sparse: Any = import_module("scipy.sparse")
 pivoted: Any = import_module("scipy.linalg").qr
-linprog: Any = import_module("scipy.optimize").linprog
 MARGIN = 1e-7
 """The least eigenvalue, in scaled units, with which exact numbers are tried."""
-PAIRED = 10
-"""Known polynomials of which products are tried in an identity."""
 MOST = 60_000
 """Entries of the matrices, at most."""
 Terms: TypeAlias = dict[Monomial, Fraction]

@@ -1,7 +1,5 @@
 """Helpers about polynomials for those who look for sums of squares."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
@@ -17,13 +15,11 @@ from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Sum
 
-sparse: Any = import_module("scipy.sparse")
-pivoted: Any = import_module("scipy.linalg").qr
 linprog: Any = import_module("scipy.optimize").linprog
 
 
 PAIRED = 10
-"""Of so many known things products of two are tried."""
+"""Products of two known things are tried, of so many of them at most."""
 
 
 def times(a: Poly, b: Poly, c: int = 1) -> Poly:

@@ -1,7 +1,5 @@
 """A system and claims about it, from a TOML file or from Python, and the certificate of all of them."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import keyword

@@ -3,8 +3,6 @@
 Nothing here is trusted: whatever is found counts once the kernel has accepted it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
@@ -209,17 +207,17 @@ def shape(functions: Sequence[Poly], names: Sequence[str]) -> list[int]:
 
 
 def completed(attempt: Attempt, role: str, escape: Poly | None) -> list[str]:
-    """Add hints about pairs of cells where V does not fall strictly, and where rates jump; return what is not shown."""
+    """Add hints about pairs of cells where V does not decrease strictly, and where rates jump; return what is not shown."""
     lacking: list[str] = []
     for _ in range(6):
         lacking, _ = attempt.missing(every=True)
         agree = [name for name in lacking if name.startswith("agree")]
-        falls = [name for name in lacking if name.startswith("changes") and not name.endswith("escapes")]
-        if len(agree) + len(falls) < len(lacking) or not lacking:
+        decreasing = [name for name in lacking if name.startswith("changes") and not name.endswith("escapes")]
+        if len(agree) + len(decreasing) < len(lacking) or not lacking:
             return lacking
         changed = False
-        if falls and attempt.theorem == "attracts":
-            changed = weakened(attempt, role, falls, escape)
+        if decreasing and attempt.theorem == "attracts":
+            changed = weakened(attempt, role, decreasing, escape)
         elif agree:
             changed = crossed(attempt, role, agree[0])
         if not changed:
@@ -234,7 +232,7 @@ def pair(name: str) -> list[int]:
 
 
 def weakened(attempt: Attempt, role: str, names: list[str], escape: Poly | None) -> bool:
-    """Let V fall weakly for some pairs, and find a function that grows there."""
+    """Let V be non-increasing for some pairs, and find a function that grows there."""
     told = f"weakly of {role}"
     pairs = [*attempt.hints.get(told, []), *(pair(name) for name in names)]
     pairs = [own for k, own in enumerate(pairs) if own not in pairs[:k]]
@@ -268,7 +266,7 @@ def escaping(attempt: Attempt, role: str, own: list[int]) -> Poly | None:
 
 
 def crossed(attempt: Attempt, role: str, name: str) -> bool:
-    """Find a surface on which V falls for all means of the rates; whether there is one."""
+    """Find a surface on which V decreases for all means of the rates; whether there is one."""
     system, across, weakly = attempt.system, f"across of {role}", f"weakly of {role}"
     j, k = pair(name)
     known = deepcopy(attempt.hints)

@@ -1,9 +1,9 @@
 """Floats guess how large a level may be, and states that refute. The latter are verified in exact rationals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from typing import Any
 
@@ -12,9 +12,42 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.invariant.candidate import Candidate, Floats
-from starhold.certification.invariant.system import Cell, Poly, along, solve
+from starhold.certification.invariant.system import Cell, Cells, Poly, System, along, solve, split
 from starhold.certification.matrices import number
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A system, a function V and a box; M is {V <= 0} in it. `equilibrium`: the point that M is told to be, its
+    coordinates, None for parameters; else None."""
+
+    system: System
+    V: Any
+    box: tuple[tuple[float, float], ...]
+    equilibrium: tuple[Any, ...] | None = None
+
+    @cached_property
+    def pieces(self) -> Cells:
+        """Return the cells of rates and V together."""
+        return split(self.system, self.V)
+
+
+class Floats:
+    """A polynomial is evaluated in floats."""
+
+    def __init__(self, polynomial: Poly) -> None:
+        self._terms = [(tuple(int(power) for power in powers), number(c)) for powers, c in polynomial.to_dict().items()]
+
+    def at(self, points: Any) -> Any:
+        """Return its values at points (n, ...)."""
+        total = np.zeros(np.shape(points)[1:])
+        for powers, c in self._terms:
+            term = c
+            for x, power in zip(points, powers, strict=True):
+                term = term * x**power if power else term
+            total = total + term
+        return total
+
 
 Array = NDArray[np.float64]
 POINTS = {1: 4001, 2: 301, 3: 61, 4: 23, 7: 5, 8: 3, 9: 3}
@@ -50,8 +83,8 @@ def grid(box: Sequence[tuple[float, float]], count: int | None = None) -> Array:
 
 
 def wrong(what: Candidate, sense: int, count: int = 8) -> list[Array]:
-    """States at which V is positive and does not fall (sense -1: grow), those of the least V first, refined by grids that
-    shrink around them."""
+    """States at which V is positive and does not decrease (sense -1: grow), those of the least V first, refined by grids
+    that shrink around them."""
     values = Values(what, grid(what.box))
     tolerance = 1e-12 * float(np.nanmax(np.abs(values.slope), initial=0.0))
     floor = 1e-12 * float(np.nanmax(np.abs(values.V), initial=0.0))
@@ -156,16 +189,6 @@ def at(polynomial: Poly, equilibrium: Sequence[Any]) -> Poly:
     context = polynomial.context()
     pairs = zip(context.gens(), equilibrium, strict=True)
     return polynomial.compose(*(g if x is None else context.constant(x) for g, x in pairs))
-
-
-def cells_at(what: Candidate, equilibrium: Sequence[Any]) -> list[Cell]:
-    """The cells, thin ones too, whose closures hold an equilibrium for some of the parameters."""
-    found: list[Cell] = []
-    for cell in (*what.pieces.cells, *what.pieces.thin):
-        sides = [at(guard, equilibrium) for guard in what.pieces.guards(cell)]
-        if not any(side.is_constant() and not side.is_zero() and side.leading_coefficient() < 0 for side in sides):
-            found.append(cell)
-    return found
 
 
 def value(what: Candidate, state: Sequence[Any]) -> Any:

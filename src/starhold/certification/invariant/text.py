@@ -4,8 +4,6 @@ Arithmetic, whole powers, comparisons and the piecewise functions below make a p
 coefficients. A number stands for what is written: 0.1 is one tenth.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Callable, Mapping

@@ -6,11 +6,9 @@ M is a compact set, V its indicator: continuous, zero on M and positive elsewher
 * `attracts` (theorem 2): and no motion can stay where V' = 0 but in M.
 * `region` (its corollary): all motions that start in {V <= level} stay there and come to M.
 * `unstable` (theorem 3): V' > 0 wherever V > 0 in a neighbourhood; V need be positive somewhere in every neighbourhood only.
-* `intersection` (theorem 4): M is where none of several V_k is positive, and each falls outside. Their maximum is a V.
+* `intersection` (theorem 4): M is where none of several V_k is positive, and each decreases outside. Their maximum is a V.
 * `avoids`: no motion from one set comes to another. V <= 0 on the one, V > 0 on the other, V' <= c V with a polynomial c.
 """
-
-from __future__ import annotations
 
 import json
 import math
@@ -20,14 +18,13 @@ from fractions import Fraction
 from functools import reduce
 from typing import Any
 
-from starhold.algebra.polynomial import exact
+from starhold.algebra.polynomial import Case, Polynomial, exact, pieces
 from starhold.algebra.scalar import maximum, minimum
 from starhold.certification.certificate import Claim, Obligation
 from starhold.certification.evidence.finding import certificate
 from starhold.certification.invariant import search
-from starhold.certification.invariant.candidate import Candidate
 from starhold.certification.invariant.prover import Attempt, proved, scales
-from starhold.certification.invariant.recording import program
+from starhold.certification.invariant.search import Candidate
 from starhold.certification.invariant.system import System, plain, turned
 from starhold.kernel.check import prove as kernel_proves
 from starhold.kernel.numbers import Account, RefusedError
@@ -35,6 +32,63 @@ from starhold.kernel.polynomials import Poly as Exact
 from starhold.kernel.polynomials import var
 from starhold.kernel.reading import Claim as KernelClaim
 from starhold.kernel.reading import read_certificate
+
+
+class Line:
+    """A straight line of steps over named inputs; equal steps are kept once."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.names, self.steps = list(names), list[list[Any]]()
+        self._places: dict[Any, int] = {}
+
+    def step(self, *parts: Any) -> int:
+        """Return the place of a step's value."""
+        if parts not in self._places:
+            self.steps.append([*parts])
+            self._places[parts] = len(self.names) + len(self.steps) - 1
+        return self._places[parts]
+
+    def polynomial(self, p: Polynomial) -> int:
+        """Return the place of a polynomial's value."""
+        total: int | None = None
+        for monomial, c in sorted(p.terms.items()):
+            text = str(Fraction(int(c.p), int(c.q)))
+            term = None if text == "1" and monomial else self.step("constant", text)
+            for name in monomial:
+                place = self.names.index(name)
+                term = place if term is None else self.step("product", term, place)
+            total = term if total is None else self.step("plus", total, term)
+        return self.step("constant", "0") if total is None else total
+
+    def value(self, cases: Sequence[Case]) -> int:
+        """Return the place of a piecewise polynomial's value: a choice by one of its conditions, and so on."""
+        condition = next((condition for case in cases for condition, _ in case.truths), None)
+        if condition is None:
+            return self.polynomial(cases[0].value)
+        sides = [_where(cases, condition, side) for side in (True, False)]
+        if not all(sides):
+            # Whatever else holds there contradicts one side.
+            return self.value(sides[0] or sides[1])
+        truth = self.step("less", self.step("constant", "0"), self.polynomial(condition.positive))
+        return self.step("select", truth, *map(self.value, sides))
+
+
+def _where(cases: Sequence[Case], condition: Any, side: bool) -> list[Case]:
+    """Return the cases where a condition has one truth, without it."""
+    found: list[Case] = []
+    for case in cases:
+        others = tuple(truth for truth in case.truths if truth[0].key != condition.key)
+        if not any(c.key == condition.key and truth != side for c, truth in case.truths):
+            found.append(Case(others, case.value))
+    return found
+
+
+def program(values: Sequence[Any], names: Sequence[str]) -> dict[str, Any]:
+    """Return piecewise polynomials of the named numbers as one program."""
+    line = Line(names)
+    outputs = [line.value(pieces(value)) for value in values]
+    return {"inputs": line.names, "steps": line.steps, "outputs": outputs}
+
 
 SQUARES, VERIFIED = "sums of squares", "exact inequality"
 KERNEL = {"stable": "is stable", "unstable": "is unstable", "avoids": "avoids"}
@@ -44,7 +98,7 @@ STEPS = {
     "positive": "positive", "border": "bounded", "changes": "falls", "agree": "switching", "continuous": "continuous",
     "never": "falls", "start": "start", "unsafe": "unsafe", "barrier": "barrier",
 }  # fmt: skip
-"""What the kernel's obligations are about."""
+"""The steps of a theorem, by the words with which the names of the kernel's obligations begin."""
 ASSUMPTIONS = "equations-as-given", "filippov"
 NEAR = 1e-6
 """The share of the largest V below which a V that rises leaves no level."""
@@ -229,8 +283,8 @@ class _Proof:
             given = {f"{name[:-1]}core": hint for name, hint in inner["evidence"].items() if name.endswith(" of V")}
             self.numbers["core"] = float(numbers["core.level"])
         if what.equilibrium is None and not any(name.startswith("member") for name in numbers):
-            falls = wanted.theorem not in ("stable", "unstable")
-            member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if falls else 0.0)
+            decreasing = wanted.theorem not in ("stable", "unstable")
+            member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if decreasing else 0.0)
             if member is None:
                 return "no state with V <= 0 was found in the box: member"
             numbers |= {f"member.{x}": fraction(v) for x, v in zip(what.pieces.names, member, strict=True)}
@@ -264,7 +318,7 @@ class _Proof:
         what, level = self.what, self.wanted.level
         if what.system.angles or self.states:
             return []
-        sense, word = (-1, "does not grow") if self.unstable else (1, "does not fall")
+        sense, word = (-1, "does not grow") if self.unstable else (1, "does not decrease")
         found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
         found.append(("continuous", "jumps", lambda: search.jump(what)))
         if what.equilibrium is not None and not self.unstable:

@@ -1,7 +1,5 @@
 """Certificates of invariant sets in sentences. Every number in them comes from the claim."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,7 +19,7 @@ OBLIGATIONS = {
     "continuous": "V is continuous",
     "positive": "V > 0 everywhere in the box but at the equilibrium",
     "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
-    "falls": "V never rises on the set, and falls but where a function is told that grows there",
+    "falls": "V is non-increasing on the set, and decreases but where a function is told that grows there",
     "grows": "V grows wherever it is positive in the box",
     "start": "V is not positive in the start set",
     "unsafe": "V is positive in the unsafe set",
@@ -64,7 +62,7 @@ def limit(numbers: Mapping[str, Any]) -> str:
     """The bound of the level for this V, and why it is one."""
     if "refuted_level" not in numbers:
         return ""
-    why = {"V rises": "where V does not fall", "border": "on the border of the box"}[numbers["limited_by"]]
+    why = {"V rises": "where V does not decrease", "border": "on the border of the box"}[numbers["limited_by"]]
     return f"no level reaches {_up(numbers['refuted_level'])}: there is a state {why}"
 
 

@@ -1,7 +1,5 @@
 """These checks are for laws of a body that is known only by what its part declares."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The checks for laws that hold a place near a libration point."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The checks for laws that turn a rigid body."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -20,15 +18,8 @@ from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import certify
 from starhold.conformance.bench import CRAFT, call, random_measurements, random_quaternions, sample_loop
 from starhold.conformance.bodies.any_body import survives_toml
-from starhold.conformance.units import rescaled, times
-from starhold.conformance.verdicts import (
-    STEPS,
-    NotApplicableError,
-    agree,
-    declares_itself,
-    gives_reasons,
-    require,
-)
+from starhold.conformance.units import SYSTEMS, rescaled, times
+from starhold.conformance.verdicts import STEPS, NotApplicableError, agree, declares_itself, gives_reasons, require
 from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -143,7 +134,7 @@ def keeps_units(law: Law) -> None:
             calls = max(calls, _first_effect(again, _torques(law, changed)))
         torques = np.array(list(islice(plain, calls)))
         size = max(float(np.abs(torques).max()), 1e-9)
-        for system in ((7.0, 1.0, 1.0), (1.0, 3.0, 1.0), (1.0, 1.0, 0.2), (2.0, 0.3, 5.0)):
+        for system in SYSTEMS:
             others = np.array(list(islice(_torques(law, gains, system), calls)))
             error = float(np.abs(others - torques).max()) / size
             require(error < 1e-6, f"with kg, m, s scaled by {system} the torque changes by {error:.1e} of itself")
@@ -156,10 +147,7 @@ def _near(seen: Measurement, share: float) -> Measurement:
     return seen._replace(attitude=normalise((1.0, x, y, z)), rate=tuple(rates[:3]), body_rate=tuple(rates[3:]))
 
 
-MOTIONS = (
-    *random_measurements(5),
-    *map(_near, random_measurements(3), (0.1, 1e-2, 1e-3)),
-)
+MOTIONS = (*random_measurements(5), *map(_near, random_measurements(3), (0.1, 1e-2, 1e-3)))
 """Far from the target, and in boundary layers about it."""
 HOLDS = (1, 4, 16, 64, 256)
 """Calls in which each motion is shown, round after round, as long as a gain has changed nothing."""

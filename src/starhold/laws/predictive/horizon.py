@@ -102,8 +102,7 @@ def sweep(problem: Problem, barrier: Scalar) -> tuple[Scalar, Scalar]:
     press against a limit are held there; with a gradient of zeros none are, which gives the policy without limits.
     Gives the Newton decrement and the number of limits held.
 
-    A barrier above zero asks for the step of the interior-point method instead: nothing is held, and the limits repel.
-    """
+    A barrier above zero asks for the step of the interior-point method instead: nothing is held, and the limits repel."""
     store, (a, b), weight, bounds = carve(problem), motion(problem), weights(problem), limits(problem)
     n, columns, pushes = problem.horizon, transposed(a), transposed(b)
     holds = less_equal(barrier, 0.0)

@@ -50,8 +50,7 @@ def linearise(measurement: Measurement, craft: Craft) -> Linear:
     """Return the motion near the measurement (SI units).
 
     A = [[-[w]x, E/2], [J^-1 G, J^-1 ([Jw]x - [w]x J)]], B = [0; J^-1], G = 6 (mu/R^5) ([R]x J - [JR]x) [R]x with R from
-    the centre of attraction in body axes; G = 0 where there is none (R = 0).
-    """
+    the centre of attraction in body axes; G = 0 where there is none (R = 0)."""
     w, position = measurement.rate, measurement.position
     momentum, pull = apply(craft.inertia, w), apply(total_inertia(craft), position)
     square = dot(position, position)
@@ -92,8 +91,7 @@ class Rates(NamedTuple):
 def sample(problem: Problem, linear: Linear, period: Scalar) -> None:
     """Sample exactly with a held input: A = exp(A h), B = (integral of exp(A s) over 0..h) B of the problem.
 
-    Both come from S = sum of (A h)^k / (k + 1)!, which loses no digits where A is singular.
-    """
+    Both come from S = sum of (A h)^k / (k + 1)!, which loses no digits where A is singular."""
     # Time counted in periods: then all entries of A and S are of comparable size.
     square = period * period
     rates = Rates(_scaled(linear.turning, period), 0.5, _scaled(linear.stiffness, square), _scaled(linear.damping, period))

@@ -34,8 +34,7 @@ def solve(
     """Solve one program from scratch: A (6, 6), B (6, 3), Q (6, 6), R (3, 3) and P (6, 6) symmetric, Q and P positive
     semidefinite, R positive definite; x (6); limits |v - centre| <= bound per axis or, with ball, in norm (inf: none).
 
-    The first call for a kind of limits compiles the solver.
-    """
+    The first call for a kind of limits compiles the solver."""
     problem = pose(a, b, q, r, p, x, horizon, bound, centre, ball)
     numbers, report = np.array(problem.numbers.cells), np.empty(3)
     _kernel(ball)(numbers.ctypes.data, report.ctypes.data, horizon, budget)

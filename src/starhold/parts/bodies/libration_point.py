@@ -95,8 +95,7 @@ def nonlinear(position: Vector, velocity: Vector, plant: Libration) -> Vector:
     """Acceleration without control in the circular restricted three-body problem (scaled).
 
     The forces at the point itself, which cancel, are left out before they are computed, so that the result is exactly zero
-    there and as accurate near it as far away.
-    """
+    there and as accurate near it as far away."""
     turning, square = 2.0 * plant.rate, plant.rate * plant.rate
     tide = add(
         _tide(position, plant.from_larger, plant.pull_larger), _tide(position, plant.from_smaller, plant.pull_smaller)
@@ -236,8 +235,7 @@ def make_libration(
     distance (m), in scaled units; the place is computed to the last digit.
 
     Raises ValueError where a number is not positive and finite, the masses are the wrong way round, or there is no such
-    point.
-    """
+    point."""
     given = {"larger mass": larger_mass, "smaller mass": smaller_mass, "separation": separation_m, "length": length_unit_m}
     for name, number in given.items():
         if not 0.0 < number < math.inf:
@@ -258,8 +256,7 @@ def _place(share: float, rest: float, point: str) -> tuple[float, float]:
     """Where the point lies along X as seen from the larger and from the smaller body, in units of their distance; `share`
     and `rest` are the smaller and the larger body's parts of the mass.
 
-    The balance of forces is written for the distance from the nearer body, without differences of near numbers.
-    """
+    The balance of forces is written for the distance from the nearer body, without differences of near numbers."""
     if point == "L3":
         distance = rising(lambda g: g * (1.0 + share / g) - rest / (g * g) - share / ((1.0 + g) * (1.0 + g)), 0.5, 1.5)
         return -distance, -1.0 - distance

@@ -67,8 +67,7 @@ def tabulate(times: Any, attitudes: Any, sample_times: Any) -> NDArray[np.float6
 
     times: (n,) s, increasing; attitudes: (n, 4) quaternions, scalar first; sample times within [times[0], times[-1]].
     Raises ValueError when they are not, where neighbours leave open which way the turn between them goes, and where the
-    spline swings far off between them. Target axes are the body axes to be followed.
-    """
+    spline swings far off between them. Target axes are the body axes to be followed."""
     times, samples = np.asarray(times, dtype=float), np.asarray(sample_times, dtype=float)
     first, last = samples.min(), samples.max()
     if not (times[0] <= first and last <= times[-1]):

@@ -28,8 +28,7 @@ def goal(params: NoParams, state: Any, step: int, before: Quaternion) -> Goal:
     """The frame at this position and velocity.
 
     Its rate is h/r2 about the normal, and its acceleration -2 h (r.v)/r4, exact for two-body motion. Of the two quaternions
-    it gives the one nearer to `before`, so that a law that feeds back q never sees a jump.
-    """
+    it gives the one nearer to `before`, so that a law that feeds back q never sees a jump."""
     position, velocity = state.position, state.velocity
     h = cross(position, velocity)
     r2, h2 = dot(position, position), dot(h, h)

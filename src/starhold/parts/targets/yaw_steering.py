@@ -13,16 +13,7 @@ from starhold.parts.contract import Card
 from starhold.parts.craft import EARTH
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.roles import Goal
-from starhold.parts.targets.alignment import (
-    AXIS,
-    GRAVITY,
-    OTHER,
-    aligned,
-    body_axes,
-    opposite_of,
-    orbiting,
-    towards_sun,
-)
+from starhold.parts.targets.alignment import AXIS, GRAVITY, OTHER, aligned, body_axes, opposite_of, orbiting, towards_sun
 
 CARD = Card(
     title="Yaw steering",

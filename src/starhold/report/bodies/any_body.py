@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING
 
-from starhold.report.body import BodyReport, PageParts
-from starhold.report.figures import POINTS, over_time, without_runs
+from starhold.report.body import PageParts
+from starhold.report.figures import POINTS, Picture, over_time, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import rounded
@@ -18,31 +18,17 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 
-class RecordedPicture(NamedTuple):
-    """A figure for each recorded quantity."""
-
-    times: Curve
-    plots: list[Plot]
-    flights: list[Flight]
-    name: str
-
-    def makers(self) -> dict[str, Callable[[], Any]]:
-        return {plot.name: partial(over_time, plot, self.times, (), self.flights, self.name) for plot in self.plots}
+def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
+    """Draw a figure of each recorded quantity, with the names, units and meanings that the body's part declares."""
+    times, plots = collect(flights, POINTS)
+    shown = without_runs(flights)
+    return {plot.name: partial(over_time, plot, times, (), shown, scenario.name) for plot in plots}
 
 
-@final
-class AnyBodyReport:
-    """Plots over time, with the names, units and meanings that the body's part declares."""
-
-    def picture(self, flights: Sequence[Flight], scenario: Scenario) -> RecordedPicture:
-        return RecordedPicture(*collect(flights, POINTS), without_runs(flights), scenario.name)
-
-    def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-        times, plots = collect(flights, PAGE_POINTS)
-        return PageParts({"times": rounded(times), "plots": [over_time_data(plot, flights) for plot in plots]})
-
-
-REPORT: BodyReport = AnyBodyReport()
+def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
+    """Make plots over time of the same."""
+    times, plots = collect(flights, PAGE_POINTS)
+    return PageParts({"times": rounded(times), "plots": [over_time_data(plot, flights) for plot in plots]})
 
 
 def collect(flights: Sequence[Flight], points: int) -> tuple[Curve, list[Plot]]:

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from html import escape
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from starhold.analysis.libration_point import DAY, goal_of
-from starhold.report.body import BodyReport, PageParts
-from starhold.report.colours import colour
-from starhold.report.figures import POINTS, headed, over_time, width_of, without_runs
+from starhold.report.body import PageParts
+from starhold.report.figures import POINTS, Picture, headed, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import rounded, views
 from starhold.report.path_plots import PathPlots, collect
 from starhold.report.plane_plots import GREY, draw_planes, plane_box, plane_data
+from starhold.report.plots import colour
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -36,48 +36,30 @@ _VIEWS = (
 )
 
 
-class PathPicture(NamedTuple):
-    """The figures of a craft near a libration point."""
-
-    plots: PathPlots
-    flights: list[Flight]
-    name: str
-
-    def makers(self) -> dict[str, Callable[[], Any]]:
-        """The projections, the path in space, the phase portrait and the plots over time."""
-        plots, flights, name = self
-        makers: dict[str, Callable[[], Any]] = {
-            plot.name: partial(over_time, plot, plots.times, (), flights, name) for plot in plots.over_time
-        }
-        makers |= {plot.name: partial(draw_planes, plot, flights, name) for plot in plots.planes}
-        return makers | {"space": partial(_space, plots, flights, name)}
+def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
+    """Draw the projections, the path in space, the phase portrait and the plots over time."""
+    plots, shown, name = collect(flights, POINTS, scenario), without_runs(flights), scenario.name
+    figures: Picture = {plot.name: partial(over_time, plot, plots.times, (), shown, name) for plot in plots.over_time}
+    figures |= {plot.name: partial(draw_planes, plot, shown, name) for plot in plots.planes}
+    return figures | {"space": partial(_space, plots, shown, name)}
 
 
-@final
-class LibrationPointReport:
-    """The path in planes and in space, with what is held, and the control over time."""
-
-    def picture(self, flights: Sequence[Flight], scenario: Scenario) -> PathPicture:
-        return PathPicture(collect(flights, POINTS, scenario), without_runs(flights), scenario.name)
-
-    def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-        plots = collect(flights, PAGE_POINTS, scenario)
-        planes, scene = [plane_data(plot) for plot in plots.planes], _scene(scenario, flights, plots)
-        data = {
-            "times": rounded(plots.times),
-            "plots": [*planes, *(over_time_data(plot, flights) for plot in plots.over_time)],
-            "scene": scene,
-        }
-        space = views(flights, len(scene["times"]), "Path", _VIEWS)
-        return PageParts(
-            data,
-            views=(*(plane_box(plot) for plot in planes), "<h2>In space</h2>", space),
-            units=_units(scenario),
-            scripts=("planes.js", "space.js", "orbit.js"),
-        )
-
-
-REPORT: BodyReport = LibrationPointReport()
+def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
+    """Show the path in planes and in space, with what is held, and the control over time."""
+    plots = collect(flights, PAGE_POINTS, scenario)
+    planes, scene = [plane_data(plot) for plot in plots.planes], _scene(scenario, flights, plots)
+    data = {
+        "times": rounded(plots.times),
+        "plots": [*planes, *(over_time_data(plot, flights) for plot in plots.over_time)],
+        "scene": scene,
+    }
+    space = views(flights, len(scene["times"]), "Path", _VIEWS)
+    return PageParts(
+        data,
+        views=(*(plane_box(plot) for plot in planes), "<h2>In space</h2>", space),
+        units=_units(scenario),
+        scripts=("planes.js", "space.js", "orbit.js"),
+    )
 
 
 def _space(plots: PathPlots, flights: Sequence[Flight], name: str) -> Any:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,13 +15,12 @@ from starhold.analysis.rigid_body import DECADES
 from starhold.parts.craft import EARTH, total_inertia
 from starhold.report import transients
 from starhold.report.attitude_plots import ACCURACIES, AttitudePlots, collect, early, steps_within, until
-from starhold.report.body import BodyReport, PageParts, Sampling
-from starhold.report.colours import colour
-from starhold.report.figures import POINTS, blank, over_time, width_of, without_runs
+from starhold.report.body import PageParts, Sampling
+from starhold.report.figures import POINTS, Picture, blank, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import panel_data, rounded, views
-from starhold.report.plots import Panel, Plot, thinning
+from starhold.report.plots import Panel, Plot, colour, thinning
 from starhold.studies.flight import Flight
 
 if TYPE_CHECKING:
@@ -47,71 +46,47 @@ _ORBITAL = (
 )
 
 
-class AttitudePicture(NamedTuple):
-    """The figures of a body that turns."""
-
-    plots: AttitudePlots
-    flights: list[Flight]
-    name: str
-    transient: AttitudePlots | None = None
-
-    def makers(self) -> dict[str, Callable[[], Any]]:
-        """The plots over time, the steps to an accuracy, and angle and torque of the transient alone where it is short."""
-        plots, flights, name, first = self
-        drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, plots.roll_pitch_yaw, *plots.further)
-        makers: dict[str, Callable[[], Any]] = {
-            plot.name: partial(over_time, plot, plots.times, plots.marks, flights, name) for plot in drawn
-        }
-        if first is not None:
-            for plot in (first.angle, first.torque):
-                cut = replace(plot, title=f"{plot.title}, transient")
-                makers[f"{plot.name}-transient"] = partial(over_time, cut, first.times, first.marks, flights, name)
-        return makers | {"accuracy": partial(_accuracy_figure, flights, name)}
+def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
+    """Draw the attitude over time, the steps to an accuracy, and angle and torque of a short transient alone."""
+    plots, shown, name = collect(flights, POINTS, scenario), without_runs(flights), scenario.name
+    drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, plots.roll_pitch_yaw, *plots.further)
+    figures: Picture = {plot.name: partial(over_time, plot, plots.times, plots.marks, shown, name) for plot in drawn}
+    if (end := early(flights)) is not None:
+        first = collect(until(flights, end), POINTS, scenario, end)
+        for plot in (first.angle, first.torque):
+            cut = replace(plot, title=f"{plot.title}, transient")
+            figures[f"{plot.name}-transient"] = partial(over_time, cut, first.times, first.marks, shown, name)
+    return figures | {"accuracy": partial(_accuracy_figure, shown, name)}
 
 
-@final
-class RigidBodyReport:
-    """The attitude over time, and the body as a box that turns."""
+def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
+    """Show the attitude over time, and the body as a box that turns."""
+    # It needs much of SciPy, which pictures, made before the table is printed, do without.
+    from starhold.report.linear_loop import section
 
-    def picture(self, flights: Sequence[Flight], scenario: Scenario) -> AttitudePicture:
-        end = early(flights)
-        transient = None if end is None else collect(until(flights, end), POINTS, scenario, end)
-        return AttitudePicture(collect(flights, POINTS, scenario), without_runs(flights), scenario.name, transient)
-
-    def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-        # It needs much of SciPy, which pictures, made before the table is printed, do without.
-        from starhold.report.linear_loop import section
-
-        plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
-        scene = _scene(scenario, flights)
-        data = {
-            "times": rounded(plots.times),
-            "plots": [*_drawn(plots, flights), _accuracy(flights)],
-            "scene": scene,
-        }
-        longest = max(len(flight.recording["time"]) for flight in flights)
-        sampling = Sampling(thinning(longest, PAGE_POINTS))
-        if end is not None:
-            early_flights = until(flights, end)
-            count = max(len(flight.recording["time"]) for flight in early_flights)
-            sampling = sampling._replace(early=(count, thinning(count, EARLY_POINTS)))
-            first = collect(early_flights, EARLY_POINTS, scenario, end)
-            drawn = {one["name"]: one for one in _drawn(first, flights)}
-            data["transient"] = {"times": rounded(first.times), "plots": drawn}
-        return PageParts(
-            data,
-            views=("<h2>The turning body</h2>", views(flights, len(scene["times"]), "Attitude", _simplification(scene))),
-            measured=transients.section(flights),
-            transient=end,
-            settings="Spacecraft and settings",
-            units=section(scenario, flights),
-            scripts=("space.js", "body.js"),
-            footer=f"; seed {scenario.table.simulation.seed}",
-            sampling=sampling,
-        )
-
-
-REPORT: BodyReport = RigidBodyReport()
+    plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
+    scene = _scene(scenario, flights)
+    data = {"times": rounded(plots.times), "plots": [*_drawn(plots, flights), _accuracy(flights)], "scene": scene}
+    longest = max(len(flight.recording["time"]) for flight in flights)
+    sampling = Sampling(thinning(longest, PAGE_POINTS))
+    if end is not None:
+        early_flights = until(flights, end)
+        count = max(len(flight.recording["time"]) for flight in early_flights)
+        sampling = sampling._replace(early=(count, thinning(count, EARLY_POINTS)))
+        first = collect(early_flights, EARLY_POINTS, scenario, end)
+        drawn = {one["name"]: one for one in _drawn(first, flights)}
+        data["transient"] = {"times": rounded(first.times), "plots": drawn}
+    return PageParts(
+        data,
+        views=("<h2>The turning body</h2>", views(flights, len(scene["times"]), "Attitude", _simplification(scene))),
+        measured=transients.section(flights),
+        transient=end,
+        settings="Spacecraft and settings",
+        units=section(scenario, flights),
+        scripts=("space.js", "body.js"),
+        footer=f"; seed {scenario.table.simulation.seed}",
+        sampling=sampling,
+    )
 
 
 def _accuracy_figure(flights: Sequence[Flight], name: str) -> Any:
@@ -201,8 +176,7 @@ def _box(inertia: Any) -> tuple[Any, Any]:
     """Half edges of the uniform box with this inertia, the longest 0.95, and its axes as columns, in body axes.
 
     For edges 2a, 2b, 2c a moment is proportional to b^2 + c^2, thus a^2 to the other two moments' sum less its own.
-    Edges that would vanish (a flat body has them) are shown as a tenth of the longest.
-    """
+    Edges that would vanish (a flat body has them) are shown as a tenth of the longest."""
     full = np.asarray(inertia, dtype=float)
     if full.ndim == 1:
         moments, axes = full, np.eye(3)

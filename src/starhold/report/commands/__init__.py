@@ -23,9 +23,10 @@ class Column(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Words of a table with a look of their own. kind: "law", in the colour of the law of this number; an outcome, "met",
-    "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of the column below it; "shade", in
-    the colour that detail names, the stronger the farther the number is from 0; else detail says what the words mean."""
+    """Words of a table with a look of their own. kind: "law", in the colour of the law of this number, or "name" where it
+    names its row; an outcome, "met", "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of
+    the column below it; "shade", in the colour that detail names, the stronger the farther the number is from 0; else detail
+    says what the words mean."""
 
     text: str
     kind: str = ""
@@ -124,8 +125,7 @@ class Command(NamedTuple):
     with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
     whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
     command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
-    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq.
-    """
+    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq."""
 
     summary: str
     suffix: str

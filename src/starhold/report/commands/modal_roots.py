@@ -66,8 +66,8 @@ def draw(result: Study, title: str) -> Any:
     """The figure: roots, times and rates over the angle; errors of the fits where there are any."""
     import numpy as np
 
-    from starhold.report.colours import COLOURS
     from starhold.report.figures import framed, plain
+    from starhold.report.plots import COLOURS
 
     fits, angles = result.fits(), np.degrees(result.angles)
     ratios = [1.5, 0.8, 1.0] if fits else [1.5, 1.0]

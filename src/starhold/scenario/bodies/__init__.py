@@ -1,8 +1,6 @@
 """The bodies that scenarios can be about: each module or folder here defines the tables of one, which is named nowhere else;
 `any_body` defines those of all others."""
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Mapping
 from difflib import get_close_matches

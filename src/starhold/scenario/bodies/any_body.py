@@ -237,7 +237,7 @@ def _example(part: Part) -> str:
     examples = part.examples() if part.hook("examples") else []
     for item, value in zip(_params(part), examples[0] if examples else (), strict=False):
         if not (isinstance(value, float) and math.isinf(value)):
-            lines.append(f"{item.name} = {json.dumps(item.gain.choices[value] if item.gain.choices else value)}")
+            lines.append(f"{item.name} = {json.dumps(item.written(value))}")
     lines.append("[initial]")
     lines += [f"{item.name} = {json.dumps(_within(item.gain))}" for item in _state(part) if item.required]
     return "\n".join([*lines, "[simulation]", "duration = 1.0", "control_period = 0.01\n"])

@@ -42,12 +42,7 @@ class LibrationPointStudy(BodyStudy):
         return measure(run, units, goal, float(attrs["settling_tolerance"]))
 
     def meter(
-        self,
-        scenario: Scenario,
-        loop: ClosedLoop,
-        gains: Any,
-        extras: Sequence[str] = (),
-        cones: Cones = NO_CONES,
+        self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES
     ) -> Meter:
         nothing_more(extras, cones)
         units, tolerance = scenario.table.libration.units, scenario.table.settling.tolerance

@@ -59,12 +59,7 @@ class RigidBodyStudy(BodyStudy):
         return metrics | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, metrics["cut_off"])
 
     def meter(
-        self,
-        scenario: Scenario,
-        loop: ClosedLoop,
-        gains: Any,
-        extras: Sequence[str] = (),
-        cones: Cones = NO_CONES,
+        self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES
     ) -> Meter:
         for extra in extras:
             if extra not in EXTRAS:

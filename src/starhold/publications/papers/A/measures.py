@@ -1,7 +1,5 @@
 """Matrices, conditions and counts of the publication on linear-quadratic stabilisation, which no scenario holds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -90,10 +90,7 @@ def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
     bound = random.uniform(0.0, 2.0, size=cases)
     falls = s * (torque - bound * np.sign(s)) <= 0.0
     return Finding(
-        {
-            "g >= |M|": bool(falls[bound >= np.abs(torque)].all()),
-            "g >= M as printed": bool(falls[bound >= torque].all()),
-        }
+        {"g >= |M|": bool(falls[bound >= np.abs(torque)].all()), "g >= M as printed": bool(falls[bound >= torque].all())}
     )
 
 

@@ -1,23 +1,19 @@
 """Flights of the three laws are compared with the statements of the publication, and drawn as it draws them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.metrics import stays_within
+from starhold.analysis.meter import stays_within
 from starhold.parts.craft import tensor
+from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.measures import samples
 from starhold.publications.verdicts import Finding
 from starhold.simulation.lane import fly
-
-if TYPE_CHECKING:
-    from starhold.publications.desk import Desk
 
 Array = NDArray[np.float64]
 LAWS = ("lyapunov", "sliding", "mpc")

@@ -1,7 +1,5 @@
 """The closed loop of the publication on reaction wheels, its regions of gains and its optimum, which no scenario holds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import permutations
 from typing import Any

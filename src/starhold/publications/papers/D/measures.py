@@ -1,8 +1,6 @@
 """Measures of this publication's turns: the roots that turn fastest within limits, the fits through them, the printed turn,
 and the effects of the control period and of external torque on it. Those of its linear model stand in `placement`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The publication's linear model, its levels and its regulators are compared with placement by the general algorithm."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeAlias
 

@@ -1,24 +1,20 @@
 """Section 2 is measured: the example (2.2), and an example of each theorem."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from starhold.algebra.polynomial import Polynomial
 from starhold.algebra.scalar import less, maximum, where
+from starhold.certification.certificate import Certificate
 from starhold.certification.invariant import InvariantProblem, certify, load
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
 from starhold.studies.phase_portraits import paths, portraits
-
-if TYPE_CHECKING:
-    from starhold.certification.certificate import Certificate
 
 WINDOW = ((-1.5, 3.5), (-2.0, 2.5))
 """The span of figure 1, by the numbers on its axes."""

@@ -1,7 +1,5 @@
 """Section 3 is measured: the linear model, rest and the circle beside L2 as they are flown."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Sections 3.1 and 3.4 are measured: where the Sun is seen from, and how its light gives the control."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

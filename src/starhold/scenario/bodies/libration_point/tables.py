@@ -94,8 +94,7 @@ class Resources(Table):
         float | None, *quantity(Gain("1", at_least=0.0, text="share by which the limit exceeds the circle's peak demand"))
     ] = None
     deficit: Annotated[
-        float | None,
-        *quantity(Gain("1", at_least=0.0, at_most=0.99, text="share by which it falls short of that demand")),
+        float | None, *quantity(Gain("1", at_least=0.0, at_most=0.99, text="share by which it falls short of that demand"))
     ] = None
     lag: Annotated[float | None, *scaled("time", Gain("s", at_least=0.0, text="time constant of the control surfaces"))] = (
         None
@@ -118,8 +117,7 @@ class ControlTable(Resources):
     """The default control limits and lag of all laws."""
 
     limit_kind: Annotated[
-        Literal["norm", "axis", "none"],
-        Field(description="whether the limit holds for the norm, each axis, or not at all"),
+        Literal["norm", "axis", "none"], Field(description="whether the limit holds for the norm, each axis, or not at all")
     ] = "norm"
 
 

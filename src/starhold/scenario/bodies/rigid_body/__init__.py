@@ -10,10 +10,9 @@ from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.modes import join_targets
 from starhold.parts.part import Fitted
-from starhold.scenario.bodies.rigid_body.craft import Made, effectors_of, make
+from starhold.scenario.bodies.rigid_body.craft import Made, effectors_of, make, written_out
 from starhold.scenario.bodies.rigid_body.dials import Dials
 from starhold.scenario.bodies.rigid_body.faults import make_events
-from starhold.scenario.bodies.rigid_body.short_forms import written_out
 from starhold.scenario.bodies.rigid_body.start import mode_target, start_of, target_of, told_to_design
 from starhold.scenario.bodies.rigid_body.tables import AttitudeLawTable, RigidBodyTable
 

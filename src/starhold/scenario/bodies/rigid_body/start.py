@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.cosines import from_angles
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, stretch, to_body
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, most, subtract
 from starhold.errors import InputError
-from starhold.export.aem import from_date
+from starhold.export.aem import OFF_UNIT, from_date, read_aem
+from starhold.files import read_text
 from starhold.laws.interface import Start
 from starhold.loop.step import total
 from starhold.parts.bodies.rigid_body import State
@@ -24,10 +28,9 @@ from starhold.parts.part import Fitted
 from starhold.parts.roles import Goal
 from starhold.parts.targets import history
 from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque, torque_limit
-from starhold.scenario.bodies.rigid_body.history import read_history
 from starhold.scenario.bodies.rigid_body.tables import Pointing, TargetTable
 from starhold.scenario.checking import show, validate
-from starhold.scenario.parts import read_part
+from starhold.scenario.parts import number_in, read_part
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -74,7 +77,7 @@ def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
     if not isinstance(given, dict):
         raise InputError(scenario.where, key, show(given), 'a table, such as { mode = "orbital" } or { type = "a target" }')
     if "type" in given or ("file" in given and "mode" not in given):
-        table, shared = cast(dict[str, Any], given), scenario.table.shared
+        table, shared = cast("dict[str, Any]", given), scenario.table.shared
         target = read_part(table, "rigid-body", scenario.folder, scenario.where, key, shared, units)
         if target.part.role != "target":
             raise InputError(scenario.where, key, f"{target.part.name}, of the role {target.part.role}", "a target")
@@ -160,3 +163,58 @@ def told_to_design(scenario: Scenario, sign: str) -> Start:
     room = min((f.part.module.capacity(f.start, f.params) for f in effectors), default=math.inf)
     tolerances = table.settling
     return Start(error, rate, stored, torque, room, tolerances.attitude_tolerance, tolerances.rate_tolerance)
+
+
+COLUMNS = ("time", "q0", "q1", "q2", "q3")
+
+
+def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+    """Times (n,) in s, quaternions (n, 4), scalar first, and the name of the reference frame, "" for none. Columns that are
+    named may stand in any order; without names they are those of COLUMNS. A file that ends in .aem is an attitude ephemeris
+    message, whose first epoch is time 0.
+
+    Raises OSError, or ValueError that names the line and what is wrong with it."""
+    if path.suffix.lower() == ".aem":
+        message = read_aem(path)
+        return message.times, message.attitudes, message.frame
+    rows: list[list[float]] = []
+    order = list(range(len(COLUMNS)))
+    for number, cells in enumerate(csv.reader(read_text(path).splitlines()), 1):
+        cells = [cell.strip() for cell in cells]
+        if not any(cells):
+            continue
+        if not rows and number_in(cells[0]) is None:
+            order = _order(cells, number)
+            continue
+        rows.append(_numbers(cells, order, number))
+    if len(rows) < 2:
+        raise ValueError(f"{len(rows)} rows of numbers")
+    table = np.array(rows)
+    backwards = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
+    if len(backwards):
+        later, earlier = table[backwards[0] + 1, 0], table[backwards[0], 0]
+        raise ValueError(f"a time of {later:g} s after one of {earlier:g} s")
+    return table[:, 0], table[:, 1:], ""
+
+
+def _order(names: list[str], line: int) -> list[int]:
+    """Where each of COLUMNS stands among the named columns."""
+    given = [name.lower() for name in names]
+    if sorted(given) != sorted(COLUMNS):
+        raise ValueError(f"line {line}: columns {', '.join(names)}")
+    return [given.index(name) for name in COLUMNS]
+
+
+def _numbers(cells: list[str], order: list[int], line: int) -> list[float]:
+    if len(cells) != len(COLUMNS):
+        raise ValueError(f"line {line}: {len(cells)} columns")
+    row: list[float] = []
+    for place in order:
+        number = number_in(cells[place])
+        if number is None or not math.isfinite(number):
+            raise ValueError(f"line {line}: {cells[place]!r}, which is no finite number")
+        row.append(number)
+    length = math.hypot(*row[1:])
+    if abs(length - 1.0) > OFF_UNIT:
+        raise ValueError(f"line {line}: a quaternion of length {length:.6g}")
+    return row

@@ -13,12 +13,63 @@ from starhold.laws.interface import Gain
 from starhold.parts.craft import check_inertia
 from starhold.parts.epoch import START
 from starhold.parts.stated_attitude import check_attitude
-from starhold.scenario.bodies.rigid_body.budget import BudgetTable
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.orbit import Orbit
 from starhold.scenario.quantity import quantity, quantity_or, reader
 from starhold.scenario.schema import LawTable, ScenarioTable, SeededTiming
 from starhold.scenario.tables import Flag, Table, at_key, refuse
+
+MOST_RUNS = 100_000
+ANGLE = "largest of all sources together, about the boresight where there is one"
+
+
+def _at_most(index: str) -> Any:
+    return quantity(Gain("rad", above=0.0, text=f"{index}, {ANGLE}"))
+
+
+class PointingRequirement(Table):
+    """The largest errors that are allowed."""
+
+    ape: Annotated[float | None, *_at_most("absolute performance error")] = None
+    mpe: Annotated[float | None, *_at_most("mean performance error")] = None
+    rpe: Annotated[float | None, *_at_most("relative performance error")] = None
+    pde: Annotated[float | None, *_at_most("performance drift error")] = None
+
+
+class BudgetTable(Table):
+    """How `starhold budget` takes pointing errors."""
+
+    start: Annotated[
+        float | None, *quantity(Gain("s", at_least=0.0, text="errors count from here on; half of the run if absent"))
+    ] = None
+    window: Annotated[
+        float | None, *quantity(Gain("s", above=0.0, text="length of windows; a tenth of what counts if absent"))
+    ] = None
+    separation: Annotated[
+        float | None,
+        *quantity(Gain("s", above=0.0, text="between the starts of two windows of a drift; half of what counts if absent")),
+    ] = None
+    confidence: Annotated[
+        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="share of the errors that are no larger, such as 95 %"))
+    ] = 0.9973
+    interpretation: Annotated[
+        Literal["mixed", "temporal", "ensemble"],
+        Field(description="a share of all instants of all runs, of those of the worst run, or of runs at their worst"),
+    ] = "mixed"
+    runs: Annotated[
+        int, *quantity(Gain("1", at_least=1, at_most=MOST_RUNS, whole=True, text="with random numbers of their own"))
+    ] = 32
+    boresight: Annotated[
+        Any, *quantity(Gain("1", shape=(3,), spread=False, text="line of sight, body axes; all three axes if absent"))
+    ] = None
+    requirement: PointingRequirement = PointingRequirement()
+
+    @model_validator(mode="after")
+    def _has_a_direction(self) -> BudgetTable:
+        if self.boresight is not None and not any(self.boresight):
+            raise at_key("boresight", "a direction that is not zero", list(self.boresight))
+        return self
+
 
 QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first, normalised on reading")
 ANGLES = Gain("rad", shape=(3,), spread=False, text="Tait-Bryan (3-2-1) angles yaw, pitch, roll")
@@ -50,8 +101,7 @@ class Spacecraft(Table):
     inertia: Annotated[Any, *INERTIA]
     torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, text="largest torque"))] = math.inf
     limit: Annotated[
-        Literal["axis", "norm", "none"],
-        Field(description="whether the limit holds for each axis, the norm, or not at all"),
+        Literal["axis", "norm", "none"], Field(description="whether the limit holds for each axis, the norm, or not at all")
     ] = "axis"
     actuator_lag: Annotated[float, *quantity(Gain("s", at_least=0.0, text="time constant of the actuators"))] = 0.0
     torque_rate_limit: Annotated[float, *quantity(Gain("N m/s", above=0.0, text="fastest change of each torque"))] = math.inf
@@ -96,8 +146,7 @@ class TargetTable(Pointing):
         Field(description="fixed, third axis to the centre of attraction, or as a file tells over time"),
     ] = "inertial"
     file: Annotated[
-        str | None,
-        Field(description="history beside the scenario: CSV of time (s), q0, q1, q2, q3, or a CCSDS AEM (.aem)"),
+        str | None, Field(description="history beside the scenario: CSV of time (s), q0, q1, q2, q3, or a CCSDS AEM (.aem)")
     ] = None
 
     @model_validator(mode="after")
@@ -185,8 +234,7 @@ class FaultTable(Table):
     inertia: Annotated[Any, *INERTIA] = None
     delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
     action: Annotated[
-        Action,
-        Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both"),
+        Action, Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both")
     ] = "both"
     """Unless it is "none", the law knows the new inertia from the diagnosis on."""
 
