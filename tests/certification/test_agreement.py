@@ -58,7 +58,10 @@ def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_
     undecided = {claim.kind for claim in certificate.claims if claim.outcome == "undecided"}
     assert len(undecided) == 3 + ("sampling" in undecided)
     assert ("sampling" in undecided) == (law == "sliding")
-    assert passed(checked(certificate, tmp_path))
+    found = checked(certificate, tmp_path)
+    assert passed(found)
+    assert {f.claim for f in found if f.verdict == "not claimed"} == undecided
+    assert not any(f.verdict == "holds" for f in found if f.claim in undecided)
 
 
 @pytest.mark.parametrize("compensation", [0.0, 0.3, 1.0])
