@@ -257,7 +257,7 @@ def struck(action):
 
 
 @pytest.mark.parametrize(("action", "names"), [("both", ["wheel", "wheel from 70 s"]), ("none", ["wheel"])])
-def test_the_certificate_is_issued_again_once_the_fault_is_known(action, names):
+def test_the_certificate_is_issued_again_once_the_fault_is_known(action, names, tmp_path):
     scenario = struck(action)
     entry = scenario.laws[0]
     found = certify_law(scenario, entry, build(scenario, entry))
@@ -270,8 +270,11 @@ def test_the_certificate_is_issued_again_once_the_fault_is_known(action, names):
         # The state in flight at that moment, with what the lost wheel holds.
         assert after.subject["wheels"]["momentum"][1] != 0.0
         assert after.claim("wheels").numbers["motors"][1] == 0.0
+        write([before, after], "struck", tmp_path / "c.json")
+        assert passed(check_file(tmp_path / "c.json"))
 
 
+@pytest.mark.slow
 def test_what_is_issued_again_is_checked_and_flown(tmp_path):
     tried = certify_scenario(struck("both"), "wheel")
     write([found.certificate for found in tried], "struck", tmp_path / "c.json")
