@@ -31,6 +31,7 @@ from starhold.studies.compare import fly_law, prove
 from tests.making import built
 from tests.missions import BASE as MISSION
 from tests.missions import DETUMBLE, POINT
+from tests.tiers import fewer
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
@@ -156,7 +157,7 @@ def test_a_flight_that_is_driven_out_of_its_set_is_told_when():
 
 
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.tuples(*[st.floats(-0.06, 0.06)] * 3))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=fewer(30))
 def test_the_limit_is_kept_by_every_flight_that_does_not_leave_the_claim(turn, rate):
     """The theorem: from inside the set and under the assumptions nothing is left, and no torque reaches the limit."""
     loop, certificate = kept_loop()
@@ -324,7 +325,7 @@ def test_a_hand_over_is_left_where_the_next_mode_holds_its_torque_for_too_long()
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=60), st.floats(0.05, 0.9))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=fewer(60))
 def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
     loop = replace(built(parse(BASE + LAW, "here")), sign_policy="hysteresis", hysteresis_width=width)
     errors = np.array([(q0, np.sqrt(max(0.0, 1.0 - q0 * q0)), 0.0, 0.0) for q0 in cosines])

@@ -187,7 +187,6 @@ def test_what_holds_is_not_refuted():
     for law, gains, wanted in (
         ("pd", pd.Gains(0.09, 0.009), Wanted()),
         ("sliding", Sliding((0.08,) * 3, (5e-3,) * 3), Wanted()),
-        ("lqr", lqr.design(PRINCIPAL, LOPSIDED), Wanted()),
         ("lqr", lqr.design(PRINCIPAL, UNEVEN), Wanted(slew_angle=math.radians(40.0))),
     ):
         claims, _ = proved_claims(make_subject(loop_of(law, gains, PRINCIPAL)), wanted.slew_angle, wanted.rate)
