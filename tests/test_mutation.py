@@ -56,4 +56,4 @@ def test_nearest_tests_are_those_of_the_module():
     near = nearest(ROOT, Path("starhold/parts/effectors/wheels.py"))
     assert near[0] == "tests/parts/test_wheels.py"
     assert "tests/wheels/test_limits.py" in near
-    assert "tests/certification/test_checker.py" in nearest(ROOT, Path("starhold/checker/well.py"))
+    assert "tests/certification/test_checker_files.py" in nearest(ROOT, Path("starhold/checker/well.py"))

@@ -13,6 +13,7 @@ from starhold.simulation.lane import fly
 from starhold.studies.compare import build, fly_law
 from tests.refusals import refused
 from tests.running import starhold
+from tests.tiers import leading
 
 SHORT = {"simulation.duration": 20.0, "simulation.record_every": 3}
 THREE = sh.load("three-laws").with_(SHORT)
@@ -79,23 +80,27 @@ def test_every_row_is_what_a_comparison_of_the_changed_scenario_measures(kind):
             assert same(row[name], value), (row, name, value)
 
 
-def test_metrics_of_a_run_are_those_of_its_flight_and_of_its_file(tmp_path):
-    for scenario in (THREE, POINT, sh.load("landing").with_({"simulation.duration": 5.0})):
-        (tmp_path / "s.toml").write_text(scenario.text)
-        starhold("run", "s.toml", "--no-certify", "-o", "out", "--force", cwd=tmp_path, code=0)
-        entry = scenario.laws[0]
-        flight = fly_law(scenario, entry, build(scenario, entry))
-        run = sh.simulate(scenario)
-        with xr.open_dataset(tmp_path / "out" / "run.nc") as read:
-            assert set(read.attrs) == set(run.attrs)
-            for name, value in run.attrs.items():
-                assert np.array_equal(read.attrs[name], value), name
-            for found in (sh.metrics(run), sh.metrics(read)):
-                assert set(flight.metrics) - set(found) <= {"cost_median", "cost_worst"}
-                for name, value in found.items():
-                    assert flight.metrics[name] == value, name
-        assert sh.metrics(flight) == flight.metrics
-        assert "diverged_at" not in run.attrs
+LANDING = sh.load("landing")
+ALONE = {"simulation.duration": 5.0} | {f"law.{entry.name}": None for entry in LANDING.laws[1:]}
+
+
+@pytest.mark.parametrize("scenario", leading([POINT, LANDING.with_(ALONE), THREE], 2))
+def test_metrics_of_a_run_are_those_of_its_flight_and_of_its_file(scenario, tmp_path):
+    (tmp_path / "s.toml").write_text(scenario.text)
+    starhold("run", "s.toml", "--no-certify", "-o", "out", cwd=tmp_path, code=0)
+    entry = scenario.laws[0]
+    flight = fly_law(scenario, entry, build(scenario, entry))
+    run = sh.simulate(scenario)
+    with xr.open_dataset(tmp_path / "out" / "run.nc") as read:
+        assert set(read.attrs) == set(run.attrs)
+        for name, value in run.attrs.items():
+            assert np.array_equal(read.attrs[name], value), name
+        for found in (sh.metrics(run), sh.metrics(read)):
+            assert set(flight.metrics) - set(found) <= {"cost_median", "cost_worst"}
+            for name, value in found.items():
+                assert flight.metrics[name] == value, name
+    assert sh.metrics(flight) == flight.metrics
+    assert "diverged_at" not in run.attrs
 
 
 def test_batched_flights_have_the_samples_of_single_ones_lost_ones_included():

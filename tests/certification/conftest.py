@@ -1,8 +1,6 @@
-"""Certificates that the certifier makes once for all tests of the checker."""
+"""Files of certificates that the certifier makes once for all tests of a worker."""
 
 import json
-from functools import cache
-from pathlib import Path
 
 import pytest
 
@@ -10,16 +8,12 @@ from starhold.certification.certificate import write
 from tests.certification.loops import certified
 
 
-@cache
-def _made(name, sign_policy, disturbance, tmp):
-    path = Path(tmp) / f"{name}-{sign_policy}-{disturbance}.json"
-    write([certified(name, sign_policy, disturbance)], "made", path)
-    return path.read_text(encoding="utf-8")
+@pytest.fixture
+def made(tmp_path):
+    """Make what stands in the file of a textbook loop's certificate."""
 
+    def make(name, sign_policy="as_published"):
+        write([certified(name, sign_policy)], "made", tmp_path / "made.json")
+        return json.loads((tmp_path / "made.json").read_text(encoding="utf-8"))
 
-@pytest.fixture(scope="session")
-def made(tmp_path_factory):
-    folder = str(tmp_path_factory.mktemp("certificates"))
-    return lambda name, sign_policy="as_published", disturbance=0.0: json.loads(
-        _made(name, sign_policy, disturbance, folder)
-    )
+    return make

@@ -11,7 +11,6 @@ from starhold.certification.certify import Wanted, certify
 from starhold.conformance.bench import sample_loop
 from starhold.laws import lqr, matrix_pd
 from starhold.laws.catalogue import catalogue
-from starhold.laws.interface import fields
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.contract import Noise
 from starhold.parts.craft import bare_inertia, make_craft, tensor
@@ -65,13 +64,9 @@ def textbook():
     return found
 
 
+@cache
 def certified(name, sign_policy="as_published", disturbance=0.0):
     """The certificate of a loop of these, made once for all tests of a worker."""
-    return _certified(name, sign_policy, disturbance)
-
-
-@cache
-def _certified(name, sign_policy, disturbance):
     loop = textbook()[name]
     loop = loop_of(loop.law.name, loop.gains, loop.craft, sign_policy=sign_policy)
     return certify(loop, name, Wanted(disturbance=disturbance))
@@ -103,11 +98,6 @@ def random_craft(random):
     points = random.normal(size=(6, 3)) * random.uniform(0.5, 2.0, size=3)
     inertia = np.trace(points.T @ points) * np.eye(3) - points.T @ points
     return make_craft(inertia, torque_limit=0.05)
-
-
-def gain_names(law):
-    """The names of a law's gains."""
-    return [item.name for item in fields(catalogue()[law].gains)]
 
 
 def is_pointing(claim):

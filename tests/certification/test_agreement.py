@@ -17,12 +17,13 @@ from starhold.parts.craft import make_craft
 from tests.certification.edits import checked
 from tests.certification.hunt import contradicted, fault_in, random_scenario
 from tests.certification.loops import energy, free, loop_of, rotors
+from tests.tiers import leading
 
-FOUND = (12, 15, 22, 30, 58, 66, 71, 90, 91, 98, 111, 118, 196, 2102, 2489, 3239)
-"""Seeds of scenarios that certifier, checker or flights once did not agree on."""
+FOUND = (12, 15, 30, 58, 66, 90, 91, 98, 118, 2489, 3239, 22, 71, 111, 196, 2102)
+"""Seeds of scenarios that certifier, checker or flights once did not agree on, last those that take long."""
 
 
-@pytest.mark.parametrize("seed", FOUND)
+@pytest.mark.parametrize("seed", leading(FOUND, 11))
 def test_hunted_scenarios(seed, tmp_path):
     text = random_scenario(np.random.default_rng(seed), tmp_path)
     assert fault_in(text, tmp_path) == ""
@@ -48,8 +49,9 @@ def test_no_flight_contradicts_what_is_proved_of_flights_like_it(first, tmp_path
 # --- what is asked of laws without V --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("wheels", [False, True])
-@pytest.mark.parametrize("law", ["sliding", "modal"])
+@pytest.mark.parametrize(
+    ("law", "wheels"), leading([("sliding", True), ("modal", False), ("sliding", False), ("modal", True)], 2)
+)
 def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_path):
     wanted = Wanted(rate=math.inf, slew_angle=1.0, inertia_tolerance=0.1)
     gains = catalogue()[law].examples()[0]
@@ -58,7 +60,10 @@ def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_
     undecided = {claim.kind for claim in certificate.claims if claim.outcome == "undecided"}
     assert len(undecided) == 3 + ("sampling" in undecided)
     assert ("sampling" in undecided) == (law == "sliding")
-    assert passed(checked(certificate, tmp_path))
+    found = checked(certificate, tmp_path)
+    assert passed(found)
+    assert {f.claim for f in found if f.verdict == "not claimed"} == undecided
+    assert not any(f.verdict == "holds" for f in found if f.claim in undecided)
 
 
 @pytest.mark.parametrize("compensation", [0.0, 0.3, 1.0])
@@ -73,8 +78,15 @@ def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tm
 # --- numbers at the edge --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("law", ["pd", "wheel"])
-@pytest.mark.parametrize("slew_angle", [1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0])
+@pytest.mark.parametrize(
+    ("law", "slew_angle"),
+    [
+        # Each angle for one of the laws; the other pairs are slow.
+        pytest.param(law, angle, marks=pytest.mark.slow if place % 2 == number else ())
+        for number, law in enumerate(("pd", "wheel"))
+        for place, angle in enumerate((1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0))
+    ],
+)
 def test_the_set_of_a_turn_holds_it(law, slew_angle, tmp_path):
     gains = {"pd": pd.Gains(0.09, 0.009), "wheel": wheel.Gains(0.09, (0.0045,) * 3)}[law]
     certificate = certify(free(loop_of(law, gains)), law, Wanted(slew_angle=slew_angle))
@@ -92,9 +104,9 @@ THIN = ([1e-14, 1.0, 1.0], [1e-20, 1.0, 1.0], [1e-14, 1e-14, 1e-14], [1e3, 1e3, 
 @pytest.mark.parametrize(
     ("law", "number", "moments"),
     [
-        # All gains of a law on the first body, the first gains on all; what is left is slow.
-        pytest.param(law, number, moments, marks=pytest.mark.slow if number and place else ())
-        for law in ("pd", "lyapunov", "lqr", "sliding", "modal", "wheel")
+        # The first gains of each law on one of the bodies; what is left is slow.
+        pytest.param(law, number, moments, marks=pytest.mark.slow if number or place != turn % len(THIN) else ())
+        for turn, law in enumerate(("pd", "lyapunov", "lqr", "sliding", "modal", "wheel"))
         for number in range(1 if law == "modal" else len(catalogue()[law].examples()))
         for place, moments in enumerate(THIN)
     ],
@@ -132,7 +144,9 @@ def test_states_are_drawn_from_the_set_however_small_it_is():
             assert height(states).max() >= 0.9 * level
 
 
-@pytest.mark.parametrize(("rate", "attitude"), [(1e25, 1e26), (1e30, 1e30), (1e-25, 1e-20), (1e-30, 1e30), (1e30, 1e-30)])
+@pytest.mark.parametrize(
+    ("rate", "attitude"), leading([(1e25, 1e26), (1e-30, 1e30), (1e30, 1e30), (1e-25, 1e-20), (1e30, 1e-30)], 2)
+)
 def test_gains_that_floats_cannot_fly_are_certified_all_the_same(rate, attitude, tmp_path):
     text = 'name = "far"\n[spacecraft]\ninertia = [2, 3, 4]\n[simulation]\nduration = 10\n'
     for law in ("lyapunov", "pd"):

@@ -11,6 +11,7 @@ from starhold.certification.invariant.search import Candidate, closed_cells
 from starhold.checker import check_file, passed
 from tests.certification.invariants import ORIGIN as AT_ORIGIN
 from tests.certification.invariants import SQUARE, claim, expression, file, fractions, system
+from tests.tiers import leading
 
 ORIGIN, ROUND = (0, 0), "x**2 + y**2"
 ON = (
@@ -34,8 +35,15 @@ def written(folder, x="-x", y="-y", V=ROUND, theorem="region", equilibrium=AT_OR
     return found, check_file(folder / "c.json")
 
 
-@pytest.mark.parametrize("on", ON)
-@pytest.mark.parametrize("surface", ["x", "x - y", "y - x**2"])
+@pytest.mark.parametrize(
+    ("on", "surface"),
+    [
+        # Each text on one surface; the other pairs are slow.
+        pytest.param(on, surface, marks=() if k % 3 == place else pytest.mark.slow)
+        for k, on in enumerate(ON)
+        for place, surface in enumerate(("x", "x - y", "y - x**2"))
+    ],
+)
 def test_a_function_that_is_another_on_a_surface_is_not_continuous(on, surface, tmp_path):
     V = f"{ROUND} - 5*{on.format(surface)}"
     found, said = written(tmp_path, V=V)
@@ -47,7 +55,7 @@ def test_a_function_that_is_another_on_a_surface_is_not_continuous(on, surface, 
         assert "V jumps at a state" in said[0].obligation
 
 
-@pytest.mark.parametrize("on", ON)
+@pytest.mark.parametrize("on", leading(reversed(ON), 2))
 def test_rates_that_are_others_on_a_surface_count(on, tmp_path):
     """(0, y) stays on x = 0 and grows there."""
     y = f"-y + 5*y*{on.format('x')}"
@@ -154,7 +162,7 @@ def on_lines(random):
     return [*found, (Fraction(3, 5), Fraction(4, 5)), (Fraction(5, 13), Fraction(-12, 13)), (Fraction(-1), Fraction(0))]
 
 
-@pytest.mark.parametrize("seed", [pytest.param(k, marks=pytest.mark.slow) if k in (3, 7) or k > 7 else k for k in range(60)])
+@pytest.mark.parametrize("seed", leading([1, 2, 4, 6, 0, 3, 5, *range(7, 60)], 4))
 def test_what_is_proved_holds_on_surfaces_too(seed, tmp_path):
     """By exact values of the texts, and by motions that keep to a line while the rates there point along it."""
     random = np.random.default_rng(seed)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import strategies as some
 
 from starhold.algebra.vector import ZERO
 from starhold.certification.certify import certify
@@ -13,6 +12,7 @@ from starhold.trace.calling import Compiled
 from tests.certification.loops import tensor, textbook
 from tests.kernel.oracle import number as number_of
 from tests.kernel.oracle import run
+from tests.tiers import leading
 
 LOOPS = textbook()
 
@@ -69,23 +69,26 @@ def largest_torque(loop, claim, level, kind):
 
 @pytest.mark.parametrize(
     ("name", "kind", "share"),
-    [
-        ("lyapunov-0", "norm", 0.96),
-        ("lyapunov-0", "axis", 0.95),
-        ("lyapunov-1", "norm", 0.98),
-        ("lyapunov-1", "axis", 0.98),
-        ("wheel-0", "norm", 0.96),
-        ("lqr-I", "norm", 0.98),
-        ("lqr-I", "axis", 0.97),
-        ("lqr-I-gyroscopic-left", "axis", 0.97),
-        pytest.param("lqr-I-gyroscopic-left", "norm", 0.97, marks=pytest.mark.slow),
-        pytest.param("lqr-III", "axis", 0.998, marks=pytest.mark.slow),
-        pytest.param("lqr-III", "norm", 0.97, marks=pytest.mark.slow),
-        ("pd-0", "norm", 0.998),
-        ("pd-0", "axis", 0.998),
-        ("matrix-pd-inertial", "norm", 0.87),
-        pytest.param("matrix-pd-inertial", "axis", 0.87, marks=pytest.mark.slow),
-    ],
+    leading(
+        [
+            ("lyapunov-0", "norm", 0.96),
+            ("lyapunov-1", "axis", 0.98),
+            ("pd-0", "norm", 0.998),
+            ("wheel-0", "norm", 0.96),
+            ("lqr-I", "axis", 0.97),
+            ("lyapunov-0", "axis", 0.95),
+            ("lyapunov-1", "norm", 0.98),
+            ("lqr-I", "norm", 0.98),
+            ("lqr-I-gyroscopic-left", "axis", 0.97),
+            ("lqr-I-gyroscopic-left", "norm", 0.97),
+            ("lqr-III", "axis", 0.998),
+            ("lqr-III", "norm", 0.97),
+            ("pd-0", "axis", 0.998),
+            ("matrix-pd-inertial", "norm", 0.87),
+            ("matrix-pd-inertial", "axis", 0.87),
+        ],
+        3,
+    ),
 )
 def test_the_level_under_a_torque_limit_against_the_largest_that_is_safe(name, kind, share):
     """No state within the level needs more torque than the limit, and one within level/share does."""
@@ -95,6 +98,3 @@ def test_the_level_under_a_torque_limit_against_the_largest_that_is_safe(name, k
     limit, level = claim.numbers["limit"], claim.numbers["level"]
     assert largest_torque(loop, claim, level, kind) <= limit * (1.0 + 1e-12)
     assert largest_torque(loop, claim, level / share, kind) > limit
-
-
-MOMENTS = some.tuples(*[some.floats(0.5, 1.5)] * 3)

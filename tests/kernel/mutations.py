@@ -1,9 +1,13 @@
-"""Ways to change one thing of a certificate of the kernel."""
+"""Ways to change one thing of a certificate of the kernel, and what it may say after that."""
 
+import copy
+import time
 from fractions import Fraction
 
-from starhold.kernel.numbers import rational
+from starhold.kernel.check import check
+from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import OPERATIONS
+from tests.kernel.certificates import rekeyed, text
 
 WORDS = ["outside torque", "moving target", "wheels", "shortest sign", "hysteresis", "handed over"]
 
@@ -107,3 +111,24 @@ def says(content):
     claim = content["claims"][0]
     numbers = {part: {name: rational(x) for name, x in claim[part].items()} for part in ("subject", "numbers")}
     return claim["theorem"], sorted(claim["taken"]), claim["programs"], numbers
+
+
+def refusals(original, r, count, true):
+    """Change a certificate so many times, and return how many the kernel refuses; what it accepts says what the original
+    says, or something that is true of its claim."""
+    refused = tried = 0
+    while tried < count:
+        content = copy.deepcopy(original)
+        r.choice(WAYS)(r, content, content["claims"][0])
+        content = rekeyed(content)
+        if content == original:
+            continue
+        tried, started = tried + 1, time.process_time()
+        try:
+            check(text(content))
+        except RefusedError:
+            refused += 1
+        else:
+            assert says(content) == says(original) or true(content, content["claims"][0]), content["claims"][0]
+        assert time.process_time() - started < 20.0
+    return refused

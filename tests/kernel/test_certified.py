@@ -13,17 +13,13 @@ from starhold.certification.comparison import differences
 from starhold.checker import check, passed
 from starhold.checker.check import BY_THE_KERNEL
 from starhold.kernel.check import check as prove
-from starhold.parts.catalogue import PACKAGES, parts
-from starhold.parts.part import Fitted
 from starhold.scenario.building import build
-from tests.certification.loops import is_pointing, says
 from tests.tiers import leading
 
 LAWS = [
     ("three-laws", "lyapunov"), ("three-laws", "sliding"), ("cubesat-slew", "pd"), ("cubesat-slew", "sliding"),
     ("geostationary", "matrix-pd"), ("wheels-orbital", "wheel"),
 ]  # fmt: skip
-READ = {"two-body", "gravity-gradient", "wheels", "inertial", "orbital", "history"}
 
 
 @cache
@@ -90,15 +86,3 @@ def test_a_file_that_says_more_than_its_proofs_fails(written):
     assert not changed(lambda file, given: file["claims"][1]["numbers"].update(limit="1/1000"))
     assert not changed(lambda file, given: file["claims"][1]["numbers"].update(angle="3"))
     assert not changed(lambda file, given: file.update(programs={}))
-
-
-@pytest.mark.parametrize(("scenario", "law"), [("three-laws", "lyapunov"), ("three-laws", "sliding")])
-def test_every_part_that_no_program_holds_is_named(scenario, law):
-    loop = loop_of(scenario, law)
-    found = [part for role in set(PACKAGES) - {"body"} for part in parts(role).values() if part.body in ("", "rigid-body")]
-    others = [Fitted(part, part.examples()[0]) for part in found if part.name not in READ and part.role != "target"]
-    assert {"lag", "rate-limit", "gaussian", "random-torque"} <= {fitted.part.name for fitted in others}
-    for claim in certify(loop.with_parts(*others), law).claims:
-        for fitted in others:
-            enters = is_pointing(claim) and says(fitted)
-            assert (f"without:{fitted.part.role} {fitted.called}" in claim.assumptions) != enters, fitted.called

@@ -1,16 +1,12 @@
 """Certificates with one thing changed: what the kernel still accepts says what it said, or something else that is true."""
 
-import copy
 import random
-import time
-from collections import Counter
 
 import pytest
 
 from starhold.kernel.check import check
-from starhold.kernel.numbers import RefusedError
-from tests.kernel.certificates import contents, rekeyed, text
-from tests.kernel.mutations import WAYS, says
+from tests.kernel.certificates import contents, text
+from tests.kernel.mutations import refusals
 from tests.kernel.oracle import Oracle
 from tests.tiers import WHOLE, leading
 
@@ -40,32 +36,15 @@ SUITES = {
 }
 COUNT = 400 if WHOLE else 25
 """Mutations of each certificate: 5 600 in all."""
-SLOW = ("evenly", "evenly whatever the inertia", "wheels")
+SLOW = {name for name in SUITES if name.startswith(("evenly", "wheels", "points", "jumps", "whatever", "falls"))}
 
 
-@pytest.mark.parametrize(
-    "suite", leading([(s,) for s in SUITES if s not in SLOW] + [(s,) for s in SLOW], len(SUITES) - len(SLOW))
-)
+@pytest.mark.parametrize("suite", leading(sorted(SUITES, key=lambda name: name in SLOW), len(SUITES) - len(SLOW)))
 def test_nothing_false_is_accepted(suite):
-    original, r, tally = contents(*SUITES[suite]), random.Random(suite), Counter()
+    original = contents(*SUITES[suite])
     assert check(text(original))
-    while sum(tally.values()) < COUNT:
-        content = copy.deepcopy(original)
-        r.choice(WAYS)(r, content, content["claims"][0])
-        content = rekeyed(content)
-        if content == original:
-            continue
-        started = time.process_time()
-        try:
-            check(text(content))
-        except RefusedError:
-            tally["refused"] += 1
-            continue
-        finally:
-            assert time.process_time() - started < 10.0
-        same = says(content) == says(original)
-        tally["same" if same else "other"] += 1
-        assert same or all(Oracle(content, content["claims"][0], seed).holds() for seed in range(2)), content["claims"][0][
-            "numbers"
-        ]
-    assert tally["refused"] > COUNT / 2
+
+    def true(content, claim):
+        return all(Oracle(content, claim, seed).holds() for seed in range(2))
+
+    assert refusals(original, random.Random(suite), COUNT, true) > COUNT / 2

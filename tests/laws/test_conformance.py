@@ -3,6 +3,7 @@
 from functools import cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -13,6 +14,7 @@ from starhold.laws.catalogue import _installed, catalogue, from_file
 from starhold.parts.bodies.libration_point import PRIMARIES
 from starhold.simulation.lane import fly
 from tests.refusals import refused, replaced
+from tests.tiers import fewer
 
 LAWS = {**catalogue(), **catalogue("libration-point")}
 GOOD = Path(catalogue()["pd"].module.__file__).read_text()
@@ -20,7 +22,10 @@ GOOD = Path(catalogue()["pd"].module.__file__).read_text()
 
 @cache
 def verdicts(name):
-    return list(examine(LAWS[name]))
+    """What is found of a law with its first gains, or, where the whole is asked for, with all that it has as examples."""
+    law, given = LAWS[name], LAWS[name].examples()
+    with patch.object(law.module, "examples", lambda: given[: fewer(len(given), len(given))]):
+        return list(examine(law))
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -109,7 +109,7 @@ def test_command_line_compares_it_and_checks_its_certificate(folder):
     starhold("check", "out/certificate.json", "--law-file", "laws/my_law.py", cwd=folder, code=0)
     assert "starhold check certificate.json --law-file my_law.py</code>" in (folder / "out" / "report.html").read_text()
     # What is printed can be run as it stands.
-    proved = starhold("certify", "own.toml", "-o", "proved", cwd=folder, code=0)
+    proved = starhold("certify", "own.toml", "--law", "my-law", "-o", "proved", cwd=folder, code=0)
     command = proved.stdout.rpartition("Re-check it: starhold ")[2].split()
     assert command[2] == "--law-file"
     assert starhold(*command, cwd=folder).returncode == 0

@@ -19,6 +19,7 @@ from starhold.scenario.reading import parse
 from tests.parts.files import BODY, LAW, PARTS, PD, part
 from tests.refusals import refused
 from tests.running import starhold
+from tests.tiers import leading
 
 RECORDED = {"effector": {"deflection"}, "sensor": {"mine_rate"}, "estimator": {"gyro_rate", "mine_rate"}}
 """Beside what a loop without the part records."""
@@ -119,7 +120,7 @@ INSTALLED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", INSTALLED)
+@pytest.mark.parametrize("name", leading(INSTALLED))
 def test_an_effector_flies_from_a_scenario_and_claims_leave_it_out(name):
     keys, recorded, dimensions, unit = INSTALLED[name]
     text = BODY.replace("[simulation]", "[simulation]\nsubsteps = 4") + part(f'type = "{name}"\nname = "wing"\n{keys}') + PD

@@ -21,6 +21,7 @@ from starhold.simulation.lane import Recording, fly, label
 from starhold.studies.flight import Flight
 from tests.report import flown
 from tests.report.flown import draw
+from tests.tiers import leading
 
 NAMES = ["scalar", "attitude", "rate", "torque", "angle", "roll-pitch-yaw", "accuracy"]
 
@@ -58,7 +59,7 @@ def test_odd_names_are_shown_as_they_stand(tmp_path: Path) -> None:
     assert len(draw(odd, tmp_path, flown.scenario(flown.HOSTILE))) == len(NAMES)
 
 
-@pytest.mark.parametrize("extra", [flown.lost, flown.still])
+@pytest.mark.parametrize("extra", leading([flown.lost, flown.still]))
 def test_lost_and_resting_runs_are_drawn(tmp_path: Path, extra: object) -> None:
     assert callable(extra)
     assert len(draw([*flown.flights(), extra()], tmp_path, flown.scenario())) == len(NAMES)

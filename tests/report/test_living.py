@@ -22,6 +22,7 @@ from starhold.studies.questions import UNASKED
 from starhold.studies.reflight import COMPUTED, FAULTS, reflight
 from tests.browser import Browser
 from tests.report import flown
+from tests.tiers import leading
 from tests.trace.machines import need
 
 DESKTOP, PHONE = (1400, 900), (390, 844)
@@ -95,7 +96,7 @@ def expected(flight: Flight) -> dict[str, float]:
     return found | {f"rate {k}": run["rate_error"][-1, k] * rate for k in range(3)}
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+@pytest.mark.parametrize("size", [DESKTOP, pytest.param(PHONE, marks=pytest.mark.slow)])
 def test_a_slider_flies_the_laws_again(browser: Browser, page: Path, size: tuple[int, int]) -> None:
     browser.complaints.clear()
     browser.open(page, *size)
@@ -249,14 +250,14 @@ def shortened(name: str, duration: str, *laws: str) -> Scenario:
 
 LOOPS = {
     "three-laws": ("three-laws", "4 s"),
-    "noise": ("three-laws-noise", "12 s", "lyapunov"),
     "wheels": ("wheels-orbital", "12 s"),
-    "matrix inertia": ("geostationary", "100 s", "pd", "matrix-pd"),
     "landing": ("landing", "20 s", "fit"),
+    "noise": ("three-laws-noise", "12 s", "lyapunov"),
+    "matrix inertia": ("geostationary", "100 s", "pd", "matrix-pd"),
 }
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", leading(LOOPS, 3))
 def test_what_flies_in_node_is_what_python_flies(name: str) -> None:
     need("node")
     scenario = shortened(*LOOPS[name])

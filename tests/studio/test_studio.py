@@ -137,7 +137,7 @@ def test_a_job_can_be_stopped(served: Served) -> None:
     assert served.ended(job["number"])["error"] == "stopped"
 
 
-@pytest.mark.parametrize("size", [(1400, 900), (390, 844)])
+@pytest.mark.parametrize("size", [(1400, 900), pytest.param((390, 844), marks=pytest.mark.slow)])
 def test_the_page_edits_and_shows(served: Served, size: tuple[int, int]) -> None:
     browser = Browser()
     try:

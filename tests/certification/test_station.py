@@ -1,0 +1,297 @@
+"""Claims about loops near a libration point against flights and random states, and what the checker takes of their files."""
+
+import copy
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from starhold.algebra.vector import ZERO
+from starhold.certification.certificate import write
+from starhold.certification.station import certify_station, described_station
+from starhold.checker import check, check_file, passed
+from starhold.laws import l2_circle, l2_equilibrium
+from starhold.laws.catalogue import catalogue
+from starhold.laws.point import PointMeasurement
+from starhold.parts.bodies.libration_point import POINTS, PRIMARIES, PointState
+from starhold.simulation.lanes import simulate_many
+from tests.certification.edits import changed, faults, outcomes, with_kinds
+from tests.kernel.stations import BEST, PLANT, REST, SOFT, loop_of
+from tests.making import point_loop
+
+PEAK = l2_circle.peak_demand(PLANT, BEST.rate)
+STEEP = 1.0 + 2.0 * PLANT.stiffness
+BESIDE = l2_equilibrium.design(PLANT, l2_equilibrium.Degree(y=1.0))
+RELAY = SOFT._replace(boundary_layer=0.0)
+CIRCLE, LIMIT = (("certificates", 0, "claims", place) for place in (0, 1))
+SUBJECT = ("certificates", 0, "subject")
+
+
+def claims_of(*given, **changes):
+    return {claim.kind: claim for claim in certify_station(loop_of(*given, **changes)).claims}
+
+
+# --- round the point --------------------------------------------------------------------------------------------------
+
+
+def drawn(gains, level, count, random):
+    """Positions and velocities (3, count) in the plane x = 0 on {V = level}."""
+    s = random.uniform(-1.0, 1.0, count)
+    f1 = s * math.sqrt(2.0 * level / gains.alpha)
+    error, turn, angle = np.sqrt(2.0 * level * (1.0 - s * s)), *random.uniform(0.0, 2.0 * np.pi, (2, count))
+    r = np.sqrt(gains.radius**2 + f1)
+    y, z = r * np.cos(turn), r * np.sin(turn)
+    zero = np.zeros(count)
+    return np.array([zero, y, z]), np.array(
+        [zero, error * np.cos(angle) - gains.rate * z, error * np.sin(angle) + gains.rate * y]
+    )
+
+
+def needed(position, velocity):
+    """The control (3, N) that the law asks for at these states."""
+    pairs = zip(position.T.tolist(), velocity.T.tolist(), strict=True)
+    return np.array([l2_circle.feedback(PointMeasurement(*map(tuple, at), 1e-3, math.inf), BEST, PLANT) for at in pairs]).T
+
+
+def test_nominal_demand_is_the_largest_on_the_circle():
+    """2 Omega sqrt(C - Omega^2) radius at the best rate, 3.429 radius; the printed 2.786 leaves out a part of it."""
+    assert pytest.approx(2.0 * math.sqrt(PLANT.stiffness - 1.0), rel=1e-12) == PEAK
+    assert pytest.approx(3.429, abs=1e-3) == PEAK
+    assert 2.0 * BEST.rate == pytest.approx(2.786, abs=1e-3)
+    phase = np.linspace(0.0, 2.0 * np.pi, 721)
+    y, z, zero = np.cos(phase), np.sin(phase), 0.0 * phase
+    u = needed(np.array([zero, y, z]), np.array([zero, -BEST.rate * z, BEST.rate * y]))
+    assert np.linalg.norm(u, axis=0).max() == pytest.approx(PEAK, rel=1e-9)
+
+
+def test_flights_from_the_set_end_on_the_circle():
+    claim = claims_of()["circle"]
+    # Near the centre the motion takes for ever; a level away from it does not.
+    position, velocity = drawn(BEST, 0.9 * claim.numbers["level"], 200, np.random.default_rng(4))
+    batch = simulate_many(loop_of(), np.vstack([position, velocity, np.zeros_like(position)]), 60_000)
+    assert (batch.lost_at < 0.0).all()
+    np.testing.assert_allclose(np.hypot(batch.states[1], batch.states[2]), 1.0, atol=2e-3)
+
+
+def test_a_relay_without_a_layer_holds_other_circles():
+    evidence = claims_of(RELAY)["circle"].refutation().evidence
+    assert evidence["needs"] <= evidence["of"] == 0.3
+    r = evidence["radius"]
+    assert 2.0 * abs(r * r - 1.0) * r == pytest.approx(evidence["needs"])
+    start, law = PointState((0.0, r, 0.0), (0.0, 0.0, BEST.rate * r), ZERO), loop_of().law
+    loops = (point_loop(PLANT, law, gains, start, 1e-4) for gains in (RELAY, RELAY._replace(boundary_layer=0.3)))
+    held, drawn_in = (simulate_many(loop, [start], 63_000) for loop in loops)
+    # One revolution of the axes: the relay alone leaves it there but for its chatter, a layer lets it come home.
+    assert np.hypot(*held.states[1:3, 0]) == pytest.approx(r, rel=2e-3)
+    assert np.hypot(*drawn_in.states[1:3, 0]) == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(("kind", "margin"), [("norm", 1.05), ("norm", 1.2), ("axis", 1.2)])
+def test_the_control_stays_within_its_limit_and_nearly_reaches_it(kind, margin):
+    limit = margin * PEAK if kind == "norm" else margin * 2.94
+    claim = claims_of(BEST, limit, kind)["control-limit"]
+    assert claim.outcome == "proved"
+    random, needs = np.random.default_rng(5), []
+    for level in (claim.numbers["level"], 1.5 * claim.numbers["level"]):
+        u = needed(*drawn(BEST, level, 4000, random))
+        needs.append(float((np.linalg.norm(u, axis=0) if kind == "norm" else np.abs(u).max(axis=0)).max()) / limit)
+    assert needs[0] <= 1.0
+    assert needs[1] > 0.99
+
+
+def test_what_the_law_does_not_undo_is_told():
+    claim = claims_of(BEST, model="nonlinear")["circle"]
+    assert claim.outcome == "undecided"
+    assert "full problem" in claim.obligations[0].evidence["reason"]
+    assert claims_of(BEST._replace(k_x=8.0))["circle"].outcome == "refuted"
+    optimal = catalogue("libration-point")["l2-optimal"]
+    assert certify_station(point_loop(PLANT, optimal, optimal.examples()[0], loop_of().start, 1e-3)).outcome == "undecided"
+
+
+# --- at rest beside the point -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("limit", [1.0, 3.5, 20.0])
+def test_the_saturated_axis_is_certified_up_to_the_separatrix(limit):
+    """|x + x'/s| < U/p, which is |x + x'| < 1 in the scaled time and twice the linear zone, within 1 %."""
+    claim = claims_of(BESIDE._replace(y=0.1), limit, "axis")["saturated-axis"]
+    assert claim.outcome == "proved"
+    true = limit / STEEP
+    assert 0.99 * true < claim.numbers["width"] < true <= claim.numbers["boundary"] < true * (1.0 + 1e-12)
+    zone = limit / (BESIDE.k_velocity[0] * math.sqrt(STEEP))
+    assert true / zone == pytest.approx(2.0)
+
+
+def test_flights_return_from_inside_and_from_nowhere_else():
+    limit = 4.0
+    numbers = claims_of(BESIDE, limit, "axis")["saturated-axis"].numbers
+    s, random = math.sqrt(STEEP), np.random.default_rng(2)
+    x = np.concatenate([random.uniform(-3.0, 3.0, 200), [0.0, 0.0]]) * numbers["width"]
+    for share, returns in ((0.999, True), (1.001 * numbers["boundary"] / numbers["width"], False)):
+        sigma = share * numbers["width"] * np.where(np.arange(x.size) % 2 == 0, 1.0, -1.0)
+        states = np.zeros((9, x.size))
+        states[0], states[1], states[3] = x, BESIDE.y, s * (sigma - x)
+        # The Coriolis acceleration that X makes along Y is undone, within the limit, while x' is small enough.
+        states = states[:, 2.0 * np.abs(states[3]) + (PLANT.stiffness - 1.0) < limit]
+        assert states.shape[1] > 20
+        loop = replace(loop_of(BESIDE, limit, "axis"), divergence_bound=50.0)
+        batch = simulate_many(loop, states, 12_000)
+        assert ((batch.lost_at < 0.0) == returns).all()
+        assert not returns or np.abs(batch.states[0]).max() < 1e-6
+
+
+OUTCOMES = [
+    (BESIDE, math.inf, {}, {"equilibrium": "proved"}),
+    (BESIDE, math.inf, {"model": "nonlinear"}, {"equilibrium": "undecided"}),
+    (BESIDE._replace(k_x=0.9 * STEEP), math.inf, {}, {"equilibrium": "refuted"}),
+    (BESIDE._replace(k_x=0.9 * STEEP), 1.0, {}, {"equilibrium": "refuted"}),
+    (BESIDE._replace(model=1), 4.0, {"model": "nonlinear"}, {"equilibrium": "proved"}),
+    (BESIDE, 3.0, {}, {"equilibrium": "proved", "saturated-axis": "proved"}),
+    (BESIDE, 2.9, {}, {"equilibrium": "proved", "saturated-axis": "undecided"}),
+    (BESIDE._replace(y=0.1, k_x=1.2 * BESIDE.k_x), 1.0, {}, {"equilibrium": "proved", "saturated-axis": "undecided"}),
+    (BESIDE._replace(y=0.1, k_x=BESIDE.k_x * (1 + 1e-9)), 1.0, {}, {"equilibrium": "proved", "saturated-axis": "proved"}),
+]
+"""Gains, limit by axis and model. Where the others cannot be held, or feedback is off the separatrix, x is undecided."""
+
+
+@pytest.mark.parametrize(("gains", "limit", "model", "wanted"), OUTCOMES)
+def test_what_is_said_of_rest_and_of_the_limited_axis(gains, limit, model, wanted):
+    assert {kind: claim.outcome for kind, claim in claims_of(gains, limit, "axis", **model).items()} == wanted
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """What the certifier writes, of which the checker finds nothing false."""
+    path = tmp_path_factory.mktemp("stations") / "certificate.json"
+
+    def make(*given, **changes):
+        write([certify_station(loop_of(*given, **changes))], "made", path)
+        assert [f for f in check_file(path) if f.verdict == "fails"] == []
+        return json.loads(path.read_text(encoding="utf-8"))
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("gains", "limit", "kind"),
+    [
+        (BEST, 1.001 * PEAK, "norm"),
+        (BEST, 1.05 * 2.95, "axis"),
+        (SOFT._replace(boundary_layer=1e-3, k=0.05), 1.02 * PEAK, "norm"),
+        (SOFT._replace(boundary_layer=5.0), 1.3 * PEAK, "norm"),
+        (BEST._replace(rate=-2.0, radius=5.0), 26.1, "norm"),
+        (BEST._replace(radius=1e-4), 1.2e-4 * PEAK, "norm"),
+        (BEST._replace(radius=1e3, alpha=1e-6), 1.2e3 * PEAK, "norm"),
+    ],
+)
+def test_limits_of_circles_of_any_size_are_checked(made, gains, limit, kind):
+    content = made(gains, limit, kind)
+    assert outcomes(content) == {"circle": "proved", "control-limit": "proved"}
+    assert {f.verdict for f in check(content)} == {"holds"}
+
+
+@pytest.mark.parametrize("name", sorted(PRIMARIES))
+def test_x_returns_at_all_points(made, name):
+    for point in POINTS:
+        plant = PRIMARIES[name].point(point)
+        content = made(l2_equilibrium.design(plant, l2_equilibrium.Degree(y=0.3)), 5.0, "axis", plant=plant)
+        assert outcomes(content) == {"equilibrium": "proved", "saturated-axis": "proved"}
+        assert {f.verdict for f in check(content)} == {"holds"}
+
+
+@pytest.mark.parametrize("gains", [BEST, SOFT, REST])
+def test_the_full_problem_is_proved_with_its_feed_forward(made, gains):
+    content = made(gains._replace(model=1), model="nonlinear")
+    assert set(outcomes(content).values()) == {"proved"}
+    told = content["certificates"][0]["claims"][0]["assumptions"]
+    assert told[0] == "whole-field"
+    assert (told[-1] == "off-the-bodies") == (gains is REST)
+
+
+@pytest.mark.parametrize(
+    ("gains", "limit", "kind", "name"),
+    [
+        (BEST, 0.95 * PEAK, "norm", "control"),
+        (SOFT, 2.7, "axis", "control"),
+        (RELAY, math.inf, "norm", "only the circle"),
+        (BEST._replace(k_x=8.0), math.inf, "norm", "x returns"),
+        (REST._replace(k_x=8.0), math.inf, "axis", "each axis returns"),
+    ],
+)
+def test_what_is_refuted_has_a_proof_too(made, gains, limit, kind, name):
+    content = made(gains, limit, kind)
+    told = [f for f in check(content) if f.reason.startswith("refuted: ")]
+    assert [f.obligation for f in told] == [name]
+    assert passed(check(content))
+    del content["certificates"][0]["proof"]
+    assert not passed(check(content))
+
+
+def test_what_a_certificate_tells_is_what_was_proved(made):
+    content = made(BEST, 1.2 * PEAK)
+    for place in (CIRCLE, LIMIT):
+        claim = content["certificates"][0]["claims"][place[-1]]
+        for key, value in claim["numbers"].items():
+            for other in (None, 0.0, "1", *([value * (1.0 + 1e-15)] if isinstance(value, float) else ())):
+                assert faults(changed(content, (*place, "numbers", key), other)), key
+        for key in ("assumptions", "obligations"):
+            assert faults(changed(content, (*place, key), claim[key][:-1])), key
+        assert faults(changed(content, (*place, "witness"), {"mu": 1.0}))
+        assert faults(changed(content, (*place, "kind"), "equilibrium"))
+    one = copy.deepcopy(content)
+    one["certificates"][0]["claims"].pop()
+    assert faults(with_kinds(one))
+    assert faults(changed(content, ("claims", 0, "numbers", "level"), "1"))
+
+
+def test_the_claims_are_about_this_loop(made):
+    content, other = made(BEST, 1.2 * PEAK), PRIMARIES["sun-earth"].point("L1")._asdict()
+    for key, value, told in (
+        (("gains", "radius"), 1.1, "another number for gains.radius"),
+        (("gains", "k"), -1.0, ""),
+        (("gains", "feedback"), "relay", "the law of the proof"),
+        (("gains", "model"), "nonlinear", "the law of the proof"),
+        (("gains", "other"), 1.0, "the gains are not"),
+        (("model",), "nonlinear", "the field of the proof"),
+        (("law",), "l2-equilibrium", "the gains are not"),
+        (("limit",), "axis", "the limit is not the loop's"),
+        (("control_limit",), None, "the limit is not the loop's"),
+        (("control_limit",), 4.0, "the limit is not the loop's"),
+        (("control_limit",), -1.0, "not positive"),
+        (("control_period",), 0.0, "not positive"),
+        (("lag",), -1.0, "negative"),
+        (("plant",), other, "another number for plant.stiffness"),
+        (("nominal",), other, "another number for craft.stiffness"),
+        *[(("plant", name), 1.01 * getattr(PLANT, name), "") for name in PLANT._fields],
+    ):
+        found = faults(changed(content, (*SUBJECT, *key), value))
+        assert any(told in text for text in found.values()), (key, found)
+
+
+def test_other_laws_claim_nothing(made):
+    content = made()
+    for law in catalogue("libration-point").values():
+        for gains in law.examples():
+            loop = point_loop(PLANT, law, gains, loop_of().start, 1e-3)
+            declares = law.hook("rest") or (law.hook("errors") and law.lyapunov)
+            assert bool(certify_station(loop).claims) == bool(declares)
+            other = changed(content, SUBJECT, json.loads(json.dumps(described_station(loop))))
+            assert law.name == "l2-circle" or faults(other)
+
+
+@pytest.mark.parametrize(
+    ("gains", "change"),
+    [
+        (RELAY, {"k": 3e-51}),
+        (RELAY, {"radius": 1e-150, "k": 3e199}),
+        (BEST, {"radius": 1e200}),
+        (SOFT, {"k": 1e-300}),
+    ],
+)
+def test_gains_of_any_size_end_in_what_the_checker_takes(made, gains, change):
+    made(gains._replace(**change), 1.0)
