@@ -10,6 +10,7 @@ import pytest
 import starhold as sh
 from starhold.analysis.departure import departures
 from starhold.certification.certificate import Certificate
+from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.noise import find_radii
@@ -137,3 +138,12 @@ def test_a_share_is_told_and_a_flight_before_the_filter_settles_leaves_it():
     assert (left.time, left.how) == (time[100], "the estimate errs by more than is told")
     run["mekf_attitude"][40] = [1.0, 3e-4, 0.0, 0.0]
     assert departures(certificate, loop, flown)["pointing"][0].time == time[40]
+
+
+def test_against_more_noise_than_can_be_shown_the_claim_leaves_it_out():
+    given = sh.load("three-laws-noise")
+    loop = build(given, given.pick("lyapunov"))
+    claim = certify(loop, "here", Wanted(pointing=True)).claim("pointing")
+    assert claim.outcome == "proved"
+    assert claim.numbers["share"] is None
+    assert "without:sensor gaussian" in claim.assumptions

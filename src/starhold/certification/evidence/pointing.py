@@ -17,7 +17,7 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.openness import Pushes, pushes
+from starhold.certification.openness import Pushes, driven_errors, pushes
 from starhold.certification.subject import above
 from starhold.kernel.held import RATE, STATE, TURN, Held, Region
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop, slopes
@@ -171,16 +171,17 @@ def find_pointed(loop: Loop) -> bool:
     rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
     own = pushes(loop.loop)
     tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
-    try:
-        against = own._replace(outside=own.outside + float(loop.known.disturbance))
-        noise = find_radii(loop, POINTS)
-        # Against more noise than can be shown, without it.
-        with_and_without = [noise] * (noise is not None) + [None]
-        return any(pushed.find(*one) for pushed in (Pushed(loop, against, own) for own in with_and_without) for one in tried)
-    except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
-        # Floats may be too far apart in size, or too large.
-        loop.failed[POINTS] = str(reason)
-        return False
+    against = own._replace(outside=own.outside + float(loop.known.disturbance))
+    # Against more noise than can be shown, without it.
+    for noisy in [True] * (driven_errors(loop.loop) is not None) + [False]:
+        try:
+            pushed = Pushed(loop, against, find_radii(loop, POINTS) if noisy else None)
+            if any(pushed.find(*one) for one in tried):
+                return True
+        except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
+            # Floats may be too far apart in size, or too large.
+            loop.failed[POINTS] = str(reason)
+    return False
 
 
 class Pushed:

@@ -259,11 +259,12 @@ def turned(rate: Vector, period: Scalar) -> tuple[Quaternion, Matrix, Matrix]:
 def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recursion | None:
     """How noise of gyro and star tracker drives the errors of attitude and bias and that of the gyro's last reading, at a
     constant rate (rad/s, body axes) of a filter that has settled; None for one that does not."""
-    found = settled(prepare(params, period), noise.every, rate, period)
-    if found is None:
+    numbers = prepare(params, period)
+    gain = settled(numbers, noise.every, rate, period)
+    if gain is None:
         return None
-    (axes, drift, gain), (attitude, _, reading, walk) = found, noise
-    known = -2.0 * prepare(params, period).reading / period
+    (_, axes, drift), (attitude, _, reading, walk) = turned(rate, period), noise
+    known = -2.0 * numbers.reading / period
 
     def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         (turn, bias, last), now, walked = errors, scale(reading, random[0]), scale(walk, random[1])
@@ -283,19 +284,18 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
 
 
 @cache
-def settled(params: Numbers, every: int, rate: Vector, period: float) -> tuple[Matrix, Matrix, Gains] | None:
-    """How errors of attitude and mean rate are carried over a control period at a rate, and the gains after many updates;
-    None where they go on changing."""
+def settled(params: Numbers, every: int, rate: Vector, period: float) -> Gains | None:
+    """The gains after many new attitudes at a constant rate; None where they go on changing."""
     memory, before = remember(params, None)._replace(rate=rate), np.zeros((4, 3, 3))
     for _ in range(MOST // every):
         for _ in range(every - 1):
             memory = arrived(propagated(memory, rate, params, period), params).memory
         now = arrived(propagated(memory, rate, params, period), params)
-        found, memory = gains(now, params), corrected(now, now.attitude, params, period).memory
-        change, size = (np.abs(np.array(x)).max(axis=(1, 2)) for x in (np.subtract(found, before), found))
+        gain, memory = gains(now, params), corrected(now, now.attitude, params, period).memory
+        change, size = (np.abs(np.array(x)).max(axis=(1, 2)) for x in (np.subtract(gain, before), gain))
         if (change <= 1e-9 * size).all():
-            return *turned(rate, period)[1:], found
-        before = found
+            return gain
+        before = gain
     return None
 
 
