@@ -16,7 +16,7 @@
 
    Program of the law: sha256 851ab1c92f50234498ca20e7141e8ad0edc5898615f514d663a47b1df0e15661
 
-   Certificate: certificate.json, sha256 78846727d4b998ed750a8986d289216a999a1a9db3a28981b688a1ea6c9300d1:
+   Certificate: certificate.json, sha256 ec7a9e9454a3629c44345ebec8d658448e2f4c562f6a70967c1fb5bbccea16c2:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -14,7 +14,7 @@
 
    Program of the law: sha256 d5137098524b4413b6d496ad62634b43647fe728da0c5962b960f411facfefe2
 
-   Certificate: certificate.json, sha256 cbcb21b3a3a2c8b2bef6efdee68807b268e1dba08308be094f03b4a063cdc51f:
+   Certificate: certificate.json, sha256 fff694ad8a484d701b970ed4d67396f3212e48dd5ab184521426759308704027:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

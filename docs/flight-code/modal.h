@@ -15,7 +15,7 @@
 
    Program of the law: sha256 99130acbe6b13c7bcd3c5cbc219c37d087ae6db2517dfd9e6fe729d84998d648
 
-   Certificate: certificate.json, sha256 308d5bd1a9cfdcd6bd201909fac8e142b9a5dc0f49efc13af226333c89abf8c7:
+   Certificate: certificate.json, sha256 91fb7f76857faaedd434e8dec533f9ac8397739b260866b428e97526b3ffa902:
    proved
    Claims:
      proved: region of attraction: from the level set of V that holds rest at every attitude told by the

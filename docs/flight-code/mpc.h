@@ -19,7 +19,7 @@
    wheels.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 0d88b4ae6330ca9f17cb964989fb3e54cbe383db812fc267b0c81ef5a40f1310:
+   Certificate: certificate.json, sha256 a196f23941c63a5acfb57fa56ccc05470536e266050723eeaba63fa41ba23416:
    undecided
    Claims:
    Check it independently: starhold check certificate.json */

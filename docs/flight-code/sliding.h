@@ -20,7 +20,7 @@
    0.1 s.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 e6dcbc61444004ac3f70633616dc9f4b68509ad7caded1cded5b3db0398bd6c2:
+   Certificate: certificate.json, sha256 4dcf83f9b4500d73daaf69cb34659a77c80e4ca9d4a4bbaef236925864f3a52e:
    undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches

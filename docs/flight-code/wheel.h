@@ -14,7 +14,7 @@
 
    Program of the law: sha256 4f874e55fa16eec8b64cc78923eef683c9775f1cdd52baf71d83b3a67f9942c4
 
-   Certificate: certificate.json, sha256 89e1d9b74a4c8c423514b0636dd3b5f504aa51649a5761584b3f3dd26c2b66d7:
+   Certificate: certificate.json, sha256 7be1a71f5e80eb54c37d92451c1e24808a8088e9388cc9862890e14ad1bde982:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
