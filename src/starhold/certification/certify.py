@@ -73,7 +73,7 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
         claims = [undecided("convergence", EVERYWHERE, subject, f"{APART}: {reason}")]
     about = described(subject, [claim.kind for claim in claims])
-    return Certificate(name or loop.law.name, about, named(claims, loop))
+    return Certificate(name or loop.law.name, about, named(claims, loop, subject.envelope))
 
 
 def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:

@@ -12,11 +12,12 @@ from flint import arb, fmpq
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
-from starhold.certification.openness import READ, assumed_away
+from starhold.certification.openness import READ, assumed_away, envelope_of
 from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import Envelope
 from starhold.parts.craft import Craft, tensor
 from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels
 from starhold.parts.environments.gravity_gradient import gravity_gradient
@@ -52,6 +53,11 @@ class Subject:
     def inertia(self) -> Rows:
         """The inertia tensor, kg m2."""
         return rows(tensor(self.loop.craft.inertia))
+
+    @property
+    def envelope(self) -> Envelope:
+        """What its motions do not leave, for the bounds of parts."""
+        return envelope_of(self.loop, above(self.total_momentum))
 
     @property
     def moving(self) -> bool:

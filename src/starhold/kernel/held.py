@@ -73,6 +73,7 @@ class Held:
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h, self.outside, self.error = loop, numbers["period"], numbers["outside"], numbers["error"]
+        self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.turned, self.rated = (numbers.get(f"error.{name}") or Fraction(0) for name in ("attitude", "rate"))
         demand(self.h > 0, "a period is not positive")
         told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
@@ -144,25 +145,32 @@ class Held:
         own = [x for name, x in self.others.items() if name[0] == letter]
         return norm(own) if letter == "e" else max(own, default=Fraction(0))
 
+    def pushed(self, wide: list[Fraction]) -> dict[str, Fraction]:
+        """Return bounds of the torque from outside and of the error of the command at rates, which r adds to the body's."""
+        turning = norm(wide) + self.size("r")
+        constant = {"outside": self.outside, "error": self.error}
+        return {name: x + self.per_rate[name] * turning for name, x in constant.items()}
+
     def stale(self, sizes: Sizes, drift: list[Fraction]) -> Fraction:
         """Return how far the torques beside the law's come from where they are at a sample."""
         e, r, a, H = (self.size(letter) for letter in "erah")
-        w = norm(sizes[name] for name in STATE[RATE])
-        change = {"r": self.h * (a + w * r), "a": 2 * a, "h": self.h * ((w + r) * H + e + self.outside), "e": 2 * e}
+        wide = [sizes[name] for name in STATE[RATE]]
+        w, outside = norm(wide), self.pushed(wide)["outside"]
+        change = {"r": self.h * (a + w * r), "a": 2 * a, "h": self.h * ((w + r) * H + e + outside), "e": 2 * e}
         changes = named(STATE[RATE], drift) | {name: change[name[0]] for name in self.others}
         return norm(sum((most(p.slope(x), sizes) * changes[x] for x in sorted(p.names)), Fraction(0)) for p in self.beside)
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
         sizes, held = region.sizes | self.others, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
-        steady = self.error + self.misread(region) + norm(most(p, sizes) for p in self.left)
+        steady = self.misread(region) + norm(most(p, sizes) for p in self.left)
         widths = [norm(row) for row in self.N]
 
         def drifted(wide: list[Fraction]) -> list[Fraction]:
             return [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
 
         def uneven(wide: list[Fraction]) -> Fraction:
-            return self.outside + self.stale(sizes | named(STATE[RATE], wide), drifted(wide))
+            return sum(self.pushed(wide).values()) + self.stale(sizes | named(STATE[RATE], wide), drifted(wide))
 
         def reached(wide: list[Fraction]) -> list[Fraction]:
             push, columns = steady + uneven(wide), zip(STATE[RATE], held.values(), widths, self.bend, strict=True)

@@ -89,6 +89,13 @@ def lowest(position: Vector, velocity: Vector, gravity: float) -> float:
     return min(distance, parameter / (1.0 + eccentricity))
 
 
+def highest_speed(position: Vector, velocity: Vector, gravity: float) -> float:
+    """The largest speed (m/s) of the whole orbit, at its lowest point."""
+    distance, energy, _, _ = _invariants(position, velocity, gravity)
+    nearest = lowest(position, velocity, gravity)
+    return math.sqrt(max(2.0 * (energy + gravity / nearest), math.hypot(*velocity) ** 2))
+
+
 def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) -> float:
     """When (s) the motion first comes down to this distance (m) from the centre, infinity for never. The start is beyond."""
     distance, energy, radial, _ = _invariants(position, velocity, gravity)

@@ -168,7 +168,7 @@ def find_pointed(loop: Loop) -> bool:
     begun = loop.loop.without("sensor", "estimator")
     shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
     rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
-    own = pushes(loop.loop)
+    own = pushes(loop.loop, loop.known.envelope)
     tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
     try:
         pushed = Pushed(loop, own._replace(outside=own.outside + float(loop.known.disturbance)))
@@ -191,9 +191,10 @@ class Pushed:
         self.loop, self.words = loop, words + sign_words(loop.loop)
         self.stiffness = feedback(loop, self.words)
         demand(self.stiffness > 0.0, "the law does not turn the body to its target")
-        outside = max(outside, LEAST * self.stiffness)
-        self.told: dict[str, Any] = {"period": loop.loop.period, "outside": outside, "error": against.command}
-        self.told |= {f"error.{name}": x for name, x in (("attitude", against.attitude), ("rate", against.rate)) if x}
+        against = against._replace(outside=max(outside, LEAST * self.stiffness))
+        demand(all(map(isfinite, against)), "the wheels' friction has no bound, for their momentum has no limit")
+        self.told: dict[str, Any] = {"period": loop.loop.period}
+        self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         self.told |= loop.bounds(words)
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
