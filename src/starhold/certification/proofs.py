@@ -211,7 +211,14 @@ def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     angle, rate = (below(_exact(numbers.get(f"start.{name}", numbers.get(name, Fraction(0))))) for name in ("angle", "rate"))
-    most = {"torque": "outside", "error": "error", "torque_per_rate": "outside.per.rate", "error_per_rate": "error.per.rate", "attitude_error": "error.attitude", "rate_error": "error.rate"}
+    most = {
+        "torque": "outside",
+        "error": "error",
+        "torque_per_rate": "outside.per.rate",
+        "error_per_rate": "error.per.rate",
+        "attitude_error": "error.attitude",
+        "rate_error": "error.rate",
+    }
     ends = {"start": "level", "level": "highest", "settling": "settling", "angle": "end.angle", "rate": "end.rate"}
     return {
         "period": float(numbers["period"]),

@@ -91,7 +91,7 @@ def lowest(position: Vector, velocity: Vector, gravity: float) -> float:
 
 def highest_speed(position: Vector, velocity: Vector, gravity: float) -> float:
     """The largest speed (m/s) of the whole orbit, at its lowest point."""
-    distance, energy, _, _ = _invariants(position, velocity, gravity)
+    energy = _invariants(position, velocity, gravity)[1]
     nearest = lowest(position, velocity, gravity)
     return math.sqrt(max(2.0 * (energy + gravity / nearest), math.hypot(*velocity) ** 2))
 

@@ -69,9 +69,10 @@ def largest_torque(
     for seen in sights(n):
         own = n[seen]
         M = first[seen].T @ own
-        turned = np.linspace(*np.linalg.eigvalsh(M + M.T)[[0, 2]] / 2.0, 33)[:, None, None] * np.eye(3)
-        sizes = np.linalg.norm(M - turned, 2, axis=(1, 2)).min(), np.linalg.norm(third[seen].T @ own, 2)
-        largest = max(largest, float(sum(sizes) + np.linalg.norm(second[seen].T @ squares[seen], 2)))
+        low, _, high = np.linalg.eigvalsh(M + M.T) / 2.0
+        arms = [float(np.linalg.norm(M - (low + (high - low) * k / 32.0) * np.eye(3), 2)) for k in range(33)]
+        others = np.linalg.norm(third[seen].T @ own, 2) + np.linalg.norm(second[seen].T @ squares[seen], 2)
+        largest = max(largest, float(min(arms) + others))
     # A little more, for what is seen nearly edge on may be taken for hidden.
     return largest + TOLERANCE * float(sum(np.linalg.norm(arms, axis=1).sum() for arms in (first, second, third)))
 
@@ -79,17 +80,19 @@ def largest_torque(
 def sights(normals: NDArray[np.float64]) -> Iterator[NDArray[np.bool_]]:
     """Yield which plates are seen at once, as (n,) of bool, for all directions to see them from: the cells that planes
     across the normals cut space into, each of which has an edge where two planes meet, or is a half of space."""
-    edges = [unit / size for i, k in combinations(normals, 2) if (size := np.linalg.norm(unit := np.cross(i, k))) > TOLERANCE]
+    across = [np.cross(*pair) for pair in combinations(normals, 2)]
+    edges = [unit / size for unit in across if (size := np.linalg.norm(unit)) > TOLERANCE]
     found = {tuple(normals @ side > 0.0) for side in (normals[0], -normals[0])} if not edges else set[tuple[bool, ...]]()
     for edge in [e * sign for e in edges for sign in (1.0, -1.0)]:
         height = normals @ edge
         flat = np.abs(height) <= TOLERANCE
         # Around the edge: half-way between the planes that meet there.
         lines = np.cross(edge, normals[flat])
-        across = lines[0] / np.linalg.norm(lines[0])
-        angles = np.arctan2(lines @ np.cross(edge, across), lines @ across) % np.pi
+        first = lines[0] / np.linalg.norm(lines[0])
+        second = np.cross(edge, first)
+        angles = np.arctan2(lines @ second, lines @ first) % np.pi
         angles = np.sort(np.concatenate([angles, angles + np.pi]))
         for half in (angles + np.append(angles[1:], angles[0] + 2.0 * np.pi)) / 2.0:
-            aside = np.cos(half) * across + np.sin(half) * np.cross(edge, across)
+            aside = np.cos(half) * first + np.sin(half) * second
             found.add(tuple(np.where(flat, normals @ aside, height) > 0.0))
     yield from (np.array(one) for one in sorted(found))

@@ -20,8 +20,8 @@ def points(claim: Claim) -> Proof:
     """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
     by no more than end.angle and turns no faster than end.rate. The torque is what the law asks for at the last sample and
     an error, |error| <= error; it is told the attitude turned by error.attitude at most and the rate off by error.rate;
-    torques from outside that it is not told are no more than `outside`. To both bounds `.per.rate` times the rate of the body
-    is added."""
+    torques from outside that it is not told are no more than `outside`. Both may
+    grow by `.per.rate` times the body's rate."""
     loop = AttitudeLoop(claim)
     yield from loop.sound()
     held, numbers, samples = Held(loop), claim.numbers, 0
@@ -65,19 +65,20 @@ def points(claim: Claim) -> Proof:
         demand(most_of > 0, f"the {name} is too small")
         yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in region.X[part]], -1))
     yield "settling", Exceeds(numbers["settling"], h * samples)
-    def pushed(name: str) -> str:
+
+    def most(name: str) -> str:
         growing = held.per_rate[name]
         more = f" and {below(growing)} N m s times the rate of the body" if growing else ""
         return f"of up to {below(numbers[name])} N m{more}"
 
-    told = [f"errors of the command {pushed('error')}"]
+    told = [f"errors of the command {most('error')}"]
     told += [f"of the attitude that it is told of up to {below(held.turned)} rad"] if held.turned else []
     told += [f"of the rate of up to {below(held.rated)} rad/s"] if held.rated else []
     text = (
         f"every motion from {{V <= {below(numbers['level'])}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
         f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside"
-        f" {pushed('outside')} and {enumerated(told)}"
+        f" {most('outside')} and {enumerated(told)}"
     )
     text += "".join(f", {name} of up to {below(x)}" for name, x in held.told.items())
     taken = (
