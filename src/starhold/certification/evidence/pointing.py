@@ -7,7 +7,7 @@ from fractions import Fraction
 from importlib import import_module
 from itertools import takewhile
 from math import inf, isfinite, pi, radians, sin, sqrt
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,9 @@ than the least, for motions come into them after a finite time; by how much a le
 levels and ellipsoids there are at most; at how many states of a set the torque is looked at."""
 
 
+Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
+
+
 @dataclass
 class Chain:
     """Levels from a set down to where pushes outweigh the damping, and ellipsoids from there on."""
@@ -49,17 +52,21 @@ class Chain:
     held: Held
     V: str
     level: float
+    found: dict[Fraction, Lower | None] = field(default_factory=dict[Fraction, "Lower | None"])
+    """What `lower` found, which chains of one V share."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     samples: int = 0
-    aimed: float | None = None
 
     def aim(self) -> float:
         """Return the level that pushes allow where all motions are nearly linear."""
-        if self.aimed is None:
-            found = self.lower(Fraction(self.level) / 2**20)
-            self.aimed = inf if found is None else float(found[2])
-        return self.aimed
+        found = self.lower(self.held.s / 2**20)
+        return inf if found is None else float(found[2])
+
+    def falls(self) -> bool:
+        """Tell whether V falls on the whole set."""
+        found = self.lower(Fraction(self.level))
+        return found is not None and found[2] < Fraction(self.level)
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
@@ -74,12 +81,18 @@ class Chain:
             c = end
         return float(c)
 
-    def lower(self, c: Fraction) -> tuple[Fraction, Fraction, Fraction] | None:
+    def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level that is shown to be reached from another, and that level."""
+        if c not in self.found:
+            self.found[c] = self.lowest(c)
+        return self.found[c]
+
+    def lowest(self, c: Fraction) -> Lower | None:
+        """Find what `lower` returns."""
         held = self.held
         try:
             region = held.region(c)
-            (exact, above, rest), push = held.fall(region), held.tube(region).push
+            exact, above, push, rest = held.fall(region)
         except RefusedError:
             return None
         Q, H, felt = floats(exact), floats(above), floats(held.felt)
@@ -199,7 +212,9 @@ class Pushed:
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.leans = [(float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}"))) for lean in LEANS]
+        self.leans = [(float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}")), {}) for lean in LEANS]
+        # The best in the small is tried first, and taken if it comes down from the whole set.
+        self.leans.sort(key=lambda lean: Chain(lean[2], lean[1], 0.0, lean[3]).aim())
 
     def held(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
@@ -212,14 +227,15 @@ class Pushed:
         loop, words, J, begun = self.loop, self.words, self.J, list[Chain]()
         told = self.told | (limits or {})
         told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
-        for epsilon, V, held in self.leans:
+        for epsilon, V, held, found in self.leans:
             lean = epsilon * sin(min(angle, pi) / 2.0)
             level = 4.0 * self.stiffness * sin(angle / 4.0) ** 2 + J * rate * (rate / 2.0 + lean)
-            begun.append(Chain(held, V, level * (1.0 + 1e-6)))
-        # The best in the small is tried first, and taken if it comes down from the whole set.
-        begun.sort(key=Chain.aim)
+            begun.append(Chain(held, V, level * (1.0 + 1e-6), found))
         if begun[0].asks_more(limits or {}):
             loop.failed[POINTS] = "the torque exceeds its limit"
+            return False
+        if not any(chain.falls() for chain in begun):
+            loop.failed[POINTS] = "V does not fall on the set from which motions start"
             return False
         if not begins(loop, loop.claim(POINTS, words, begun[0].V, **told | {"level": begun[0].level}), self.scales):
             return False

@@ -38,8 +38,7 @@ def points(claim: Claim) -> Proof:
     for k, told in enumerate(levels):
         end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
         demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
-        Q, H, rest = held.fall(region)
-        push = held.tube(region).push
+        Q, H, push, rest = held.fall(region)
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(held.felt), held.felt), -tau), H, -beta)
         yield f"V falls by a share {k}", Definite(fallen)
