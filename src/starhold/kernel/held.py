@@ -53,8 +53,8 @@ class Region:
 @dataclass(frozen=True)
 class Tube:
     """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
-    drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time, and
-    by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time."""
+    drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
+    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time."""
 
     sizes: Sizes
     drift: list[Fraction]
@@ -74,7 +74,8 @@ class Held:
 
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
-        self.loop, self.h, self.outside, self.error = loop, numbers["period"], numbers["outside"], numbers["error"]
+        self.loop, self.h = loop, numbers["period"]
+        self.constant = {name: numbers[name] for name in ("outside", "error")}
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.turned, self.rated = (numbers.get(f"error.{name}") or Fraction(0) for name in ("attitude", "rate"))
         demand(self.h > 0, "a period is not positive")
@@ -93,7 +94,9 @@ class Held:
         # What of it vanishes with the state is in V' as it is: that by momentum of wheels does no work.
         told, turning = minus(loop.u, self.u), growing(self.beside)
         self.more = growing(told)
-        self.rigid = [sum(own, Poly({})) for own in zip(told, self.beside, *([-x for x in v] for v in (self.more, turning)))]
+        left = [p + q for p, q in zip(minus(told, self.more), minus(self.beside, turning), strict=True)]
+        # What does not, by the first that it has of what comes from outside.
+        self.rigid = {x: [first(p, x) for p in left] for x in ("e", "a", "h", "r")}
         self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
@@ -156,8 +159,8 @@ class Held:
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds of the torque from outside and of the error of the command at rates, to which the target's adds."""
         turning = norm(sizes[name] for name in STATE[RATE]) + self.size("r")
-        constant = {"outside": self.outside, "error": self.error}
-        return {name: x + self.per_rate[name] * turning for name, x in constant.items()}
+        outside, error = (x + self.per_rate[name] * turning for name, x in self.constant.items())
+        return {"outside": outside, "both": outside + error}
 
     def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
         """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
@@ -165,21 +168,18 @@ class Held:
         e, r, a, H = (self.size(letter) for letter in "erah")
         w, outside = norm(sizes[name] for name in STATE[RATE]), self.pushed(sizes)["outside"]
         change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
-        found = Fraction(0)
-        for letter in sorted({name[0] for name in self.others}):
-            slopes = [[most(p.slope(f"{letter}{k + 1}"), sizes) for k in AXES] for p in parts]
-            found += stretch(slopes) * change[letter]
-        return found
+        return sum((felt(parts, letter, sizes) * x for letter, x in change.items()), Fraction(0))
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
         sizes, held = region.sizes, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
-        steady = self.misread(region) + norm(most(p, sizes) for p in self.rigid)
+        steady = self.misread(region)
+        steady += sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
         widths = [norm(row) for row in self.N]
 
         def reached(wide: list[Fraction]) -> list[Fraction]:
             within = sizes | named(STATE[RATE], wide)
-            push = steady + sum(self.pushed(within).values()) + self.stale(within, self.beside)
+            push = steady + self.pushed(within)["both"] + self.stale(within, self.beside)
             columns = zip(STATE[RATE], held.values(), widths, self.bend, strict=True)
             return [sizes[x] + self.h * (u + push * n + most(g, within)) for x, u, n, g in columns]
 
@@ -188,7 +188,7 @@ class Held:
         far = {name: min(sizes[name] + turned, Fraction(1)) for name in STATE[TURN]}
         drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
         within = sizes | {"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held
-        return Tube(within, drift, turned, steady, sum(self.pushed(within).values()), self.stale(within, self.beside))
+        return Tube(within, drift, turned, steady, self.pushed(within)["both"], self.stale(within, self.beside))
 
     def fall(self, region: Region) -> tuple[Rows, Rows, Fraction, Fraction]:
         """Return Q, H, p and r such that V changes in a period by h (p |felt x| + r - x.Qx) at most, and V <= x.Hx."""
@@ -266,6 +266,16 @@ def least_form(p: Poly, region: Region) -> Rows:
     for i, row in enumerate(radius):
         middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
     return middle
+
+
+def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
+    """Return how much parts change at most with a vector, in norms."""
+    return stretch([[most(p.slope(f"{letter}{k + 1}"), sizes) for k in AXES] for p in parts])
+
+
+def first(p: Poly, letter: str) -> Poly:
+    """Return the terms of which the first variable but q0 has this letter."""
+    return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
 
 
 def growing(parts: list[Poly]) -> list[Poly]:

@@ -212,7 +212,10 @@ class Pushed:
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.leans = [(float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}")), {}) for lean in LEANS]
+        self.leans = [
+            (float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}")), dict[Fraction, Lower | None]())
+            for lean in LEANS
+        ]
         # The best in the small is tried first, and taken if it comes down from the whole set.
         self.leans.sort(key=lambda lean: Chain(lean[2], lean[1], 0.0, lean[3]).aim())
 
