@@ -2,7 +2,8 @@
 
 J w' = u + d - w x Jw with u = the law's torque at the last sample and an error. What errors and torques d from outside do is
 bounded by what they are; what is of higher order in the period, or not linear, by the size of the set, and so is what the
-law's torque and the motion have of a moving target, wheels and a torque that the law is told. Docs/kernel.md, 10.
+law's torque and the motion have of a moving target, wheels and a torque that the law is told, and what changes of these do.
+Docs/kernel.md, 10.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class Held:
         self.constant = {name: numbers[name] for name in ("outside", "error")}
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.turned, self.rated = (numbers.get(f"error.{name}") or Fraction(0) for name in ("attitude", "rate"))
-        demand(self.h > 0, "a period is not positive")
+        demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
         names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}
         each = {"e": [f"outside.{k}" for k in AXES]} | {letter: [name] * 3 for letter, name in names.items()}
@@ -92,9 +93,9 @@ class Held:
         self.told = {name: numbers[name] for letter, own in each.items() if told[letter] for name in own}
         self.beside = minus(loop.balance(NONE), free)
         # What of it vanishes with the state is in V' as it is: that by momentum of wheels does no work.
-        told, turning = minus(loop.u, self.u), growing(self.beside)
-        self.more = growing(told)
-        left = [p + q for p, q in zip(minus(told, self.more), minus(self.beside, turning), strict=True)]
+        asked, turning = minus(loop.u, self.u), growing(self.beside)
+        self.more = growing(asked)
+        left = [p + q for p, q in zip(minus(asked, self.more), minus(self.beside, turning), strict=True)]
         # What does not, by the first that it has of what comes from outside.
         self.rigid = {x: [first(p, x) for p in left] for x in ("e", "a", "h", "r")}
         self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
