@@ -14,7 +14,7 @@ from starhold.certification.station import certify_station
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.checker.check import check
-from starhold.laws import modal
+from starhold.laws import modal, wheel
 from starhold.parts.catalogue import PACKAGES, fit, parts
 from starhold.parts.part import Fitted
 from starhold.scenario.reading import builtin_text, parse
@@ -148,7 +148,7 @@ def test_bounds_are_those_of_the_whole_orbit():
 
 def test_an_error_without_a_bound_is_refused_and_not_left_out():
     """Of wheels that no limit keeps slow: no claim leaves wheels out by name."""
-    free = rotors("wheel", (0.09, 0.009))
+    free = rotors("wheel", wheel.examples()[0])
     rubbed = on_wheels(free, momentum_limit=(float("inf"),) * 4, viscous=(1e-6,) * 4)
     assert pushed(rubbed).command == float("inf")
     assert pushed(on_wheels(free, viscous=(1e-6,) * 4)).command < 1e-2

@@ -50,8 +50,8 @@ class Pushes(NamedTuple):
 
 
 def envelope_of(loop: ClosedLoop, momentum: float) -> Envelope:
-    """What the motions of a loop do not leave while its momentum (N m s) is no more than told, and what is left out by name
-    moves no orbit. A little more, for floats tell how low the orbit comes."""
+    """Tell what the motions of a loop do not leave while its momentum (N m s) is no more than told, and no part that is left
+    out by name moves the orbit. A little more, for floats tell how low the orbit comes."""
     begun, gravity = (loop.start.position, loop.start.velocity), loop.craft.gravity
     low, fast = (find(*begun, gravity) for find in (lowest, highest_speed)) if loop.has("two-body") else map(norm, begun)
     moment = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[-1])
@@ -60,7 +60,7 @@ def envelope_of(loop: ClosedLoop, momentum: float) -> Envelope:
 
 
 def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
-    """Bounds of what the parts of a loop that say theirs do together."""
+    """Add up the bounds of what the parts of a loop that say theirs do."""
     torques, errors = [Push(0.0)], [Push(0.0)]
     for fitted in loop.parts:
         for told, found in zip((torques, errors), _pushes(fitted, envelope), strict=True):
@@ -102,8 +102,8 @@ def _says(fitted: Fitted, envelope: Envelope) -> bool:
 
 
 def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:
-    """Bounds of a part's torque and of its error of the command, where it says them; those of one that is left out by name
-    are finite."""
+    """Read bounds of a part's torque and of its error of the command, where it says them; those of one that could be left out
+    by name are finite."""
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]

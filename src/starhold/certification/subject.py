@@ -56,7 +56,7 @@ class Subject:
 
     @property
     def envelope(self) -> Envelope:
-        """What its motions do not leave, for the bounds of parts."""
+        """Tell what its motions do not leave, for the bounds of parts."""
         return envelope_of(self.loop, above(self.total_momentum))
 
     @property

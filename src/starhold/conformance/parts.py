@@ -244,8 +244,8 @@ def keeps_what_it_says(part: Part) -> None:
             errors = tell_errors(params)
         if tell_torque:
             torque = tell_torque(params, envelope)
-        told = (*errors, *torque, *command)
-        require(min(told) >= 0.0, f"the bounds {told} are not all positive or 0")
+        limits = (*errors, *torque, *command)
+        require(min(limits) >= 0.0, f"the bounds {limits} are not all positive or 0")
         for name, size, bound in _pushes(part, loop, errors, torque, command):
             require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
 
@@ -276,8 +276,12 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
             if hasattr(reading, "rate"):
                 yield "error of the rate", norm(subtract(reading.rate, state.rate)), errors.rate
         elif part.role == "actuator" and part.hook("command"):
-            wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
-            yield "error of the command", norm(subtract(module.command(wanted, numbers), wanted)), command.torque
+            torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
+            yield (
+                "error of the command",
+                norm(subtract(module.command(torque_wanted, numbers), torque_wanted)),
+                command.torque,
+            )
     if part.role == "effector":
         for step in (1, 5, STEPS):
             end = fly(loop, step)[1]
@@ -285,11 +289,11 @@ def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command:
             if part.hook("bound"):
                 yield "torque", norm(module.reaction(effector, None, end.state, numbers)), most(torque, end.state)
             if part.hook("error"):
-                wanted = scale(
+                torque_wanted = scale(
                     0.1 * module.sure_torque(numbers, "norm"), cast(Any, tuple(random.uniform(-1, 1, 3).tolist()))
                 )
-                given = module.applied(effector, module.command(wanted, numbers), end.state, numbers)
-                yield "error of the command", norm(subtract(given, wanted)), most(command, end.state)
+                torque_given = module.applied(effector, module.command(torque_wanted, numbers), end.state, numbers)
+                yield "error of the command", norm(subtract(torque_given, torque_wanted)), most(command, end.state)
 
 
 def _draws(part: Part) -> bool:

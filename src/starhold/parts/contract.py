@@ -38,7 +38,7 @@ NO_ERRORS, UNBOUNDED = Errors(), Errors(math.inf, math.inf, math.inf)
 
 
 class Envelope(NamedTuple):
-    """What the motions of a loop do not leave, for parts that bound what they do: the least distance from the centre of
+    """Bounds the motions of a loop, for parts that bound what they do: the least distance from the centre of
     attraction (m) and the largest speed (m/s) of the orbit, the angular momentum of body and wheels together (N m s), the
     body's largest moment of inertia (kg m2), and the error of the magnetic field that is measured (T)."""
 

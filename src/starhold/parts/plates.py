@@ -67,11 +67,11 @@ def largest_torque(
     squares = np.einsum("ij,ik->ijk", n, n).reshape(-1, 9)
     largest = 0.0
     for seen in sights(n):
-        own = n[seen]
-        M = first[seen].T @ own
+        faces = n[seen]
+        M = first[seen].T @ faces
         low, _, high = np.linalg.eigvalsh(M + M.T) / 2.0
         arms = [float(np.linalg.norm(M - (low + (high - low) * k / 32.0) * np.eye(3), 2)) for k in range(33)]
-        others = np.linalg.norm(third[seen].T @ own, 2) + np.linalg.norm(second[seen].T @ squares[seen], 2)
+        others = np.linalg.norm(third[seen].T @ faces, 2) + np.linalg.norm(second[seen].T @ squares[seen], 2)
         largest = max(largest, float(min(arms) + others))
     # A little more, for what is seen nearly edge on may be taken for hidden.
     return largest + TOLERANCE * float(sum(np.linalg.norm(arms, axis=1).sum() for arms in (first, second, third)))
@@ -82,7 +82,7 @@ def sights(normals: NDArray[np.float64]) -> Iterator[NDArray[np.bool_]]:
     across the normals cut space into, each of which has an edge where two planes meet, or is a half of space."""
     across = [np.cross(*pair) for pair in combinations(normals, 2)]
     edges = [unit / size for unit in across if (size := np.linalg.norm(unit)) > TOLERANCE]
-    found = {tuple(normals @ side > 0.0) for side in (normals[0], -normals[0])} if not edges else set[tuple[bool, ...]]()
+    patterns = {tuple(normals @ side > 0.0) for side in (normals[0], -normals[0])} if not edges else set[tuple[bool, ...]]()
     for edge in [e * sign for e in edges for sign in (1.0, -1.0)]:
         height = normals @ edge
         flat = np.abs(height) <= TOLERANCE
@@ -94,5 +94,5 @@ def sights(normals: NDArray[np.float64]) -> Iterator[NDArray[np.bool_]]:
         angles = np.sort(np.concatenate([angles, angles + np.pi]))
         for half in (angles + np.append(angles[1:], angles[0] + 2.0 * np.pi)) / 2.0:
             aside = np.cos(half) * first + np.sin(half) * second
-            found.add(tuple(np.where(flat, normals @ aside, height) > 0.0))
-    yield from (np.array(one) for one in sorted(found))
+            patterns.add(tuple(np.where(flat, normals @ aside, height) > 0.0))
+    yield from (np.array(one) for one in sorted(patterns))

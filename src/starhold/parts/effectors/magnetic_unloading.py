@@ -94,8 +94,8 @@ def bound(params: Params, envelope: Envelope) -> Push:
     """
     limit = norm(params.dipole_limit)
     full = limit * magnetic_field.strongest(params.epoch, envelope.distance)
-    asked = params.gain * (envelope.momentum + norm(params.momentum)) + limit * envelope.field_error
-    return Push(full) if full <= asked else Push(asked, params.gain * envelope.moment)
+    for_momentum = params.gain * (envelope.momentum + norm(params.momentum)) + limit * envelope.field_error
+    return Push(full) if full <= for_momentum else Push(for_momentum, params.gain * envelope.moment)
 
 
 def examples() -> list[Params]:
