@@ -4,7 +4,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.vector import Vector, norm, scale
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Parameter, Push
 
 CARD = Card(
     title="Leak",
@@ -41,9 +41,9 @@ def torque(state, params, craft, memory):
     return memory
 
 
-def bound(params):
-    """The largest norm that it has (N m), which certificates take it in by."""
-    return norm(params.torque)
+def bound(params, envelope):
+    """The largest norm that it has, which certificates take it in by."""
+    return Push(norm(params.torque))
 
 
 def examples():

@@ -9,24 +9,22 @@ import pytest
 from starhold.certification.assumptions import ASSUMPTIONS
 from starhold.certification.certificate import write
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.openness import named, pushes
+from starhold.certification.openness import envelope_of, named, pushes
 from starhold.certification.station import certify_station
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.checker.check import check
-from starhold.laws import modal
+from starhold.laws import modal, wheel
 from starhold.parts.catalogue import PACKAGES, fit, parts
-from starhold.parts.craft import make_craft
 from starhold.parts.part import Fitted
 from starhold.scenario.reading import builtin_text, parse
-from tests.certification.loops import FULL, certified, is_pointing, loop_of, says, textbook
+from tests.certification.loops import certified, is_pointing, loop_of, rotors, says, textbook
 from tests.kernel import stations
-from tests.making import built
+from tests.making import built, on_wheels
 
 LAWS = ("pd-0", "lyapunov-0", "lqr-I", "lqr-II", "lqr-III", "lqr-numeric", "matrix-pd-inertial", "sliding-0", "wheel-0")
 TAKEN = {"two-body", "gravity-gradient", "linear-gravity", "three-body-gravity", "wheels", "inertial", "orbital", "history"}
 """The parts that the theorems in docs/certificates.md take in."""
-MARS = 4.2828375816e13
 
 
 def others(body):
@@ -55,8 +53,9 @@ def test_every_part_is_named_in_every_claim_that_does_not_take_it_in(name):
     for fitted in found:
         composed = loop.with_parts(fitted)
         enters = says(fitted)
-        assert enters or pushes(composed) == (0.0,) * 4, fitted.called
-        for claim, plain in zip(named(list(certificate.claims), composed), certificate.claims, strict=True):
+        assert enters or pushes(composed, envelope_of(composed, 1.0)) == (0.0,) * 6, fitted.called
+        claims = named(list(certificate.claims), composed, envelope_of(composed, 1.0))
+        for claim, plain in zip(claims, certificate.claims, strict=True):
             told = f"without:{fitted.part.role} {fitted.called}"
             assert (told in claim.assumptions) != (enters and is_pointing(claim)), (claim.kind, fitted.called)
             assert [text for text in claim.assumptions if text != told] == list(plain.assumptions)
@@ -128,24 +127,29 @@ def test_every_assumption_near_a_libration_point_is_told(loop):
     assert {name for claim in certify_station(loop).claims for name in claim.assumptions} <= set(ASSUMPTIONS)
 
 
-# --- where a bound holds ----------------------------------------------------------------------------------------------
+# --- how far a bound reaches ------------------------------------------------------------------------------------------
 
 
-def magnetic(position=(7e6, 0.0, 0.0), velocity=(0.0, 7.5e3, 0.0), gravity=None):
-    """A loop of a craft with a residual dipole."""
+def pushed(loop, momentum=1.0):
+    """What the parts of a loop do together."""
+    return pushes(loop, envelope_of(loop, momentum))
+
+
+def test_bounds_are_those_of_the_whole_orbit():
+    """A residual dipole is pushed as the strongest field of the orbit does, whose perigee is at half the distance."""
     loop = textbook()["pd-0"].with_parts(fit("environment", "residual-dipole", (0.01, 0.0, 0.02)))
-    given = {} if gravity is None else {"gravity": gravity}
-    craft = make_craft(FULL.inertia, torque_limit=0.05, **given)
-    return replace(loop, craft=craft, start=loop.start._replace(position=position, velocity=velocity))
+    gravity = loop.craft.gravity
+    torques = [
+        pushed(replace(loop, start=loop.start._replace(position=(2.4e7, 0.0, 0.0), velocity=(0.0, speed, 0.0)))).outside
+        for speed in ((gravity / 2.4e7) ** 0.5, (2.0 * gravity * (1.0 / 2.4e7 - 1.0 / 3.6e7)) ** 0.5)
+    ]
+    assert 8.0 < torques[1] / torques[0] < 9.5
 
 
-def test_a_bound_enters_only_where_it_holds():
-    """About another body, or with a perigee of less than 6371.2 km, the part is left out by name."""
-    speed = (2.0 * 3.986004418e14 * (1.0 / 7e6 - 1.0 / (7e6 + 6.37e6))) ** 0.5
-    outside = magnetic(velocity=(0.0, speed, 0.0)), magnetic((3.6e6, 0.0, 0.0), (0.0, 3.4e3, 0.0), MARS)
-    assert pushes(magnetic()).outside > 0.0
-    assert pushes(magnetic(velocity=(0.0, speed * 1.001, 0.0))).outside > 0.0
-    for loop in outside:
-        assert pushes(loop).outside == 0.0
-        (claim,) = named([certified("pd-0", disturbance=1e-6).claim("pointing")], loop)
-        assert "without:environment residual-dipole" in claim.assumptions
+def test_an_error_without_a_bound_is_refused_and_not_left_out():
+    """Of wheels that no limit keeps slow: no claim leaves wheels out by name."""
+    free = rotors("wheel", wheel.examples()[0])
+    rubbed = on_wheels(free, momentum_limit=(float("inf"),) * 4, viscous=(1e-6,) * 4)
+    assert pushed(rubbed).command == float("inf")
+    assert pushed(on_wheels(free, viscous=(1e-6,) * 4)).command < 1e-2
+    assert certify(rubbed, "", Wanted(pointing=True, disturbance=1e-9)).claim("pointing").outcome == "undecided"

@@ -63,12 +63,13 @@ def states_of(oracle, level, count):
     return [np.array(part).T for part in zip(*pairs, strict=True)]
 
 
-def after_a_period(fleet, q, w, unit):
-    """The state after a period in which the error points one way, and the outside torque turns over at a time of its own."""
+def after_a_period(fleet, q, w, unit, per_rate=0.0):
+    """The state after a period in which the error points one way, and the outside torque, which grows with the rate, turns
+    over at a time of its own."""
     command, turned = fleet.law(q, w) + fleet.error * unit, fleet.rng.uniform()
     for share, sign in ((turned, 1), (1 - turned, -1)):
         for _ in range(4):
-            torque = command + sign * fleet.outside * unit
+            torque = command + sign * (fleet.outside + per_rate * np.linalg.norm(w, axis=0)) * unit
             q, w = moved(fleet.J, fleet.inverse, q, w, torque, share * fleet.h / 4)
     return q, w
 
@@ -79,7 +80,8 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     oracle = Oracle(contents("flying", name), contents("flying", name)["claims"][0])
     level = oracle.numbers["level"] / 30.0**power
     push = 0.02 * math.sqrt(level * oracle.subject["gains.k_attitude"])
-    held = held_loop(name, outside=push, error=2 * push)
+    slope = push / math.sqrt(level / oracle.J.max())
+    held = held_loop(name, outside=push, error=2 * push, **{"outside.per.rate": slope / 4, "error.per.rate": slope})
     region = held.region(Fraction(level))
     fleet = fleet_of(name, push, 2 * push)
     q, w = states_of(oracle, level, fleet.lanes)
@@ -87,16 +89,19 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     sizes = np.array([float(region.sizes[name]) for name in STATE])
     assert (np.abs(x).max(axis=1) <= sizes).all()
     assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
-    Q, H, rest = held.fall(region)
+    Q, H, _, rest = held.fall(region)
     Q, H, felt, (A, pushes) = floats(Q), floats(H), floats(held.felt), held.linear(region)
     V = oracle.lyapunov(q, w)
     assert ((x * (H @ x)).sum(0) * (1 + 1e-9) >= V).all()
     for unit in (fleet.push(0, q, w), fleet.directions(), along(felt @ x)):
-        later, rate = after_a_period(fleet, q, w, unit)
-        most = fleet.h * (3 * push * np.linalg.norm(felt @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
+        later, rate = after_a_period(fleet, q, w, unit, 1.2 * slope)
+        grown = 3 * push + 1.25 * slope * np.linalg.norm(w, axis=0)
+        most = fleet.h * (grown * np.linalg.norm(felt @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
         assert (oracle.lyapunov(later, rate) - V <= most).all()
         y = np.concatenate([rate, later[1:]])
         assert (np.abs(y) <= np.array([[float(tube.sizes[name])] for name in STATE])).all()
+        drift = np.abs(rate - w).max(axis=1) / np.array([float(x) for x in tube.drift])
+        assert 0.1 < drift.max() <= 1.0
         # What is not linear is a push of the first kind and, beside, of the others.
         left, (B, b), others = y - floats(A) @ x, pushes[0], pushes[1:]
         v = np.linalg.solve(floats(B)[:3], left[:3])

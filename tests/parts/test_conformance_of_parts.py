@@ -98,7 +98,10 @@ BROKEN = {
     "an estimate of two numbers": ("estimator", {"Estimate(rate),": "Estimate(rate[:2]),"}, {"measures_what_it_says"}),
     "an exceeded bound": (
         "environment",
-        {"def torque": "def bound(params):\n    return 0.0\n\n\ndef torque"},
+        {
+            "def torque": "def bound(params, envelope):\n    return Push(0.0)\n\n\ndef torque",
+            "import Card, Parameter": "import Card, Parameter, Push",
+        },
         {"keeps_what_it_says"},
     ),
     "a unit without the period": ("environment", {"def torque": PREPARED}, {"keeps_units"}),

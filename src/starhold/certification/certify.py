@@ -70,7 +70,7 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
         claims = [undecided("convergence", EVERYWHERE, subject, f"{APART}: {reason}")]
     about = described(subject, [claim.kind for claim in claims])
-    return Certificate(name or loop.law.name, about, named(claims, loop))
+    return Certificate(name or loop.law.name, about, named(claims, loop, above(subject.total_momentum)))
 
 
 def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:

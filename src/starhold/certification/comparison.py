@@ -12,11 +12,12 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
-from starhold.certification.openness import driven_errors, pushes, samples_of
+from starhold.certification.openness import Pushes, driven_errors, pushes, samples_of
 from starhold.certification.subject import make_subject
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import DEVIATIONS
 from starhold.parts.effectors.wheels import BAND
 
 
@@ -56,13 +57,13 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
     if "share" in told and (driven := driven_errors(loop)) is not None:
-        exactly |= {"samples": samples_of(loop), "every": driven.recursion.every}
+        exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, "noise.beside": DEVIATIONS}
     if claim["theorem"] == POINTS:
-        own_torque, *errors = map(exact, pushes(loop))
-        least["outside"] = own_torque + (0 if OUTSIDE in claim["taken"] else known.modelled_norm)
-        least |= dict(zip(("error.attitude", "error.rate", "error"), errors, strict=True))
+        envelope = known.envelope("share" in told)._replace(momentum=float(told.get("momentum", 0)) * (1.0 + 1e-15))
+        least |= {name: exact(x) for name, x in pushes(loop, envelope).numbers.items()}
+        least["outside"] += 0 if OUTSIDE in claim["taken"] else known.modelled_norm
         # What is not told of is none.
-        told = {name: Fraction(0) for name in ("error.attitude", "error.rate")} | told
+        told = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | told
     most = {"limit": float(loop.craft.torque_limit), "limit.norm": float(loop.craft.torque_limit)}
     if wheels is not None:
         most |= {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit)}

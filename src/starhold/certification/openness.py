@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from math import ceil, isfinite
+from math import ceil, inf, isfinite
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
-from starhold.algebra.vector import Vector, apply, scale
+from starhold.algebra.vector import Vector, apply, norm, scale
 from starhold.certification.assumptions import WITHOUT
 from starhold.certification.certificate import Claim
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import NO_ERRORS, Errors, Noise, Recursion
-from starhold.parts.orbit import body_of, lowest, period_of
-from starhold.parts.part import Fitted, Part
+from starhold.parts.contract import DEVIATIONS, NO_ERRORS, Envelope, Errors, Noise, Push, Recursion
+from starhold.parts.craft import tensor
+from starhold.parts.orbit import highest_speed, lowest, period_of
+from starhold.parts.part import Fitted
 
 READ = {
     "environment": ("two-body", "gravity-gradient", "linear-gravity", "three-body-gravity"),
@@ -27,16 +30,28 @@ BOUNDED = ("pointing",)
 """Kinds of claims that take in torques from outside and errors by their bounds."""
 SPAN = 3600.0
 """Of how much time (s) a claim has a share without an orbit."""
+TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
+"""Roles whose `error` is of what the law is told, and of its command."""
+MORE = 1.0 + 1e-12
+"""A little more, for floats are added."""
 
 
 class Pushes(NamedTuple):
-    """Bounds of what acts on a loop and is told to no law: the torque from outside (N m), and errors of the attitude (rad)
-    and the rate (rad/s) that the law is told, and of the command (N m)."""
+    """Bounds of what acts on a loop and is told to no law: the torque from outside (N m, and N m s times the body's rate),
+    errors of the attitude (rad) and the rate (rad/s) that the law is told, and of the command (as the torque)."""
 
     outside: float
+    outside_per_rate: float = 0.0
     attitude: float = 0.0
     rate: float = 0.0
     command: float = 0.0
+    command_per_rate: float = 0.0
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The numbers of a claim that they are."""
+        names = ("outside", "outside.per.rate", "error.attitude", "error.rate", "error", "error.per.rate")
+        return dict(zip(names, self, strict=True))
 
 
 class Driven(NamedTuple):
@@ -46,16 +61,26 @@ class Driven(NamedTuple):
     parts: tuple[Fitted, ...]
 
 
-def pushes(loop: ClosedLoop) -> Pushes:
-    """Bounds of what the parts of a loop that say theirs do together."""
-    torques, errors = list[float](), [NO_ERRORS]
+def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
+    """Tell what the motions of a loop do not leave while its momentum (N m s) is no more than told, and no part that is left
+    out by name moves the orbit. A little more, for floats tell how low the orbit comes. noisy: but for a share of times."""
+    begun, gravity = (loop.start.position, loop.start.velocity), loop.craft.gravity
+    low, fast = (find(*begun, gravity) for find in (lowest, highest_speed)) if loop.has("two-body") else map(norm, begun)
+    moment = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[-1])
+    field = sum(_field_error(fitted, loop.period, noisy) for fitted in loop.used("sensor"))
+    return Envelope(low * (1.0 - 1e-9), fast * (1.0 + 1e-9), momentum, moment * MORE, field)
+
+
+def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
+    """Add up the bounds of what the parts of a loop that say theirs do."""
+    torques, errors = [Push(0.0)], [Push(0.0)]
     for fitted in loop.parts:
-        if (torque := _torque(loop, fitted)) is not None:
-            torques.append(torque)
-        if (error := _errors(loop, fitted)) is not None:
-            errors.append(error)
-    # A little more, for floats are added.
-    return Pushes(*(sum(own) * (1.0 + 1e-12) for own in (torques, *zip(*errors, strict=True))))
+        for told, found in zip((torques, errors), _pushes(fitted, envelope), strict=True):
+            told += [] if found is None else [found]
+    told = [NO_ERRORS, *(found for fitted in loop.parts if (found := _errors(loop, fitted)) is not None)]
+    attitude, rate, _ = (sum(own) for own in zip(*told, strict=True))
+    (torque, per_rate), (command, command_per_rate) = ([sum(x) for x in zip(*own, strict=True)] for own in (torques, errors))
+    return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate)))
 
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
@@ -93,7 +118,7 @@ def assumed_away(loop: ClosedLoop) -> list[str]:
     return [_called(f) for f in loop.parts if not _is_read(f)]
 
 
-def named(claims: list[Claim], loop: ClosedLoop) -> tuple[Claim, ...]:
+def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
     """The claims with an assumption for each part that they are not about."""
     away, driven = assumed_away(loop), driven_errors(loop)
 
@@ -101,7 +126,8 @@ def named(claims: list[Claim], loop: ClosedLoop) -> tuple[Claim, ...]:
         if claim.kind not in BOUNDED or claim.outcome != "proved":
             return tuple(f"{WITHOUT}{name}" for name in away)
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
-        return tuple(f"{WITHOUT}{_called(f)}" for f in loop.parts if not (_is_read(f) or _says(loop, f, noisy)))
+        envelope = envelope_of(loop, momentum, bool(noisy))
+        return tuple(f"{WITHOUT}{_called(f)}" for f in loop.parts if not (_is_read(f) or _says(loop, f, envelope, noisy)))
 
     return tuple(replace(claim, assumptions=(*claim.assumptions, *more(claim))) for claim in claims)
 
@@ -114,18 +140,22 @@ def _is_read(fitted: Fitted) -> bool:
     return fitted.part.name in READ.get(fitted.part.role, ()) and fitted.part.file is None
 
 
-def _says(loop: ClosedLoop, fitted: Fitted, noisy: Collection[Fitted]) -> bool:
+def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, noisy: Collection[Fitted]) -> bool:
     """Whether all that a part does to a loop has a bound. noisy: parts whose noise is taken in."""
-    if fitted in noisy or _is_idle(loop, fitted) or _torque(loop, fitted) is not None:
+    if fitted in noisy or _is_idle(loop, fitted, envelope) or any(push is not None for push in _pushes(fitted, envelope)):
         return True
     return _errors(loop, fitted) is not None and not _is_random(_noise(fitted, loop.period))
 
 
-def _torque(loop: ClosedLoop, fitted: Fitted) -> float | None:
-    """The largest torque (N m) of a part, where it says one that holds."""
-    tell: Any = fitted.part.hook("bound")
-    acts = fitted.part.hook("torque" if fitted.part.role == "environment" else "reaction") is not None
-    return float(tell(fitted.params)) if tell is not None and acts and _holds(loop, fitted.part) else None
+def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:
+    """Read bounds of a part's torque and of its error of the command, where it says them; those of one that could be left
+    out by name are finite."""
+    part = fitted.part
+    acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
+    tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
+    found = [None if tell is None else tell(fitted.params, envelope) for tell in tells]
+    torque, error = (push if push is None or _is_read(fitted) or all(map(isfinite, push)) else None for push in found)
+    return torque, error
 
 
 def _errors(loop: ClosedLoop, fitted: Fitted) -> Errors | None:
@@ -137,9 +167,22 @@ def _errors(loop: ClosedLoop, fitted: Fitted) -> Errors | None:
 
 
 def _bounded(fitted: Fitted) -> Errors | None:
-    tell: Any = fitted.part.hook("error")
+    tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
     found = NO_ERRORS if tell is None else tell(fitted.params)
     return None if tell is None or not all(map(isfinite, found)) else found
+
+
+def _field_error(fitted: Fitted, period: float, noisy: bool) -> float:
+    """The largest error (T) of the magnetic field that a sensor shows; its noise has a bound but for a share of times."""
+    if "magnetic_field" not in _shown(fitted):
+        return 0.0
+    error, deviation = _bounded(fitted), _noise(fitted, period).field
+    return inf if error is None or (deviation and not noisy) else error.field + DEVIATIONS * deviation
+
+
+def measures_noisy_field(loop: ClosedLoop) -> bool:
+    """Whether a sensor shows the magnetic field with noise."""
+    return any(_noise(fitted, loop.period).field for fitted in loop.used("sensor"))
 
 
 def _noise(fitted: Fitted, period: float) -> Noise:
@@ -178,19 +221,9 @@ def _shown(sensor: Fitted) -> set[str]:
     return set(sensor.part.module.Reading._fields)
 
 
-def _is_idle(loop: ClosedLoop, fitted: Fitted) -> bool:
+def _is_idle(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
     """Whether a sensor shows nothing but what is read by parts whose torque has a bound, whatever they are shown."""
     if fitted.part.role != "sensor" or _shown(fitted) & {*loop.start._fields, *loop.law.reads}:
         return False
     readers = [f for f in loop.parts if _shown(fitted) & {*f.part.reads, *f.part.needs}]
-    return all(f.part.role == "effector" and _torque(loop, f) is not None for f in readers)
-
-
-def _holds(loop: ClosedLoop, part: Part) -> bool:
-    """Whether all of the orbit lies where the part's bound holds."""
-    if part.about and body_of(loop.craft.gravity) != part.about:
-        return False
-    if not part.bound_from:
-        return True
-    # A little more, for floats tell how low the orbit comes.
-    return lowest(loop.start.position, loop.start.velocity, loop.craft.gravity) >= part.bound_from * (1.0 + 1e-9)
+    return all(f.part.role == "effector" and _pushes(f, envelope)[0] is not None for f in readers)

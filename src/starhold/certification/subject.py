@@ -10,11 +10,12 @@ from flint import arb, fmpq
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
-from starhold.certification.openness import READ, assumed_away
+from starhold.certification.openness import READ, assumed_away, envelope_of
 from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import Envelope
 from starhold.parts.craft import Craft, tensor
 from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels
 from starhold.parts.environments.gravity_gradient import gravity_gradient
@@ -49,6 +50,10 @@ class Subject:
     def inertia(self) -> Rows:
         """The inertia tensor, kg m2."""
         return rows(tensor(self.loop.craft.inertia))
+
+    def envelope(self, noisy: bool) -> Envelope:
+        """Tell what its motions do not leave, for the bounds of parts; noisy: but for a share of times."""
+        return envelope_of(self.loop, above(self.total_momentum), noisy)
 
     @property
     def moving(self) -> bool:

@@ -238,9 +238,15 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
         start = f"up to {angle(n['slew_angle'])} at up to {speed(n['rate_start'])}"
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
     beside = " beside those that the law is told" if n["told"] else ""
-    bounds = [f"torques from outside of up to {shown(n['torque'], ' N m')}{beside}"]
+
+    def pushed(name: str) -> str:
+        growing = n[f"{name}_per_rate"]
+        more = f" and {shown(growing, ' N m s')} times the body's rate" if growing else ""
+        return f"of up to {shown(n[name], ' N m')}{more}"
+
+    bounds = [f"torques from outside {pushed('torque')}{beside}"]
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
-    bounds += [f"errors of the command of up to {shown(n['error'], ' N m')}"] if n["error"] else []
+    bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
     near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"

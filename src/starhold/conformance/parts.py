@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from starhold.algebra.quaternion import conjugate, multiply, to_reference, vector_part
 from starhold.algebra.structure import flatten, leaves
-from starhold.algebra.vector import ZERO, add, apply, norm, subtract
+from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtract
+from starhold.certification.openness import COMMANDED, envelope_of
 from starhold.conformance.bench import PERIOD, sample_loop
 from starhold.conformance.units import SYSTEMS, rescale, rescale_params
 from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, require, run
@@ -19,7 +20,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import fly_plainly, numbers_of
 from starhold.parts.catalogue import as_part, from_file, parts, read_module, role_of
-from starhold.parts.contract import UNBOUNDED, Card
+from starhold.parts.contract import UNBOUNDED, Card, Errors, Push
 from starhold.parts.craft import make_craft
 from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice
@@ -175,19 +176,20 @@ def keeps_momentum(part: Part) -> None:
         loop = loop if part.flag("ACTS") else replace(loop, limit="axis", command_limit=0.0)
         loop = replace(loop, start=loop.start._replace(position=ZERO, velocity=ZERO), period=PERIOD / 10.0)
         carries = [loop.carry(), fly(loop, 10 * STEPS)[1]]
-        numbers = loop.setup().effectors
-        totals: list[Any] = []
-        for carry in carries:
-            effectors = zip(loop.used("effector"), carry.effectors, numbers, strict=True)
-            total = apply(loop.craft.inertia, carry.state.rate)
-            for fitted, state, prepared in effectors:
-                module = fitted.part.module
-                total = add(total, module.momentum(state, prepared))
-                if fitted.part.hook("inertia_change") is not None:
-                    total = add(total, apply(module.inertia_change(state, prepared), carry.state.rate))
-            totals.append(to_reference(carry.state.attitude, total))
-        apart = float(np.abs(np.subtract(*totals)).max()) / max(float(np.abs(totals).max()), 1e-300)
+        totals = [to_reference(carry.state.attitude, _momentum(loop, carry)) for carry in carries]
+        apart = float(np.abs(np.subtract(totals[0], totals[1])).max()) / max(float(np.abs(totals).max()), 1e-300)
         require(apart < 1e-7, f"the angular momentum changes by {apart:.1e} of itself")
+
+
+def _momentum(loop: ClosedLoop, carry: Any) -> Vector:
+    """The angular momentum of body and effectors (N m s, body axes)."""
+    total = apply(loop.craft.inertia, carry.state.rate)
+    for fitted, state, prepared in zip(loop.used("effector"), carry.effectors, loop.setup().effectors, strict=True):
+        module = fitted.part.module
+        total = add(total, module.momentum(state, prepared))
+        if fitted.part.hook("inertia_change") is not None:
+            total = add(total, apply(module.inertia_change(state, prepared), carry.state.rate))
+    return total
 
 
 def measures_what_it_says(part: Part) -> None:
@@ -223,13 +225,23 @@ def keeps_what_it_says(part: Part) -> None:
     if tell_torque is None and tell_errors is None:
         raise NotApplicableError("it says no bound of its torque or of its errors")
     for params in part.examples():
-        errors, torque = tell_errors(params) if tell_errors else UNBOUNDED, tell_torque(params) if tell_torque else inf
-        require(min(*errors, torque) >= 0.0, f"the bounds {(*errors, torque)} are not all positive or 0")
-        for name, size, bound in _pushes(part, loop_with(part, params), (*errors, torque)):
+        loop = loop_with(part, params)
+        # In a few steps torques from outside bring in little.
+        envelope = envelope_of(loop, 1.01 * norm(_momentum(loop, loop.carry())), noisy=True)
+        errors, torque, command = UNBOUNDED, Push(inf), Push(inf)
+        if tell_errors and part.role in COMMANDED:
+            command = tell_errors(params, envelope)
+        elif tell_errors:
+            errors = tell_errors(params)
+        if tell_torque:
+            torque = tell_torque(params, envelope)
+        limits = (*errors, *torque, *command)
+        require(min(limits) >= 0.0, f"the bounds {limits} are not all positive or 0")
+        for name, size, bound in _pushes(part, loop, errors, torque, command):
             require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
 
 
-def _pushes(part: Part, loop: ClosedLoop, bounds: tuple[float, ...]) -> Iterator[tuple[str, float, float]]:
+def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
     """Yield torques and errors of a part at states of a flight and at other attitudes, and their bounds."""
 
     class Silent(Dice):
@@ -239,7 +251,10 @@ def _pushes(part: Part, loop: ClosedLoop, bounds: tuple[float, ...]) -> Iterator
     dice = (Silent if part.hook("noise") else Dice)((1, 2), 3, 0)
     fitted, module = next(f for f in loop.parts if f.part == part), part.module
     numbers, random = fitted.prepared(loop.period), np.random.default_rng(1)
-    attitude, rate, command, torque = bounds
+
+    def most(push: Push, state: Any) -> float:
+        return push.torque + push.per_rate * norm(state.rate)
+
     memory = fitted.remembered(numbers, *([loop.start] if part.role == "sensor" else []))
     for step in range(STEPS):
         turned = random.normal(size=4)
@@ -248,23 +263,34 @@ def _pushes(part: Part, loop: ClosedLoop, bounds: tuple[float, ...]) -> Iterator
         )
         if part.role == "environment":
             memory = module.update(memory, state, numbers, dice, step) if part.hook("update") else memory
-            yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), torque
+            yield "torque", norm(module.torque(state, numbers, loop.craft, memory)), most(torque, state)
         elif part.role == "sensor":
             reading, memory = module.measure(state, memory, numbers, dice, step)
             if hasattr(reading, "attitude"):
                 # The angle, of whichever quaternion.
                 turn = 2.0 * norm(vector_part(multiply(conjugate(state.attitude), reading.attitude)))
-                yield "error of the attitude", turn, attitude
+                yield "error of the attitude", turn, errors.attitude
             if hasattr(reading, "rate"):
-                yield "error of the rate", norm(subtract(reading.rate, state.rate)), rate
+                yield "error of the rate", norm(subtract(reading.rate, state.rate)), errors.rate
         elif part.role == "actuator" and part.hook("command"):
-            wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
-            yield "error of the command", norm(subtract(module.command(wanted, numbers), wanted)), command
+            torque_wanted: Any = tuple(random.normal(scale=10.0 ** random.uniform(-6, 0), size=3).tolist())
+            yield (
+                "error of the command",
+                norm(subtract(module.command(torque_wanted, numbers), torque_wanted)),
+                command.torque,
+            )
     if part.role == "effector":
         for step in (1, 5, STEPS):
             end = fly(loop, step)[1]
             effector = end.effectors[[f.part for f in loop.used("effector")].index(part)]
-            yield "torque", norm(module.reaction(effector, None, end.state, numbers)), torque
+            if part.hook("bound"):
+                yield "torque", norm(module.reaction(effector, None, end.state, numbers)), most(torque, end.state)
+            if part.hook("error"):
+                torque_wanted = scale(
+                    0.1 * module.sure_torque(numbers, "norm"), cast(Any, tuple(random.uniform(-1, 1, 3).tolist()))
+                )
+                torque_given = module.applied(effector, module.command(torque_wanted, numbers), end.state, numbers)
+                yield "error of the command", norm(subtract(torque_given, torque_wanted)), most(command, end.state)
 
 
 def _draws(part: Part) -> bool:

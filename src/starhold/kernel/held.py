@@ -2,7 +2,8 @@
 
 J w' = u + d - w x Jw with u = the law's torque at the last sample and an error. What errors and torques d from outside do is
 bounded by what they are; what is of higher order in the period, or not linear, by the size of the set, and so is what the
-law's torque and the motion have of a moving target, wheels and a torque that the law is told. Docs/kernel.md, 10.
+law's torque and the motion have of a moving target, wheels and a torque that the law is told, and what changes of these do.
+Docs/kernel.md, 10.
 """
 
 from __future__ import annotations
@@ -53,18 +54,20 @@ class Region:
 @dataclass(frozen=True)
 class Tube:
     """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
-    drift, how far q turns, and the torques beside the law's: what is held with it, and what is not."""
+    drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
+    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time."""
 
     sizes: Sizes
     drift: list[Fraction]
     turned: Fraction
     held: Fraction
-    uneven: Fraction
+    pushed: Fraction
+    stale: Fraction
 
     @property
     def push(self) -> Fraction:
-        """Return the bound of both together."""
-        return self.held + self.uneven
+        """Return the bound of all together, in the mean."""
+        return self.held + self.pushed + self.stale
 
 
 class Held:
@@ -72,12 +75,14 @@ class Held:
 
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
-        self.loop, self.h, self.outside, self.error = loop, numbers["period"], numbers["outside"], numbers["error"]
+        self.loop, self.h = loop, numbers["period"]
+        self.constant = {name: numbers[name] for name in ("outside", "error")}
+        self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.turned, self.rated = (
             sum((numbers.get(f"{kind}.{name}") or Fraction(0) for kind in ("error", "noise")), Fraction(0))
             for name in ("attitude", "rate")
         )
-        demand(self.h > 0, "a period is not positive")
+        demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
         names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}
         each = {"e": [f"outside.{k}" for k in AXES]} | {letter: [name] * 3 for letter, name in names.items()}
@@ -90,10 +95,16 @@ class Held:
         loop.autonomous(loop.u, kept="".join(letter for letter in told if told[letter]))
         self.told = {name: numbers[name] for letter, own in each.items() if told[letter] for name in own}
         self.beside = minus(loop.balance(NONE), free)
-        self.left = [p + q for p, q in zip(minus(loop.u, self.u), self.beside, strict=True)]
+        # What of it vanishes with the state is in V' as it is: that by momentum of wheels does no work.
+        asked, turning = minus(loop.u, self.u), growing(self.beside)
+        self.more = growing(asked)
+        left = [p + q for p, q in zip(minus(asked, self.more), minus(self.beside, turning), strict=True)]
+        # What does not, by the first that it has of what comes from outside.
+        self.rigid = {x: [first(p, x) for p in left] for x in ("e", "a", "h", "r")}
         self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
-        self.gyroscopic = [-p for p in free]
-        self.pull, self.bend = apply(self.N, self.u), apply(self.N, self.gyroscopic)
+        self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
+        self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
+        self.bend = apply(self.N, self.gyroscopic)
         # V' to V'''' while the acceleration u is held.
         acceleration = [u - g for u, g in zip(variables("u"), self.bend, strict=True)]
         self.rates = [loop.slopes_along(V, acceleration)]
@@ -106,6 +117,7 @@ class Held:
         demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
         # What a torque does to V: felt x.
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
+        self.worked = dot(apply(self.felt, x), self.beside)
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
         demand(definite(self.under), "V is not least on target")
@@ -125,7 +137,8 @@ class Held:
         turn = root(1 - least * least) if least > 0 else Fraction(1)
         X = [[c * x for x in row] for row in inverse(self.under)]
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
-        return Region(X, sizes | {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in STATE[TURN]}, least)
+        sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in STATE[TURN]}
+        return Region(X, sizes | self.others, least)
 
     def misread(self, region: Region) -> Fraction:
         """Return how far the torque is from what the law asks for at the true state, for errors of what it is told."""
@@ -135,7 +148,7 @@ class Held:
         J = [[poly(x).number for x in row] for row in self.loop.J]
         wrong = {"q": self.turned / 2, "w": self.rated + self.turned * r, "r": self.turned * r, "a": self.turned * a}
         wrong |= {"h": stretch(J) * self.rated, "e": 2 * e}
-        sizes = {name: x + wrong[name[0]] for name, x in (region.sizes | self.others).items()}
+        sizes = {name: x + wrong[name[0]] for name, x in region.sizes.items()}
         columns = {letter: [name for name in sizes if name[0] == letter] for letter in wrong}
         slopes = {
             k: [[most(p.slope(name), sizes) for name in own] for p in self.loop.u] for k, own in columns.items() if own
@@ -147,58 +160,65 @@ class Held:
         own = [x for name, x in self.others.items() if name[0] == letter]
         return norm(own) if letter == "e" else max(own, default=Fraction(0))
 
-    def stale(self, sizes: Sizes, drift: list[Fraction]) -> Fraction:
-        """Return how far the torques beside the law's come from where they are at a sample."""
+    def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
+        """Return bounds of the torque from outside and of the error of the command at rates, to which the target's adds."""
+        turning = norm(sizes[name] for name in STATE[RATE]) + self.size("r")
+        outside, error = (x + self.per_rate[name] * turning for name, x in self.constant.items())
+        return {"outside": outside, "both": outside + error}
+
+    def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
+        """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
+        nothing on, what is told at once."""
         e, r, a, H = (self.size(letter) for letter in "erah")
-        w = norm(sizes[name] for name in STATE[RATE])
-        change = {"r": self.h * (a + w * r), "a": 2 * a, "h": self.h * ((w + r) * H + e + self.outside), "e": 2 * e}
-        changes = named(STATE[RATE], drift) | {name: change[name[0]] for name in self.others}
-        return norm(sum((most(p.slope(x), sizes) * changes[x] for x in sorted(p.names)), Fraction(0)) for p in self.beside)
+        w, outside = norm(sizes[name] for name in STATE[RATE]), self.pushed(sizes)["outside"]
+        change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
+        return sum((felt(parts, letter, sizes) * x for letter, x in change.items()), Fraction(0))
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
-        sizes, held = region.sizes | self.others, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
-        steady = self.error + self.misread(region) + norm(most(p, sizes) for p in self.left)
+        sizes, held = region.sizes, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
+        steady = self.misread(region)
+        steady += sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
         widths = [norm(row) for row in self.N]
 
-        def drifted(wide: list[Fraction]) -> list[Fraction]:
-            return [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
-
-        def uneven(wide: list[Fraction]) -> Fraction:
-            return self.outside + self.stale(sizes | named(STATE[RATE], wide), drifted(wide))
-
         def reached(wide: list[Fraction]) -> list[Fraction]:
-            push, columns = steady + uneven(wide), zip(STATE[RATE], held.values(), widths, self.bend, strict=True)
-            return [sizes[x] + self.h * (u + push * n + most(g, named(STATE[RATE], wide))) for x, u, n, g in columns]
+            within = sizes | named(STATE[RATE], wide)
+            push = steady + self.pushed(within)["both"] + self.stale(within, self.beside)
+            columns = zip(STATE[RATE], held.values(), widths, self.bend, strict=True)
+            return [sizes[x] + self.h * (u + push * n + most(g, within)) for x, u, n, g in columns]
 
         wide = settled(reached, [sizes[name] for name in STATE[RATE]])
         turned = self.h / 2 * norm(wide)
         far = {name: min(sizes[name] + turned, Fraction(1)) for name in STATE[TURN]}
-        sizes = sizes | {"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held
-        return Tube(sizes, drifted(wide), turned, steady, uneven(wide))
+        drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
+        within = sizes | {"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held
+        return Tube(within, drift, turned, steady, self.pushed(within)["both"], self.stale(within, self.beside))
 
-    def fall(self, region: Region) -> tuple[Rows, Rows, Fraction]:
-        """Return Q, H and r such that V changes in a period by h (p |felt x| + r - x.Qx) at most, with the push p of the
-        tube, and V <= x.Hx."""
+    def fall(self, region: Region) -> tuple[Rows, Rows, Fraction, Fraction]:
+        """Return Q, H, p and r such that V changes in a period by h (p |felt x| + r - x.Qx) at most, and V <= x.Hx."""
         h, tube = self.h, self.tube(region)
         bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
         pushed = [tube.push * norm(row) for row in self.N]
         # How far pushes take the rates from where they go without.
         away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(bent, d), strict=True)])
         slope = {name: most(self.rates[0].slope(name), tube.sizes) for name in ("q0", *STATE)}
-        rest = h**3 / 24 * most(self.rates[3], tube.sizes)
-        rest += tube.push / 2 * norm(reach(self.felt, [*tube.drift, *[tube.turned] * 3]))
+        rest, push = h**3 / 24 * most(self.rates[3], tube.sizes), tube.held + tube.pushed
+        # What changes of momentum do to V, which is less than what their torques do to the body.
+        rest += self.stale(tube.sizes, [self.worked])
+        rest += push / 2 * norm(reach(self.felt, [*tube.drift, *[tube.turned] * 3]))
         rest += reach([[slope[name] for name in STATE[RATE]]], away)[0] / 2
         rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        return least_form(-self.mean, region), over, rest
+        return least_form(-self.mean, region), over, push, rest
 
     def swing(self, region: Region) -> Fraction:
         """Return a bound of |V'| between samples."""
         tube = self.tube(region)
         sizes = tube.sizes
-        return most(self.rates[0], sizes) + tube.push * norm(reach(self.felt, [sizes[name] for name in STATE]))
+        return most(self.rates[0], sizes) + (tube.push + tube.stale) * norm(
+            reach(self.felt, [sizes[name] for name in STATE])
+        )
 
     def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
         """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, of
@@ -211,12 +231,15 @@ class Held:
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         x, near = [var(name) for name in STATE], region.sizes | {"v": turn * turn}
-        unlike = [p - own - g for p, own, g in zip(u, apply(linear, x), self.gyroscopic, strict=True)]
+        parts = zip(u, self.more, apply(linear, x), self.gyroscopic, strict=True)
+        unlike = [p + more - own - g for p, more, own, g in parts]
         bent = [[most(g.slope(name), tube.sizes) for name in STATE[RATE]] for g in self.gyroscopic]
-        odd = [most(p.at({"q0": 1 - var("v")}), near) + y for p, y in zip(unlike, reach(bent, tube.drift), strict=True)]
-        uneven = tube.uneven + norm(odd)
+        odd = norm(most(p.at({"q0": 1 - var("v")}), near) for p in unlike)
+        # Rates drift from nothing on, too.
+        mean = tube.pushed + tube.stale + odd + stretch(bent) * norm(tube.drift) / 2
+        uneven = 2 * mean - tube.pushed - odd
         return A, [
-            ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], tube.held + uneven),
+            ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], tube.held + mean),
             (scalar(0) + N, h * h / 8 * uneven),
             (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))),
         ]
@@ -233,8 +256,8 @@ def least_form(p: Poly, region: Region) -> Rows:
     sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
     middle, radius = scalar(0, 6), scalar(0, 6)
     for m, c in p.terms.items():
-        own, power = [name for name in m if name != "q0"], m.count("q0")
-        demand(len(own) > 1, "the torque is not zero at rest on target")
+        own, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
+        demand(set(own[-2:]) <= set(place) and len(own) > 1, "the torque is not zero at rest on target")
         # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
         *left, i, k = own
         high = c * prod(sizes[name] for name in left)
@@ -247,6 +270,21 @@ def least_form(p: Poly, region: Region) -> Rows:
     for i, row in enumerate(radius):
         middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
     return middle
+
+
+def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
+    """Return how much parts change at most with a vector, in norms."""
+    return stretch([[most(p.slope(f"{letter}{k + 1}"), sizes) for k in AXES] for p in parts])
+
+
+def first(p: Poly, letter: str) -> Poly:
+    """Return the terms of which the first variable but q0 has this letter."""
+    return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
+
+
+def growing(parts: list[Poly]) -> list[Poly]:
+    """Return what of polynomials vanishes with the state."""
+    return [Poly({m: c for m, c in p.terms.items() if set(m) & set(STATE)}) for p in parts]
 
 
 def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:

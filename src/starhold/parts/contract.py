@@ -28,26 +28,31 @@ class NoParams(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """The largest errors that a sensor, actuator or effector makes, beside its noise: of the attitude (rad) and of the rate
-    (rad/s) that it gives, and of the command that it passes on (N m), in norm; `inf` for one without a bound."""
+    """The largest errors that a sensor makes, beside its noise: of the attitude (rad), of the rate (rad/s) and of the
+    magnetic field (T) that it gives, in norm; `inf` for one without a bound."""
 
     attitude: float = 0.0
     rate: float = 0.0
-    command: float = 0.0
+    field: float = 0.0
 
 
 NO_ERRORS, UNBOUNDED = Errors(), Errors(math.inf, math.inf, math.inf)
 
 
+DEVIATIONS = 8.0
+"""How many deviations a Gaussian vector is taken to be long at most where a part bounds by it what it does."""
+
+
 class Noise(NamedTuple):
     """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), which
     is new every so many control periods, and at each control step of the rate (rad/s) and of the change of a gyro's bias
-    until the next (rad/s)."""
+    until the next (rad/s); the deviation about each axis of that of the magnetic field (T)."""
 
     attitude: Matrix = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     every: int = 1
     rate: float = 0.0
     walk: float = 0.0
+    field: float = 0.0
 
 
 class Recursion(NamedTuple):
@@ -61,6 +66,26 @@ class Recursion(NamedTuple):
     every: int
     size: int
     """How many vectors of errors are kept."""
+
+
+class Envelope(NamedTuple):
+    """Bounds the motions of a loop, for parts that bound what they do: the least distance from the centre of
+    attraction (m) and the largest speed (m/s) of the orbit, the angular momentum of body and wheels together (N m s), the
+    body's largest moment of inertia (kg m2), and the error of the magnetic field that is measured (T)."""
+
+    distance: float
+    speed: float
+    momentum: float
+    moment: float
+    field_error: float = 0.0
+
+
+class Push(NamedTuple):
+    """A bound of the norm of a torque or of an error of the command, which may grow with the body's rate: `torque` (N m),
+    and `per_rate` (N m s) times the norm of the rate (rad/s); `inf` for one without a bound."""
+
+    torque: float
+    per_rate: float = 0.0
 
 
 @dataclass(frozen=True)

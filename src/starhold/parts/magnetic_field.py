@@ -21,6 +21,8 @@ ASSUMPTIONS = (
 )
 RADIUS = 6.3712e6
 """The reference radius of the coefficients, m."""
+GROUND = 6.35e6
+"""A distance (m) from the Earth's centre that is below ground everywhere."""
 FIRST, LAST = (days_of((year, 1.0, 1.0, 0.0, 0.0, 0.0)) for year in (2025.0, 2030.0))
 """Days since J2000 that the coefficients are for."""
 Row: TypeAlias = tuple[int, int, float, float, float, float]
@@ -102,16 +104,17 @@ def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> 
     return Numbers(cosines, sines, sidereal(days), period)
 
 
-def strongest(epoch: Date) -> float:
-    """A bound of the field's strength (T) wherever the distance is at least `RADIUS`, at an epoch (UTC).
+def strongest(epoch: Date, distance: float) -> float:
+    """A bound of the field's strength (T) from a distance (m) from the Earth's centre on, at an epoch (UTC).
 
     In no direction do the harmonics of degree n give more than n + 1 times the root of the sum of their squared
-    coefficients, by the addition theorem. Errors as of `prepared`."""
+    coefficients, by the addition theorem; they fall with the power n + 2 of the distance. Errors as of `prepared`.
+    """
     days = _known(epoch)
     total = 0.0
     for degree in range(1, ROWS[-1][0] + 1):
         squares = [g * g + h * h for n, _, g, h in _at(days, ROWS) if n == degree]
-        total += (degree + 1.0) * sqrt(sum(squares))
+        total += (degree + 1.0) * sqrt(sum(squares)) * (RADIUS / distance) ** (degree + 2)
     return 1e-9 * total
 
 

@@ -94,6 +94,13 @@ def period_of(position: Vector, velocity: Vector, gravity: float) -> float:
     return math.tau * gravity / math.sqrt((-2.0 * energy) ** 3) if energy < 0.0 else math.inf
 
 
+def highest_speed(position: Vector, velocity: Vector, gravity: float) -> float:
+    """The largest speed (m/s) of the whole orbit, at its lowest point."""
+    energy = _invariants(position, velocity, gravity)[1]
+    nearest = lowest(position, velocity, gravity)
+    return math.sqrt(max(2.0 * (energy + gravity / nearest), math.hypot(*velocity) ** 2))
+
+
 def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) -> float:
     """When (s) the motion first comes down to this distance (m) from the centre, infinity for never. The start is beyond."""
     distance, energy, radial, _ = _invariants(position, velocity, gravity)

@@ -52,11 +52,6 @@ class Part:
         return getattr(self.module, "ABOUT", "")
 
     @property
-    def bound_from(self) -> float:
-        """The distance (m) from the centre of attraction from which on its `bound` holds, 0 for everywhere."""
-        return getattr(self.module, "BOUND_FROM", 0.0)
-
-    @property
     def reads(self) -> tuple[str, ...]:
         """Readings, by name, that a law or an effector with `switch` cannot do without."""
         return getattr(self.module, "READS", ())

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from itertools import combinations
 from math import hypot
 from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, scale
@@ -11,6 +16,8 @@ from starhold.algebra.vector import Vector, scale
 COLUMNS = ("area", "normal_x", "normal_y", "normal_z", "x", "y", "z")
 """The columns of a table of plates: area (m2), outward normal, and centre from the centre of mass (m), body axes."""
 TEXT = "areas, outward normals and centres from the centre of mass, body axes; no plate shades another"
+TOLERANCE = 1e-9
+"""A sine below which a plate counts as seen edge on."""
 BOX = (
     (0.06, 1.0, 0.0, 0.0, 0.052, -0.01, 0.02),
     (0.06, -1.0, 0.0, 0.0, -0.048, -0.01, 0.02),
@@ -41,3 +48,51 @@ def plates_of(rows: Any) -> Plates:
             raise ValueError(f"plate {number} needs an area of at least 0 and a normal with a direction")
         normals.append(scale(1.0 / size, (x, y, z)))
     return Plates(tuple(row[0] for row in rows), tuple(normals), tuple((row[4], row[5], row[6]) for row in rows))
+
+
+def largest_torque(
+    normals: Sequence[Vector],
+    taken: Sequence[Vector],
+    mirrored: Sequence[Vector] = (),
+    scattered: Sequence[Vector] = (),
+) -> float:
+    """A bound (m3) of |s x sum c_i taken_i - sum c_i^2 mirrored_i - sum c_i scattered_i| over all unit vectors s, with c_i =
+    max(n_i.s, 0).
+
+    While the same plates are seen the first sum is Ms, and |s x Ms| = |s x (M - x)s| is at most |M - x| for any number x.
+    The others are linear in s and in the products of its components.
+    """
+    n = np.array(normals)
+    first, second, third = (np.array(arms if len(arms) else np.zeros_like(n)) for arms in (taken, mirrored, scattered))
+    squares = np.einsum("ij,ik->ijk", n, n).reshape(-1, 9)
+    largest = 0.0
+    for seen in sights(n):
+        faces = n[seen]
+        M = first[seen].T @ faces
+        low, _, high = np.linalg.eigvalsh(M + M.T) / 2.0
+        arms = [float(np.linalg.norm(M - (low + (high - low) * k / 32.0) * np.eye(3), 2)) for k in range(33)]
+        others = np.linalg.norm(third[seen].T @ faces, 2) + np.linalg.norm(second[seen].T @ squares[seen], 2)
+        largest = max(largest, float(min(arms) + others))
+    # A little more, for what is seen nearly edge on may be taken for hidden.
+    return largest + TOLERANCE * float(sum(np.linalg.norm(arms, axis=1).sum() for arms in (first, second, third)))
+
+
+def sights(normals: NDArray[np.float64]) -> Iterator[NDArray[np.bool_]]:
+    """Yield which plates are seen at once, as (n,) of bool, for all directions to see them from: the cells that planes
+    across the normals cut space into, each of which has an edge where two planes meet, or is a half of space."""
+    across = [np.cross(*pair) for pair in combinations(normals, 2)]
+    edges = [unit / size for unit in across if (size := np.linalg.norm(unit)) > TOLERANCE]
+    patterns = {tuple(normals @ side > 0.0) for side in (normals[0], -normals[0])} if not edges else set[tuple[bool, ...]]()
+    for edge in [e * sign for e in edges for sign in (1.0, -1.0)]:
+        height = normals @ edge
+        flat = np.abs(height) <= TOLERANCE
+        # Around the edge: half-way between the planes that meet there.
+        lines = np.cross(edge, normals[flat])
+        first = lines[0] / np.linalg.norm(lines[0])
+        second = np.cross(edge, first)
+        angles = np.arctan2(lines @ second, lines @ first) % np.pi
+        angles = np.sort(np.concatenate([angles, angles + np.pi]))
+        for half in (angles + np.append(angles[1:], angles[0] + 2.0 * np.pi)) / 2.0:
+            aside = np.cos(half) * first + np.sin(half) * second
+            patterns.add(tuple(np.where(flat, normals @ aside, height) > 0.0))
+    yield from (np.array(one) for one in sorted(patterns))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import floats, read
-from starhold.certification.openness import driven_errors, samples_of
-from starhold.kernel.theorems.noise import CARRIED, CORRECTED, SHARE, TOLD, linear
+from starhold.certification.openness import driven_errors, measures_noisy_field, samples_of
+from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, TOLD, linear
+from starhold.parts.contract import DEVIATIONS
 
 linalg: Any = import_module("scipy.linalg")
 optimize: Any = import_module("scipy.optimize")
@@ -51,11 +52,13 @@ def find_radii(loop: Loop, theorem: str) -> tuple[dict[str, Any], dict[str, Any]
     samples = samples_of(loop.loop)
 
     def missed(k: float) -> float:
-        return log(2.0 * samples * 0.8 * (k + 1.0 / k)) - k * k / 2.0 - log(float(RARELY))
+        # Less, for what noise of the magnetic field takes.
+        return log(2.0 * samples * 0.8 * (k + 1.0 / k)) - k * k / 2.0 - log(float(RARELY) * (1.0 - 1e-5))
 
     k = float(optimize.brentq(missed, 1.0, 12.0)) * MORE
     numbers = {SHARE: RARELY, "samples": samples, "every": every}
     numbers |= {f"noise.{name}": k * width for name, width in zip(TOLD, deviations, strict=True)}
+    numbers |= {BESIDE: DEVIATIONS} if measures_noisy_field(loop.loop) else {}
     evidence = {
         "covariances": [[[str(Fraction(x)) for x in row] for row in own.tolist()] for own in shapes],
         "deviations": [str(Fraction(x)) for x in deviations],

@@ -7,7 +7,7 @@ from fractions import Fraction
 from importlib import import_module
 from itertools import takewhile
 from math import inf, isfinite, pi, radians, sin, sqrt
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,9 @@ than the least, for motions come into them after a finite time; by how much a le
 levels and ellipsoids there are at most; at how many states of a set the torque is looked at."""
 
 
+Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
+
+
 @dataclass
 class Chain:
     """Levels from a set down to where pushes outweigh the damping, and ellipsoids from there on."""
@@ -50,17 +53,21 @@ class Chain:
     held: Held
     V: str
     level: float
+    found: dict[Fraction, Lower | None] = field(default_factory=dict[Fraction, "Lower | None"])
+    """What `lower` found, which chains of one V share."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     samples: int = 0
-    aimed: float | None = None
 
     def aim(self) -> float:
         """Return the level that pushes allow where all motions are nearly linear."""
-        if self.aimed is None:
-            found = self.lower(Fraction(self.level) / 2**20)
-            self.aimed = inf if found is None else float(found[2])
-        return self.aimed
+        found = self.lower(self.held.s / 2**20)
+        return inf if found is None else float(found[2])
+
+    def falls(self) -> bool:
+        """Tell whether V falls on the whole set."""
+        found = self.lower(Fraction(self.level))
+        return found is not None and found[2] < Fraction(self.level)
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
@@ -75,12 +82,18 @@ class Chain:
             c = end
         return float(c)
 
-    def lower(self, c: Fraction) -> tuple[Fraction, Fraction, Fraction] | None:
+    def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level that is shown to be reached from another, and that level."""
+        if c not in self.found:
+            self.found[c] = self.lowest(c)
+        return self.found[c]
+
+    def lowest(self, c: Fraction) -> Lower | None:
+        """Find what `lower` returns."""
         held = self.held
         try:
             region = held.region(c)
-            (exact, above, rest), push = held.fall(region), held.tube(region).push
+            exact, above, push, rest = held.fall(region)
         except RefusedError:
             return None
         Q, H, felt = floats(exact), floats(above), floats(held.felt)
@@ -169,11 +182,11 @@ def find_pointed(loop: Loop) -> bool:
     begun = loop.loop.without("sensor", "estimator")
     shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
     rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
-    own = pushes(loop.loop)
     tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
-    against = own._replace(outside=own.outside + float(loop.known.disturbance))
     # Against more noise than can be shown, without it.
     for noisy in [True] * (driven_errors(loop.loop) is not None) + [False]:
+        own = pushes(loop.loop, loop.known.envelope(noisy))
+        against = own._replace(outside=own.outside + float(loop.known.disturbance))
         try:
             pushed = Pushed(loop, against, find_radii(loop, POINTS) if noisy else None)
             if any(pushed.find(*one) for one in tried):
@@ -196,15 +209,21 @@ class Pushed:
         self.loop, self.words = loop, words + sign_words(loop.loop)
         self.stiffness = feedback(loop, self.words)
         demand(self.stiffness > 0.0, "the law does not turn the body to its target")
-        outside = max(outside, LEAST * self.stiffness)
-        self.told: dict[str, Any] = {"period": loop.loop.period, "outside": outside, "error": against.command}
-        self.told |= {f"error.{name}": x for name, x in (("attitude", against.attitude), ("rate", against.rate)) if x}
+        against = against._replace(outside=max(outside, LEAST * self.stiffness))
+        demand(all(map(isfinite, against)), "the wheels' friction has no bound, for their momentum has no limit")
+        self.told: dict[str, Any] = {"period": loop.loop.period}
+        self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = noise or ({}, {})
         self.told |= loop.bounds(words) | more
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
-        self.leans = [(float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}"))) for lean in LEANS]
+        self.leans = [
+            (float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}")), dict[Fraction, Lower | None]())
+            for lean in LEANS
+        ]
+        # The best in the small is tried first, and taken if it comes down from the whole set.
+        self.leans.sort(key=lambda lean: Chain(lean[2], lean[1], 0.0, lean[3]).aim())
 
     def held(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
@@ -221,14 +240,15 @@ class Pushed:
         loop, J, begun = self.loop, self.J, list[Chain]()
         told = self.told | (limits or {})
         told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
-        for epsilon, V, held in self.leans:
+        for epsilon, V, held, found in self.leans:
             lean = epsilon * sin(min(angle, pi) / 2.0)
             level = 4.0 * self.stiffness * sin(angle / 4.0) ** 2 + J * rate * (rate / 2.0 + lean)
-            begun.append(Chain(held, V, level * (1.0 + 1e-6)))
-        # The best in the small is tried first, and taken if it comes down from the whole set.
-        begun.sort(key=Chain.aim)
+            begun.append(Chain(held, V, level * (1.0 + 1e-6), found))
         if begun[0].asks_more(limits or {}):
             loop.failed[POINTS] = "the torque exceeds its limit"
+            return False
+        if not any(chain.falls() for chain in begun):
+            loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return False
         if not begins(loop, self.claim(begun[0].V, told | {"level": begun[0].level}), self.scales):
             return False

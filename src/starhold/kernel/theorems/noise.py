@@ -13,7 +13,7 @@ from ..rules import Definite, Exceeds
 from ..sentences import Statement, below
 from .attitude import Proof
 
-SHARE = "share"
+SHARE, BESIDE = "share", "noise.beside"
 CARRIED, CORRECTED = "errors carried", "errors corrected"
 """The programs of a sample without a new measurement, and with one: from `errors` and standard normal `noise` to the errors
 at the next, and to those of the attitude and the rate that the law is told."""
@@ -24,7 +24,8 @@ MOST, TERMS = 64, 80
 
 def within_radii(claim: Claim) -> Proof:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
-    than noise.attitude and noise.rate, but with a probability of `share` at most."""
+    than noise.attitude and noise.rate, and other standard normal vectors no longer than noise.beside, but with a probability
+    of `share` at most."""
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
@@ -43,11 +44,14 @@ def within_radii(claim: Claim) -> Proof:
             part = slice(size + 3 * i, size + 3 * i + 3)
             told = [row[part] for row in spread[part]]
             yield f"deviation of the {name} {k}", Definite(plus(scalar(width * width), told, -1))
-    missed = samples * sum(tail(numbers[f"noise.{name}"], width) for name, width in widths.items())
+    beside, missed = "", samples * sum(tail(numbers[f"noise.{name}"], width) for name, width in widths.items())
+    if BESIDE in numbers:
+        missed += samples * tail(numbers[BESIDE], Fraction(1))
+        beside = f", other noise up to {below(numbers[BESIDE])} deviations"
     yield "share", Exceeds(share, missed)
     text = (
         f", of these errors up to {below(numbers['noise.attitude'])} rad and {below(numbers['noise.rate'])} rad/s driven by"
-        f" noise: all this at {samples} samples on end with a probability of at least"
+        f" noise{beside}: all this at {samples} samples on end with a probability of at least"
         f" {below(1 - share)}"
     )
     return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate"))

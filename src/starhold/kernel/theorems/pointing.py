@@ -21,8 +21,9 @@ def points(claim: Claim) -> Proof:
     """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
     by no more than end.angle and turns no faster than end.rate. The torque is what the law asks for at the last sample and
     an error, |error| <= error; it is told the attitude turned by error.attitude at most and the rate off by error.rate;
-    torques from outside that it is not told are no more than `outside`. With a `share` all holds at so many `samples` on
-    end but with this probability: errors that noise drives are no more than noise.attitude and noise.rate beside."""
+    torques from outside that it is not told are no more than `outside`. Both may grow by `.per.rate` times the body's rate.
+    With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
+    noise.attitude and noise.rate beside."""
     loop = AttitudeLoop(claim)
     yield from loop.sound()
     noise = (yield from within_radii(claim)) if SHARE in claim.numbers else Statement("", ())
@@ -40,8 +41,7 @@ def points(claim: Claim) -> Proof:
     for k, told in enumerate(levels):
         end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
         demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
-        Q, H, rest = held.fall(region)
-        push = held.tube(region).push
+        Q, H, push, rest = held.fall(region)
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(held.felt), held.felt), -tau), H, -beta)
         yield f"V falls by a share {k}", Definite(fallen)
@@ -67,20 +67,26 @@ def points(claim: Claim) -> Proof:
         demand(most_of > 0, f"the {name} is too small")
         yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in region.X[part]], -1))
     yield "settling", Exceeds(numbers["settling"], h * samples)
-    told = [f"errors of the command of up to {below(held.error)} N m"]
+
+    def most(name: str) -> str:
+        growing = held.per_rate[name]
+        more = f" and {below(growing)} N m s times the rate of the body" if growing else ""
+        return f"of up to {below(numbers[name])} N m{more}"
+
+    told = [f"errors of the command {most('error')}"]
     told += [f"of the attitude that it is told of up to {below(held.turned)} rad"] if held.turned else []
     told += [f"of the rate of up to {below(held.rated)} rad/s"] if held.rated else []
     text = (
         f"every motion from {{V <= {below(numbers['level'])}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
-        f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside of up to"
-        f" {below(held.outside)} N m and {enumerated(told)}"
+        f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside"
+        f" {most('outside')} and {enumerated(told)}"
     )
     text += "".join(f", {name} of up to {below(x)}" for name, x in held.told.items()) + noise.text
     taken = (
         *(["bounded-outside-torque"] if loop.outside else []),
         "bounded-target" if loop.moving else "target-at-rest",
-        *(["frictionless-wheels", "bounded-momentum"] if loop.wheels else ["no-wheels"]),
+        "bounded-momentum" if loop.wheels else "no-wheels",
     )
     assumptions = (
         "rigid-body",

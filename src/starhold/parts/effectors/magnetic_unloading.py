@@ -8,7 +8,7 @@ from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Vector, norm, scale, subtract
 from starhold.parts import magnetic_field
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.effectors import magnetorquers
 from starhold.parts.effectors.magnetorquers import LIMIT, LIMITED, State, dipole_for, within
 from starhold.parts.epoch import EPOCH, START, Date
@@ -27,7 +27,6 @@ ROLE = "effector"
 OUTSIDE = True
 NEEDS = ("two-body", "wheels")
 ABOUT = "Earth"
-BOUND_FROM = magnetic_field.RADIUS
 READS = ("magnetic_field",)
 
 
@@ -86,9 +85,17 @@ def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
     return Sample(state.dipole, reaction(state, command, body, params))
 
 
-def bound(params: Params) -> float:
-    """The largest norm of the torque (N m) at distances from `BOUND_FROM` on, where the field is nowhere stronger."""
-    return norm(params.dipole_limit) * magnetic_field.strongest(params.epoch)
+def bound(params: Params, envelope: Envelope) -> Push:
+    """The largest norm of the torque: that of all dipoles in the strongest field of the orbit, or what the momentum asks
+    for, if that is less.
+
+    The limits make no dipole longer: |m| <= gain |h - momentum| / |B_m|, so that |m x B| <= |m| |B_m| + |m| |B - B_m| is at
+    most gain |h - momentum| and what the dipoles make of the field's error. h is the total less the body's momentum.
+    """
+    limit = norm(params.dipole_limit)
+    full = limit * magnetic_field.strongest(params.epoch, envelope.distance)
+    for_momentum = params.gain * (envelope.momentum + norm(params.momentum)) + limit * envelope.field_error
+    return Push(full) if full <= for_momentum else Push(for_momentum, params.gain * envelope.moment)
 
 
 def examples() -> list[Params]:

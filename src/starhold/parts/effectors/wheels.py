@@ -21,7 +21,7 @@ from starhold.algebra.scalar import Scalar, absolute, both, clip, either, less, 
 from starhold.algebra.several import each, weighted
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
-from starhold.parts.contract import Card
+from starhold.parts.contract import Card, Envelope, Push
 from starhold.parts.craft import vector
 from starhold.parts.effectors.envelope import COPLANAR, authority, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
@@ -138,6 +138,16 @@ def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
 def applied(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
     """The torque of motors and friction on the body (N m)."""
     return scale(-1.0, weighted(motor(command, state.momentum, body.rate, params), params.axes))
+
+
+def error(params: Wheels, envelope: Envelope) -> Push:
+    """The largest torque of friction, by which the motors' falls short of the command: of rotors within their momentum
+    limits, together or against one another."""
+    A, viscous = np.array(params.axes), np.array(params.viscous)
+    speeds = np.array(params.momentum_limit) / np.array(params.inertia)
+    most = np.where(viscous > 0.0, viscous, 0.0) * np.where(viscous > 0.0, speeds, 0.0) + np.array(params.coulomb)
+    stretch = float(np.linalg.norm(A, 2))
+    return Push(stretch * float(np.linalg.norm(most)), stretch**2 * float(viscous.max()))
 
 
 def fastest(params: Wheels) -> float:

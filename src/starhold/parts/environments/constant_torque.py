@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import Vector
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 
 CARD = Card(
@@ -32,9 +32,9 @@ def torque(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
     return to_body(state.attitude, params.torque) if params.axes else params.torque
 
 
-def bound(params: Params) -> float:
-    """The largest norm of the torque (N m), anywhere."""
-    return math.hypot(*params.torque)
+def bound(params: Params, envelope: Envelope) -> Push:
+    """The norm of the torque."""
+    return Push(math.hypot(*params.torque))
 
 
 def examples() -> list[Params]:

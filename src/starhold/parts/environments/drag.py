@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import tau
+from math import exp, tau
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 from starhold.algebra.exponential import exponential
@@ -10,11 +10,11 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, maximum, sqrt
 from starhold.algebra.several import weighted
 from starhold.algebra.vector import Vector, cross, dot, scale, subtract, unit
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import DAY, SIDEREAL
 from starhold.parts.orbit import BODIES
-from starhold.parts.plates import BOX, COLUMNS, TEXT, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -112,6 +112,17 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     # All forces are against the course.
     shown = tuple(maximum(dot(normal, course), 0.0) for normal in params.normals)
     return scale(params.coefficient * memory.pressure, cross(course, weighted(shown, params.arms)))
+
+
+def bound(params: Params, envelope: Envelope) -> Push:
+    """The largest norm of the torque, from any side, against the fastest wind in the densest air of the orbit."""
+    numbers, lowest = prepare(params, 1.0), envelope.distance
+    wind, turn = envelope.speed, params.rotation * TURN
+    # rho (v + turn r)^2 is largest at the lowest place, or higher up where air that hardly thins turns fast.
+    place = max(lowest, 2.0 * params.scale_height - wind / turn) if turn else lowest
+    density = numbers.density * exp((numbers.distance - place) / params.scale_height)
+    size = largest_torque(numbers.normals, numbers.arms)
+    return Push(params.coefficient * density * (wind + turn * place) ** 2 * size)
 
 
 def examples() -> list[Params]:

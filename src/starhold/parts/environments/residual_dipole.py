@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.vector import ZERO, Vector, cross, norm
 from starhold.parts import magnetic_field
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.random import Dice
@@ -25,7 +25,6 @@ CARD = Card(
 ROLE = "environment"
 NEEDS = ("two-body",)
 ABOUT = "Earth"
-BOUND_FROM = magnetic_field.RADIUS
 
 
 class Params(NamedTuple):
@@ -62,9 +61,9 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
     return cross(params.dipole, to_body(state.attitude, memory))
 
 
-def bound(params: Params) -> float:
-    """The largest norm of the torque (N m) at distances from `BOUND_FROM` on, where the field is nowhere stronger."""
-    return norm(params.dipole) * magnetic_field.strongest(params.epoch)
+def bound(params: Params, envelope: Envelope) -> Push:
+    """The largest norm of the torque, across the strongest field of the orbit."""
+    return Push(norm(params.dipole) * magnetic_field.strongest(params.epoch, envelope.distance))
 
 
 def examples() -> list[Params]:

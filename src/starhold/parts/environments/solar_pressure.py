@@ -7,13 +7,13 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, maximum
 from starhold.algebra.several import weighted
-from starhold.algebra.vector import Vector, add, cross, dot, norm, scale
+from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.algebra.words import number_of
 from starhold.parts import sun
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.plates import BOX, COLUMNS, TEXT, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -107,11 +107,10 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     return scale(-memory.pressure, add(cross(weighted(cosines, params.taken), toward), along))
 
 
-def bound(params: Params) -> float:
-    """The largest norm of the torque (N m) anywhere: every plate seen square on, at the perihelion."""
+def bound(params: Params, envelope: Envelope) -> Push:
+    """The largest norm of the torque, from any side, at the perihelion."""
     numbers = prepare(params, 1.0)
-    arms = (*numbers.taken, *numbers.mirrored, *numbers.scattered)
-    return sun.STRONGEST * sum(norm(arm) for arm in arms)
+    return Push(sun.STRONGEST * largest_torque(*numbers[:4]))
 
 
 def examples() -> list[Params]:

@@ -12,7 +12,7 @@ from starhold.algebra.scalar import both, less, less_equal, where
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import ZERO, Vector, add, scale, subtract
 from starhold.algebra.words import number_of
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.random import Dice
 
@@ -76,9 +76,9 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
     return to_body(state.attitude, memory) if params.axes else memory
 
 
-def bound(params: Params) -> float:
-    """The largest norm of the torque (N m), anywhere: along a straight line the norm is largest at an end."""
-    return max(math.hypot(*row[1:]) for row in params.table)
+def bound(params: Params, envelope: Envelope) -> Push:
+    """The largest norm of the torque: along a straight line the norm is largest at an end."""
+    return Push(max(math.hypot(*row[1:]) for row in params.table))
 
 
 def examples() -> list[Params]:

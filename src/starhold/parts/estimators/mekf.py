@@ -263,7 +263,7 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
     gain = settled(numbers, noise.every, rate, period)
     if gain is None:
         return None
-    (_, axes, drift), (attitude, _, reading, walk) = turned(rate, period), noise
+    (_, axes, drift), (attitude, _, reading, walk, _) = turned(rate, period), noise
     known = -2.0 * numbers.reading / period
 
     def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
@@ -9,7 +10,7 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, where
 from starhold.algebra.vector import ZERO, Vector, add, scale
 from starhold.parts import magnetic_field
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
@@ -76,6 +77,19 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
     out = is_out(step, params.outage)
     latest: Any = tuple(where(out, old, new) for old, new in zip(memory, shown, strict=True))
     return Reading(latest, where(out, 0.0, 1.0)), latest
+
+
+def error(params: Params) -> Errors:
+    """The largest error beside noise and without outages, wherever there is no ground."""
+    if params.outage != NEVER:
+        return UNBOUNDED
+    scaled = abs(params.scale_error) * magnetic_field.strongest(params.epoch, magnetic_field.GROUND)
+    return NO_ERRORS._replace(field=scaled + math.hypot(*params.bias))
+
+
+def noise(params: Params, period: float) -> Noise:
+    """Tell the noise of a reading."""
+    return Noise(field=params.noise)
 
 
 def examples() -> list[Params]:

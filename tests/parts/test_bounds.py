@@ -1,0 +1,225 @@
+"""What parts say of the largest torques and errors that they make: never exceeded, and not far above the largest."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from starhold.algebra.quaternion import NO_TURN, to_body
+from starhold.algebra.vector import ZERO
+from starhold.parts import magnetic_field
+from starhold.parts.bodies.rigid_body import State
+from starhold.parts.contract import Envelope
+from starhold.parts.craft import make_craft
+from starhold.parts.effectors import magnetic_unloading, wheels
+from starhold.parts.effectors.layouts import pyramid, three_orthogonal
+from starhold.parts.environments import constant_torque, drag, residual_dipole, solar_pressure, torque_table
+from starhold.parts.orbit import BODIES, Elements, from_elements, highest_speed, lowest
+from starhold.parts.plates import BOX, largest_torque
+from starhold.parts.sensors import magnetometer
+
+GRAVITY, CRAFT = BODIES["Earth"].gravity, make_craft([0.05, 0.065, 0.025])
+COUNT = 200
+"""States at which the equations themselves are called."""
+
+
+def directions(random, count):
+    found = random.normal(size=(count, 3))
+    return found / np.linalg.norm(found, axis=1)[:, None]
+
+
+def orbit(random):
+    """A place on a random orbit, and its envelope without momentum."""
+    radius, eccentricity = 6.378e6 + random.uniform(2e5, 2e6), random.choice([0.0, random.uniform(0.0, 0.5)])
+    angles = random.uniform(0.0, 2.0 * pi, 4)
+    angles[0] /= 2.0
+    elements = Elements(radius / (1.0 - eccentricity), eccentricity, *angles.tolist())
+    begun = from_elements(elements, GRAVITY)
+    around = Envelope(lowest(*begun, GRAVITY), highest_speed(*begun, GRAVITY), 0.0, 0.065)
+    # The bound is one of the whole orbit; where it is nearest it is looked at most.
+    elements = elements._replace(true_anomaly=float(random.choice([0.0, angles[3]])))
+    return from_elements(elements, GRAVITY), around
+
+
+def state_at(random, place):
+    attitude = random.normal(size=4)
+    return State(tuple((attitude / np.linalg.norm(attitude)).tolist()), ZERO, *place, ZERO)
+
+
+def shares(part, params, seed):
+    """The torques at random places, times and attitudes, as shares of the bound."""
+    random, numbers = np.random.default_rng(seed), part.prepare(params, 1.0) if hasattr(part, "prepare") else params
+    for _ in range(20):
+        place, around = orbit(random)
+        bound = part.bound(params, around)
+        assert bound.per_rate == 0.0
+        for _ in range(COUNT // 10):
+            state, step = state_at(random, place), int(random.integers(10**6))
+            memory = part.update(part.remember(numbers), state, numbers, None, step) if hasattr(part, "update") else None
+            yield float(np.linalg.norm(part.torque(state, numbers, CRAFT, memory))) / bound.torque
+
+
+EPOCHS = [(2025.0, 1.0, 3.0, 18.0, 0.0, 0.0), (2029.0, 9.0, 21.0, 12.0, 30.0, 15.0)]
+SIDES = tuple((*row, 0.2, 0.1) for row in BOX)
+WING = (*SIDES, (0.2, 0.6, 0.0, 0.8, 0.0, 0.4, 0.0, 0.8, 0.05), (0.2, 1.0, 1.0, 1.0, 0.0, -0.4, 0.1, 0.1, 0.9))
+BOUNDED = [
+    (residual_dipole, residual_dipole.Params((0.005, -0.003, 0.004), EPOCHS[0]), 0.5),
+    (residual_dipole, residual_dipole.Params((0.0, 1.0, 0.3), EPOCHS[1]), 0.5),
+    (drag, drag.Params(BOX, density=1.5e-12), 0.5),
+    (drag, drag.Params(tuple(row[:7] for row in WING), scale_height=2e6), 0.3),
+    (drag, drag.Params(BOX[:1], scale_height=5e6, rotation=30.0), 0.1),
+    (solar_pressure, solar_pressure.Params(SIDES, EPOCHS[0]), 0.4),
+    (solar_pressure, solar_pressure.Params(WING, EPOCHS[1]), 0.25),
+    (solar_pressure, solar_pressure.Params(SIDES[2:3], EPOCHS[0]), 0.6),
+    (constant_torque, constant_torque.examples()[1], 0.99),
+]
+
+
+@pytest.mark.parametrize(("part", "params", "reached"), BOUNDED)
+def test_no_torque_of_an_environment_exceeds_its_bound_and_some_come_near(part, params, reached):
+    found = list(shares(part, params, 1))
+    assert reached < max(found) <= 1.0 + 1e-12
+
+
+def plates_of_a_kind(random, kind, count):
+    """Normals, and arms of taken, mirrored and scattered light: any, of boxes, in a plane, of one sheet."""
+    normals = directions(random, count)
+    if kind == "box":
+        normals = np.concatenate([np.eye(3), -np.eye(3)])[random.integers(6, size=count)]
+    elif kind == "plane":
+        normals = np.cross(normals, directions(random, 1))
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+    elif kind == "sheet":
+        normals = normals[:1] * random.choice([-1.0, 1.0], (count, 1))
+    return normals, *random.normal(size=(3, count, 3))
+
+
+@pytest.mark.parametrize("kind", ["any", "box", "plane", "sheet"])
+@pytest.mark.parametrize("count", [1, 2, 6, 9])
+@pytest.mark.parametrize("light", [False, True])
+def test_no_side_is_pushed_more_than_the_largest_torque(kind, count, light):
+    """From 10^5 sides, of which an own formula tells the torque."""
+    random = np.random.default_rng(count)
+    normals, taken, mirrored, scattered = plates_of_a_kind(random, kind, count)
+    s = directions(random, 100_000)
+    # Some from where plates are seen edge on.
+    s[::2] = np.cross(s[::2], normals[random.integers(count, size=50_000)])
+    s /= np.linalg.norm(s, axis=1)[:, None]
+    cosines = np.maximum(s @ normals.T, 0.0)
+    torque = np.cross(s, cosines @ taken)
+    if light:
+        torque = torque - cosines**2 @ mirrored - cosines @ scattered
+    found = largest_torque(normals, taken, *((mirrored, scattered) if light else ()))
+    largest = np.linalg.norm(torque, axis=1).max()
+    assert largest <= found * (1.0 + 1e-12)
+    assert found < (5.0 if light else 2.0) * largest
+
+
+def test_a_table_is_bounded_by_its_rows():
+    params = torque_table.examples()[1]
+    numbers = torque_table.prepare(params, 0.01)
+    state = State(NO_TURN, ZERO, ZERO, ZERO, ZERO)
+    sizes = [np.linalg.norm(torque_table.update(ZERO, state, numbers, None, step)) for step in range(400)]
+    bound = torque_table.bound(params, Envelope(1e7, 1e4, 0.0, 0.0)).torque
+    assert 0.99 * bound < max(sizes) <= bound * (1.0 + 1e-12)
+
+
+def unloaded(params, random, field_error, momentum, count):
+    """Torques of the unloading, and what is said of them at the body's rate."""
+    numbers = magnetic_unloading.prepare(params, 1.0)
+    inertia = np.diag([0.05, 0.065, 0.025])
+    for _ in range(count):
+        place, around = orbit(random)
+        state, step = state_at(random, place), int(random.integers(10**6))
+        around = around._replace(momentum=momentum, field_error=field_error)
+        field = magnetic_field.field_at(state.position, step, numbers.field)
+        measured = np.array(to_body(state.attitude, field)) + field_error * directions(random, 1)[0]
+        rate = 10.0 ** random.uniform(-4, 0) * directions(random, 1)[0]
+        stored = momentum * directions(random, 1)[0] - inertia @ rate
+        shown = shown_of(tuple(stored.tolist()), tuple(measured.tolist()))
+        switched = magnetic_unloading.switch(magnetic_unloading.remember(numbers), None, shown, state, numbers, step)
+        torque, bound = magnetic_unloading.reaction(switched, None, state, numbers), magnetic_unloading.bound(params, around)
+        yield float(np.linalg.norm(torque)), bound.torque + bound.per_rate * float(np.linalg.norm(rate))
+
+
+def shown_of(stored, field):
+    """What the unloading reads of a measurement."""
+
+    class Shown:
+        wheel_momentum, magnetic_field = stored, field
+
+    return Shown
+
+
+@pytest.mark.parametrize("limited", [0, 1])
+@pytest.mark.parametrize(
+    ("gain", "field_error", "momentum", "reached"),
+    [
+        (3e-4, 0.0, 5e-3, 0.8),
+        (3e-4, 2e-6, 5e-3, 0.4),
+        (3e-4, 6e-5, 5e-3, 0.1),
+        (0.05, 0.0, 5e-3, 0.3),
+        (0.05, 3e-5, 1.0, 0.4),
+    ],
+)
+def test_unloading_keeps_what_it_says(gain, field_error, momentum, reached, limited):
+    params = magnetic_unloading.Params(gain, (0.2, 0.1, 0.2), limited, (1e-3, 0.0, -5e-4), EPOCHS[1])
+    pairs = list(unloaded(params, np.random.default_rng(limited), field_error, momentum, COUNT // 2))
+    found = [size / bound for size, bound in pairs]
+    assert reached < max(found) <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize(
+    "axes", [three_orthogonal(), pyramid(), [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0.2), (0.1, 0, 1)]]
+)
+@pytest.mark.parametrize("friction", [{"viscous": 2e-7}, {"coulomb": 3e-5}, {"viscous": 2e-7, "coulomb": 3e-5}])
+def test_friction_is_an_error_of_the_command(axes, friction):
+    """Rotors within their limits, as bad as can be: all at full speed, in all senses."""
+    params = wheels.make_wheels(axes, 2.2e-5, 2e-3, 15e-3, **friction)
+    bound, random, found = wheels.error(params, Envelope(7e6, 7.6e3, 0.1, 0.065)), np.random.default_rng(3), []
+    for _ in range(COUNT):
+        full = 0.98 * 15e-3 * random.choice([-1.0, 1.0], len(axes)) * random.choice([1.0, random.uniform()])
+        rate = 10.0 ** random.uniform(-4, 2) * directions(random, 1)[0]
+        wanted = tuple((1e-4 * directions(random, 1)[0]).tolist())
+        body = State(NO_TURN, tuple(rate.tolist()), ZERO, ZERO, ZERO)
+        given = wheels.applied(wheels.State(tuple(full.tolist())), wheels.command(wanted, params), body, params)
+        said = bound.torque + bound.per_rate * np.linalg.norm(rate)
+        found.append(float(np.linalg.norm(np.subtract(given, wanted)) / said))
+    assert 0.7 < max(found) <= 1.0 + 1e-9
+
+
+def test_friction_that_grows_without_end_has_no_bound():
+    params = wheels.make_wheels(three_orthogonal(), 2.2e-5, 2e-3, float("inf"), viscous=1e-7)
+    assert wheels.error(params, Envelope(7e6, 7.6e3, 0.1, 0.065)).torque == float("inf")
+    smooth = wheels.make_wheels(three_orthogonal(), 2.2e-5, 2e-3, float("inf"), coulomb=1e-5)
+    assert wheels.error(smooth, Envelope(7e6, 7.6e3, 0.1, 0.065)) == (pytest.approx(3**0.5 * 1e-5), 0.0)
+
+
+def test_a_magnetometer_without_noise_errs_by_no_more_than_it_says():
+    params = magnetometer.Params(bias=(2e-7, -1e-7, 3e-7), scale_error=-0.01, epoch=EPOCHS[0])
+    numbers, random, errors = magnetometer.prepare(params, 1.0), np.random.default_rng(5), []
+
+    class Still:
+        vector = staticmethod(lambda place, deviation: ZERO)
+
+    for _ in range(COUNT // 4):
+        place, _ = orbit(random)
+        state, step = state_at(random, place), int(random.integers(10**6))
+        reading, _ = magnetometer.measure(state, ZERO, numbers, Still, step)
+        true = to_body(state.attitude, magnetic_field.field_at(state.position, step, numbers.field))
+        errors.append(float(np.linalg.norm(np.subtract(reading.magnetic_field, true))))
+    bound = magnetometer.error(params)
+    assert 0.4 * bound.field < max(errors) <= bound.field
+    assert (bound.attitude, bound.rate) == (0.0, 0.0)
+    assert magnetometer.error(params._replace(noise=1e-9)).field == float("inf")
+    assert magnetometer.error(params._replace(outage=(1.0, 2.0))).field == float("inf")
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 0.3, 0.9, 1.5])
+def test_an_orbit_is_nowhere_faster(eccentricity):
+    size = 7e6 / (1.0 - eccentricity)
+    for anomaly in np.linspace(-1.5, 1.5, 7).tolist():
+        begun = from_elements(Elements(size, eccentricity, 0.4, 0.1, 0.2, anomaly), GRAVITY)
+        found = highest_speed(*begun, GRAVITY)
+        assert found == pytest.approx((GRAVITY * (1.0 + eccentricity) / 7e6) ** 0.5, rel=1e-9)
+        assert found >= np.hypot(*begun[1][:2]) * (1.0 - 1e-12)
