@@ -148,8 +148,8 @@ def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, noisy: Collectio
 
 
 def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:
-    """Read bounds of a part's torque and of its error of the command, where it says them; those of one that could be left
-    out by name are finite."""
+    """Read bounds of a part's torque and of its error of the command, where it says them; of one that could be left out
+    by name only finite ones."""
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
