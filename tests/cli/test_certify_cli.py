@@ -33,9 +33,13 @@ def test_certify_writes_a_certificate(proved):
     assert set(found) == {"pd"}
     assert set(found["pd"].values()) == {"proved"}
     assert {"convergence", "torque-limit", "inertia", "sampling"} <= set(found["pd"])
-    for word in ("proved", "converges", "within the torque limit", "rigid body", "flown", "starhold check"):
+    for word in ("proved", "converges", "within the torque limit", "flown", "starhold check"):
         assert word in done.stdout
     assert sorted(path.name for path in (folder / "out").iterdir()) == ["certificate.json", "kernel.pyz"]
+    whole = starhold("certify", "small.toml", "--why", "-o", "whole", cwd=folder).stdout
+    assert "assuming: rigid body" in whole
+    assert "(exact identity" in whole
+    assert "assuming" not in done.stdout
 
 
 def test_existing_results_are_refused(proved):

@@ -88,8 +88,9 @@ def coverage(claim: Claim, subject: Mapping[str, Any]) -> str:
     count, absent = subject.get("parts"), len(left_out(claim))
     if not count:
         return ""
-    share = f"{count - absent} of the loop's {count} parts" if absent else f"all {count} parts of the loop"
-    return f"{share} are in it"
+    if absent:
+        return f"of the loop's {count} parts {count - absent} {'is' if count - absent == 1 else 'are'} in it"
+    return f"all {count} parts of the loop are in it" if count > 1 else "the loop's only part is in it"
 
 
 def enumerated(names: Sequence[str]) -> str:

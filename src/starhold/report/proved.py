@@ -77,8 +77,8 @@ def _law(flight: Flight, number: int, place: int) -> str:
     ]
     # What is about less of the loop is there for who looks for it.
     claims = "".join(
-        f'<details class="share"{opened}><summary>{escape(_sentence_case(heading))}</summary>{"".join(told)}</details>'
-        for opened, (heading, told) in zip([" open", *[""] * len(groups)], groups, strict=False)
+        f'<details class="share"{opened}><summary>{escape(_sentence_case(heading))}</summary>{"".join(parts)}</details>'
+        for opened, (heading, parts) in zip([" open", *[""] * len(groups)], groups, strict=False)
     )
     if not claims:
         why = escape(unclaimed(certificate.subject))
