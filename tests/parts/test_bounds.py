@@ -211,7 +211,7 @@ def test_a_magnetometer_without_noise_errs_by_no_more_than_it_says():
     bound = magnetometer.error(params)
     assert 0.55 * bound.field < max(errors) <= bound.field
     assert (bound.attitude, bound.rate) == (0.0, 0.0)
-    assert magnetometer.error(params._replace(noise=1e-9)).field == float("inf")
+    assert magnetometer.noise(params._replace(noise=1e-9), 1.0).field == 1e-9
     assert magnetometer.error(params._replace(outage=(1.0, 2.0))).field == float("inf")
 
 

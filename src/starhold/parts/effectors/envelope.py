@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 COPLANAR = 1e-9
 """Sine of the angle below which axes count as parallel, or as lying in a plane."""
+_WORST_CONDITION = 1e3
 
 
 def facets_of(axes: tuple[Vector, ...], least: tuple[Vector, ...]) -> Buffer:
@@ -103,3 +104,27 @@ def _merge_parallel(axes: Array, counted: tuple[int, ...]) -> Array:
             parallel = [len(leaders) - 1]
         classes[parallel[0]][k] = np.sign(leaders[parallel[0]] @ axes[k])
     return np.array(classes).T
+
+
+def check_authority(axes: Array, who: str) -> None:
+    """ValueError unless the axes (working wheels, 3) span the space well."""
+    if len(axes) == 0:
+        raise ValueError(f"{who} no torque at all: none is left")
+    directions, sizes, _ = np.linalg.svd(axes.T)
+    sizes = np.append(sizes, np.zeros(3 - len(sizes)))
+    lacking = directions[:, sizes <= COPLANAR * sizes[0]]
+    if lacking.shape[1]:
+        shown = " and ".join(_shown(direction) for direction in lacking.T)
+        raise ValueError(f"{who} no torque about the body direction {shown}: three independent axes are needed")
+    condition = float(sizes[0] / sizes[2])
+    if condition > _WORST_CONDITION:
+        raise ValueError(
+            f"{who} hardly any torque about the body direction {_shown(directions[:, 2])}: "
+            f"the condition number of the axes is {condition:.3g}, above {_WORST_CONDITION:g}"
+        )
+
+
+def _shown(direction: Array) -> str:
+    rounded = direction.round(9)
+    leading = np.flatnonzero(np.abs(rounded) > 0.5 * np.abs(rounded).max())[0]
+    return f"({', '.join(f'{x:.3g}' for x in (np.sign(rounded[leading]) * rounded + 0.0).tolist())})"

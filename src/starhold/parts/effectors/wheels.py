@@ -23,7 +23,7 @@ from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.parts.contract import Card, Envelope, Push
 from starhold.parts.craft import vector
-from starhold.parts.effectors.envelope import COPLANAR, authority, facets_of
+from starhold.parts.effectors.envelope import authority, check_authority, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 
 CARD = Card(
@@ -50,7 +50,6 @@ would make any integrator of fixed step chatter about standstill."""
 
 ALLOCATIONS, MOST = ("least-squares", "least-peak"), 24
 """Allocation rules, and the most wheels that a craft has: the work of the second rule grows with their cube."""
-_WORST_CONDITION = 1e3
 
 
 class Wheels(NamedTuple):
@@ -290,7 +289,7 @@ def make_wheels(
         _column("Coulomb friction", coulomb, count, least=0.0),
     )
     working = [i for i in range(count) if columns[1][i] > 0.0]
-    _check_authority(matrix[working], "the wheels give" if len(working) == count else "the working wheels give")
+    check_authority(matrix[working], "the wheels give" if len(working) == count else "the working wheels give")
     return Wheels(_rows(matrix), *columns, _least_squares(matrix, working))
 
 
@@ -307,7 +306,7 @@ def lose(wheels: Wheels, index: int) -> Wheels:
     limits = tuple(0.0 if i == index else limit for i, limit in enumerate(wheels.torque_limit))
     working = [i for i in range(count) if limits[i] > 0.0]
     matrix = np.array(wheels.axes)
-    _check_authority(matrix[working], f"without wheel {index + 1} the others give")
+    check_authority(matrix[working], f"without wheel {index + 1} the others give")
     return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=())
 
 
@@ -373,30 +372,6 @@ def _column(name: str, value: Any, count: int, least: float | None, infinite: bo
                 f"the {name} of wheel {i + 1} must be {range_}{'' if infinite else ' and finite'}, not {number:g}"
             )
     return tuple(column)
-
-
-def _check_authority(axes: NDArray[np.float64], who: str) -> None:
-    """ValueError unless the axes (working wheels, 3) span the space well."""
-    if len(axes) == 0:
-        raise ValueError(f"{who} no torque at all: none is left")
-    directions, sizes, _ = np.linalg.svd(axes.T)
-    sizes = np.append(sizes, np.zeros(3 - len(sizes)))
-    lacking = directions[:, sizes <= COPLANAR * sizes[0]]
-    if lacking.shape[1]:
-        shown = " and ".join(_shown(direction) for direction in lacking.T)
-        raise ValueError(f"{who} no torque about the body direction {shown}: three independent axes are needed")
-    condition = float(sizes[0] / sizes[2])
-    if condition > _WORST_CONDITION:
-        raise ValueError(
-            f"{who} hardly any torque about the body direction {_shown(directions[:, 2])}: "
-            f"the condition number of the axes is {condition:.3g}, above {_WORST_CONDITION:g}"
-        )
-
-
-def _shown(direction: NDArray[np.float64]) -> str:
-    rounded = direction.round(9)
-    leading = np.flatnonzero(np.abs(rounded) > 0.5 * np.abs(rounded).max())[0]
-    return f"({', '.join(f'{x:.3g}' for x in (np.sign(rounded[leading]) * rounded + 0.0).tolist())})"
 
 
 def _rows(matrix: NDArray[np.float64]) -> tuple[Vector, ...]:
