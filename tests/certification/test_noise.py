@@ -1,6 +1,7 @@
 """Claims for a share of orbits: the parts whose noise they take in, what they are not about, flights that leave them."""
 
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ import starhold as sh
 from starhold.analysis.departure import departures
 from starhold.certification.certificate import Certificate
 from starhold.certification.certify import Wanted, certify
+from starhold.certification.comparison import _numbers as numbers_apart
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.noise import find_radii
@@ -147,3 +149,14 @@ def test_against_more_noise_than_can_be_shown_the_claim_leaves_it_out():
     assert claim.outcome == "proved"
     assert claim.numbers["share"] is None
     assert "without:sensor gaussian" in claim.assumptions
+
+
+def test_a_claim_with_its_loops_own_pushes_is_about_that_loop():
+    own = Loop(make_subject(nadir()))
+    claim = noise_claim(nadir())
+    against = pushes(own.loop, own.known.envelope(noisy=True))
+    claim["numbers"] |= {name: str(Fraction(x)) for name, x in (against.numbers | own.bounds(own.words)).items()}
+    assert list(numbers_apart(claim, own)) == []
+    less = str(Fraction(against.outside) * Fraction(999, 1000))
+    claim["numbers"]["outside"] = less
+    assert list(numbers_apart(claim, own)) == ["outside is exceeded"]

@@ -13,9 +13,10 @@ from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.openness import Pushes, driven_errors, pushes, samples_of
-from starhold.certification.subject import make_subject
+from starhold.certification.subject import above, make_subject
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
+from starhold.kernel.theorems.noise import BESIDE
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS
 from starhold.parts.effectors.wheels import BAND
@@ -57,9 +58,9 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
     if "share" in told and (driven := driven_errors(loop)) is not None:
-        exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, "noise.beside": DEVIATIONS}
+        exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
     if claim["theorem"] == POINTS:
-        envelope = known.envelope("share" in told)._replace(momentum=float(told.get("momentum", 0)) * (1.0 + 1e-15))
+        envelope = known.envelope(BESIDE in told)._replace(momentum=above(exact(told.get("momentum", 0))))
         least |= {name: exact(x) for name, x in pushes(loop, envelope).numbers.items()}
         least["outside"] += 0 if OUTSIDE in claim["taken"] else known.modelled_norm
         # What is not told of is none.
