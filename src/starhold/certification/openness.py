@@ -29,7 +29,7 @@ READ = {
 BOUNDED = ("pointing",)
 """Kinds of claims that take in torques from outside and errors by their bounds."""
 SPAN = 3600.0
-"""Of how much time (s) a claim has a share without an orbit."""
+"""The time (s) that a claim with a share speaks of where there is no orbit."""
 TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
 """Roles whose `error` is of what the law is told, and of its command."""
 MORE = 1.0 + 1e-12
@@ -77,7 +77,8 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     for fitted in loop.parts:
         for told, found in zip((torques, errors), _pushes(fitted, envelope), strict=True):
             told += [] if found is None else [found]
-    told = [NO_ERRORS, *(found for fitted in loop.parts if (found := _errors(loop, fitted)) is not None)]
+    estimated = _estimated(loop, driven_errors(loop))
+    told = [NO_ERRORS, *(found for f in loop.parts if f not in estimated and (found := _bounded(f)) is not None)]
     attitude, rate, _ = (sum(own) for own in zip(*told, strict=True))
     (torque, per_rate), (command, command_per_rate) = ([sum(x) for x in zip(*own, strict=True)] for own in (torques, errors))
     return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate)))
@@ -121,13 +122,15 @@ def assumed_away(loop: ClosedLoop) -> list[str]:
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
     """The claims with an assumption for each part that they are not about."""
     away, driven = assumed_away(loop), driven_errors(loop)
+    estimated = _estimated(loop, driven)
 
     def more(claim: Claim) -> tuple[str, ...]:
         if claim.kind not in BOUNDED or claim.outcome != "proved":
             return tuple(f"{WITHOUT}{name}" for name in away)
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
-        return tuple(f"{WITHOUT}{_called(f)}" for f in loop.parts if not (_is_read(f) or _says(loop, f, envelope, noisy)))
+        absent = [f for f in loop.parts if not (_is_read(f) or f in noisy or _says(loop, f, envelope, f in estimated))]
+        return tuple(f"{WITHOUT}{_called(f)}" for f in absent)
 
     return tuple(replace(claim, assumptions=(*claim.assumptions, *more(claim))) for claim in claims)
 
@@ -140,11 +143,11 @@ def _is_read(fitted: Fitted) -> bool:
     return fitted.part.name in READ.get(fitted.part.role, ()) and fitted.part.file is None
 
 
-def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, noisy: Collection[Fitted]) -> bool:
-    """Whether all that a part does to a loop has a bound. noisy: parts whose noise is taken in."""
-    if fitted in noisy or _is_idle(loop, fitted, envelope) or any(push is not None for push in _pushes(fitted, envelope)):
+def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool) -> bool:
+    """Whether all that a part does to a loop has a bound. estimated: an estimator takes its errors out."""
+    if _is_idle(loop, fitted, envelope) or any(push is not None for push in _pushes(fitted, envelope)):
         return True
-    return _errors(loop, fitted) is not None and not _is_random(_noise(fitted, loop.period))
+    return not estimated and _bounded(fitted) is not None and not _is_random(_noise(fitted, loop.period))
 
 
 def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:
@@ -158,15 +161,13 @@ def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | Non
     return torque, error
 
 
-def _errors(loop: ClosedLoop, fitted: Fitted) -> Errors | None:
-    """The largest errors of a part beside its noise, where it says them and they are finite; those of a sensor do not count
-    where an estimator takes them out."""
-    if loop.used("estimator") and (driven := driven_errors(loop)) is not None and fitted in driven.parts:
-        return None
-    return _bounded(fitted)
+def _estimated(loop: ClosedLoop, driven: Driven | None) -> Collection[Fitted]:
+    """Return the parts whose errors do not count beside their noise, for an estimator takes them out."""
+    return driven.parts if driven is not None and loop.used("estimator") else ()
 
 
 def _bounded(fitted: Fitted) -> Errors | None:
+    """Read the largest errors of a part beside its noise, where it says them and they are finite."""
     tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
     found = NO_ERRORS if tell is None else tell(fitted.params)
     return None if tell is None or not all(map(isfinite, found)) else found

@@ -20,7 +20,7 @@ POINTS = 2000
 
 
 Picture: TypeAlias = dict[str, Callable[[], Any]]
-"""What draws each figure, by the name of its file, without the runs: small, and quickly sent to another process."""
+"""It maps the name of each file to what draws its figure without the runs: small, and quickly sent to another process."""
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:

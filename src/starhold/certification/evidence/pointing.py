@@ -54,7 +54,7 @@ class Chain:
     V: str
     level: float
     found: dict[Fraction, Lower | None] = field(default_factory=dict[Fraction, "Lower | None"])
-    """What `lower` found, which chains of one V share."""
+    """It keeps what `lower` found, for all chains of one V."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     samples: int = 0
@@ -64,8 +64,8 @@ class Chain:
         found = self.lower(self.held.s / 2**20)
         return inf if found is None else float(found[2])
 
-    def falls(self) -> bool:
-        """Tell whether V falls on the whole set."""
+    def decreases(self) -> bool:
+        """Tell whether V decreases on the whole set, down to a lower level."""
         found = self.lower(Fraction(self.level))
         return found is not None and found[2] < Fraction(self.level)
 
@@ -247,7 +247,7 @@ class Pushed:
         if begun[0].asks_more(limits or {}):
             loop.failed[POINTS] = "the torque exceeds its limit"
             return False
-        if not any(chain.falls() for chain in begun):
+        if not any(chain.decreases() for chain in begun):
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return False
         if not begins(loop, self.claim(begun[0].V, told | {"level": begun[0].level}), self.scales):
