@@ -86,19 +86,19 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
         Plot("scalar", "scalar part of the error quaternion", [scalar]),
         Plot("attitude", "vector part of the error quaternion", vector),
         Plot("rate", "angular velocity relative to the target", [sound(one, flights) for one in rates]),
-        Plot("torque", "torque applied", torques, dashed, True),
+        Plot("torque", "torque applied", torques, dashed, True, topic="Actuators"),
         _angle(flights, factor, scenario),
         _roll_pitch_yaw(flights, factor),
         (
             *_transient(flights, factor, scenario),
             *_wheels(flights, factor, scenario),
-            *recorded_plots(flights, factor, KNOWN),
+            *recorded_plots(flights, factor, KNOWN, readers_of(scenario)),
         ),
-        tuple(mark for mark in (*map(Mark, fault_times(scenario)), *_begun(flights)) if mark.time <= end),
+        tuple(mark for mark in (*map(Mark, fault_times(scenario)), *begun(flights)) if mark.time <= end),
     )
 
 
-def _begun(flights: Sequence[Flight]) -> list[Mark]:
+def begun(flights: Sequence[Flight]) -> list[Mark]:
     """When modes begin; of laws that switch to and fro the first of them."""
     of = {flight.name: flight.modes for flight in flights if flight.modes}
     return [
@@ -106,6 +106,12 @@ def _begun(flights: Sequence[Flight]) -> list[Mark]:
         for name, modes in of.items()
         for one in modes[:MOST_MARKS]
     ]
+
+
+def readers_of(scenario: Scenario) -> tuple[str, ...]:
+    """How the names of what sensors and estimators tell begin."""
+    told = [fitted.called for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator")]
+    return tuple(f"{name.replace('-', '_')}_" for name in told)
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:
@@ -215,7 +221,7 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple
         if limits is not None and not any(panel.levels for panel in panels):
             least = min(limits)
             dashed = f"limit of {'each' if max(limits) == least else 'the weakest'}, {least:g} {unit}, off the scale"
-        plots.append(Plot(name.replace("_", "-"), title, panels, dashed))
+        plots.append(Plot(name.replace("_", "-"), title, panels, dashed, topic="Actuators"))
     return tuple(plots)
 
 

@@ -20,9 +20,8 @@ from starhold.report.campaign_tables import Section, drivers, indices, picture
 from starhold.report.campaign_units import Wording, count_text, flown_text, headings_of, headline, outcome_of, plain_measure
 from starhold.report.page_parts import document, plot_box, rounded, versions
 from starhold.report.plots import colour
-from starhold.report.proved import swatch
 from starhold.report.results import PAGE, write_run
-from starhold.report.tables import code, note, pill, table_html
+from starhold.report.tables import code, note, pill, swatch, table_html
 
 if TYPE_CHECKING:
     from starhold.campaign.envelopes import Envelope

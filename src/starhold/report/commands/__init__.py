@@ -15,18 +15,20 @@ if TYPE_CHECKING:
 
 
 class Column(NamedTuple):
-    """A column of a table: its heading, the unit below it, and the format of its numbers; without one it holds words."""
+    """A column of a table: its heading, the unit below it, the format of its numbers (without one it holds words), and what
+    it means."""
 
     name: str
     unit: str = ""
     format: str = ""
+    meaning: str = ""
 
 
 class Cell(NamedTuple):
     """Words of a table with a look of their own. kind: "law", in the colour of the law of this number, or "name" where it
-    names its row; an outcome, "met", "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of
-    the column below it; "shade", in the colour that detail names, the stronger the farther the number is from 0; else detail
-    says what the words mean."""
+    names its row, with detail below it; an outcome, as "met" or "missed"; "best" of its column; "typed", to be copied;
+    "share", with a bar of this share of the column below it; "shade", in the colour that detail names, the stronger the
+    farther the number is from 0; else detail says what the words mean."""
 
     text: str
     kind: str = ""

@@ -1,0 +1,130 @@
+"""The first screen of a page: whether each law does what it should, by how much, and what of that is proved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from starhold.certification.wording import coverage, statement, strongest, unclaimed
+from starhold.report.commands import Cell, Column, Table
+from starhold.report.tables import note, pill, swatch, table_html
+from starhold.report.text import lost_text, unknown_text
+
+if TYPE_CHECKING:
+    from starhold.analysis.ranking import MetricSet
+    from starhold.scenario.reading import Scenario
+    from starhold.studies.flight import Flight
+
+SPANS = ((172_800.0, 86_400.0, "days"), (7_200.0, 3_600.0, "h"), (600.0, 60.0, "min"))
+"""From how many seconds on a time is told in a unit, and its seconds."""
+
+
+def span_text(seconds: float) -> str:
+    """Tell a time in the unit in which it is large and round."""
+    fits = ((size, unit) for least, size, unit in SPANS if seconds >= least and not (10.0 * seconds / size) % 1.0)
+    size, unit = next(fits, (1.0, "s"))
+    return f"{seconds / size:.4g} {unit}"
+
+
+def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
+    """Tell how long was flown, and how often the laws act."""
+    period, metric_set = scenario.table.simulation.control_period, flights[0].metric_set
+    end = max(float(flight.recording["time"][-1]) for flight in flights)
+    if metric_set.clock != "s":
+        return metric_set.moment(end, 4)
+    return f"{span_text(end)} at {1.0 / period:.4g} Hz" if period <= 1.0 else f"{span_text(end)}, a step every {period:g} s"
+
+
+def lost_alarm(flights: Sequence[Flight]) -> str:
+    """List the motions that diverged, and the metrics that are not numbers; empty if there are none."""
+    lost = [f"{flight.name} (at {lost_text(flight)})" for flight in flights if flight.lost is not None]
+    sentences = [f"Diverged, and so without final values: {', '.join(lost)}"] if lost else []
+    sentences += [said for flight in flights if (said := unknown_text(flight))]
+    return "".join(f'<p class="alarm">{escape(said)}.</p>' for said in sentences)
+
+
+def leading(metric_set: MetricSet, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """List the metrics of the table, those first that laws are ranked by."""
+    there = metric_set.columns(results)
+    return [*(name for name in metric_set.order if name in there), *(name for name in there if name not in metric_set.order)]
+
+
+def fate(flight: Flight) -> str:
+    """Tell in a word what became of a flight; empty where nothing says whether it settles."""
+    if flight.lost is not None:
+        return "diverged"
+    if "settling_time" not in flight.metrics:
+        return ""
+    return "not settled" if flight.metrics["settling_time"] is None else "settled"
+
+
+def ranking(flights: Sequence[Flight]) -> str:
+    """Make the ranked table: a row of key numbers for each law, below it what is best at what."""
+    metric_set = flights[0].metric_set
+    results = {flight.name: flight.metrics for flight in flights}
+    best, metrics = metric_set.winners(results), leading(metric_set, results)
+    numbers = {flight.name: number for number, flight in enumerate(flights)}
+    measures = [metric_set.measures[metric] for metric in metrics]
+    columns = [Column("law"), Column("flown")]
+    columns += [Column(one.heading, one.unit or "\N{NO-BREAK SPACE}", ">", one.meaning) for one in measures]
+    rows: list[list[Any]] = []
+    for name in metric_set.ranked(results):
+        flight = flights[numbers[name]]
+        below = f"at {lost_text(flight)}" if flight.lost is not None else flight.law if flight.law != name else ""
+        cells = [Cell(metric_set.cell(one, flight.metrics), "best" if name in best[one] else "") for one in metrics]
+        rows.append([Cell(name, "name", numbers[name], below), Cell("", fate(flight)), *cells])
+    lost = {i: 'class="lost"' for i, row in enumerate(rows) if row[1].kind == "diverged"}
+    won = "".join(
+        f"<span>{escape(metric_set.measures[one].heading)}: {_winners(best[one], numbers)}</span>"
+        for one in metric_set.order
+        if best.get(one)
+    )
+    said = f'<p class="best-at"{"" if won else " hidden"}><b>Best</b> {won}</p>' if len(flights) > 1 else ""
+    return f"{said}{table_html(Table(columns, rows), 'ranking', rows=lost)}\n{note(metric_set.late(results))}"
+
+
+def _winners(names: Iterable[str], numbers: Mapping[str, int]) -> str:
+    return ", ".join(f"{swatch(numbers[name])}{escape(name)}" for name in names)
+
+
+def columns_list(flights: Sequence[Flight]) -> str:
+    """Explain the columns of the ranking and its order."""
+    metric_set, results = flights[0].metric_set, {flight.name: flight.metrics for flight in flights}
+    items = "".join(
+        f"<dt>{escape(one.heading)}{f', {escape(one.unit)}' if one.unit else ''}</dt><dd>{escape(one.meaning)}</dd>"
+        for one in (metric_set.measures[metric] for metric in leading(metric_set, results))
+    )
+    order = escape(", then ".join(metric_set.headings(results)))
+    return (
+        f'<h3>How to read the key numbers</h3>\n<p class="note">Laws are ordered by {order}; less is better in every '
+        f"column, and the best value is marked. A dash: never reached, or not measured.</p>\n<dl>{items}</dl>"
+    )
+
+
+def proofs(flights: Sequence[Flight]) -> str:
+    """Tell the strongest proof about each law in a sentence; empty where none was looked for."""
+    lines = [_strongest(number, flight, len(flights)) for number, flight in enumerate(flights) if flight.certificates]
+    if not lines:
+        return ""
+    more = '<button class="link" type="button" data-open="proofs">All claims</button>'
+    return f'<section class="card proved"><h2>Proved</h2>{"".join(lines)}{more}</section>'
+
+
+def _strongest(number: int, flight: Flight, count: int) -> str:
+    claims = [(claim, place) for place, one in enumerate(flight.certificates) for claim in one.claims]
+    whose = f"<b>{swatch(number)}{escape(flight.name)}</b> " if count > 1 else ""
+    if not claims:
+        return f"<p>{pill('undecided')} {whose}nothing is claimed: {escape(unclaimed(flight.certificates[0].subject))}.</p>"
+    claim = strongest([claim for claim, _ in claims])[0]
+    place = next(place for other, place in claims if other is claim)
+    certificate = flight.certificates[place]
+    about = certificate.name.removeprefix(flight.name).strip(": ")
+    left = flight.left(place, claim.kind)
+    when = ""
+    if left and claim.outcome == "proved":
+        start = left[0].time
+        when = f"this flight leaves it {'from the start' if start == 0.0 else f'at {flight.metric_set.moment(start, 4)}'}"
+    told = "; ".join(filter(None, (coverage(claim, certificate.subject), when)))
+    text = f"{f'{about}: ' if about else ''}{statement(claim, certificate.subject)}{f' ({told})' if told else ''}."
+    return f"<p>{pill(claim.outcome)} {whose}{escape(text)}</p>"
