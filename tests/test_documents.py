@@ -18,7 +18,6 @@ from generators import formulas
 from generators.authors import filled
 from starhold.analysis.rigid_body import EXTRAS, make_meter
 from starhold.analysis.trial import FLIGHTS
-from starhold.campaign.requirements import CONE, LOST
 from starhold.campaign.sampling import SAMPLINGS
 from starhold.campaign.sequence import runs_to_meet
 from starhold.campaign.verdicts import runs_needed
@@ -32,6 +31,8 @@ from starhold.scenario.building import build
 from starhold.scenario.checking import RENAMED
 from starhold.scenario.distributions import DISTRIBUTIONS
 from starhold.scenario.reading import load
+from starhold.scenario.requirement import CONE
+from starhold.studies.requirements import LOST
 
 ROOT = Path(__file__).parents[1]
 BODIES = "src/starhold/scenario/bodies"

@@ -164,7 +164,7 @@ def test_planted_drivers_are_found(tmp_path):
 
 
 def test_ends_once_all_is_decided(tmp_path):
-    asked = [{"name": "easy", "metric": "final_rate_error", "at_most": "60 deg/s", "share": 0.99}]
+    asked = [{"id": "easy", "metric": "final_rate_error", "at_most": "60 deg/s", "share": 0.99}]
     options = {"requirement": asked, "runs": 20_000, "law": "pd", "until_decided": True}
     scenario = small(simulation__duration=2.0)
     found = fly(tmp_path / "a", scenario=scenario, **options)

@@ -30,14 +30,14 @@ def test_names_that_differ_in_case_alone_are_refused(tmp_path):
     """They would be one column in SQL, and one folder on some disks."""
     with pytest.raises(InputError, match="names that differ by more than case"):
         campaign(tmp_path / "c", short(laws=laws("A", "a")))
-    alike = [{"name": name, "metric": "effort", "at_most": 3} for name in ("Straße", "STRASSE")]
-    with pytest.raises(InputError, match=r"campaign.requirement\[2\].name: found \"STRASSE\""):
+    alike = [{"id": name, "metric": "effort", "at_most": 3} for name in ("Straße", "STRASSE")]
+    with pytest.raises(InputError, match=r"requirement\[2\].id: found \"STRASSE\""):
         campaign(tmp_path / "c", requirement=alike)
     assert not (tmp_path / "c").exists()
 
 
 def test_columns_of_metrics_and_of_requirements_stay_apart(tmp_path):
-    asked = [{"name": "effort", "metric": "final_rate_error", "at_most": 0.5}, {"name": "run", "metric": "lost"}]
+    asked = [{"id": "effort", "metric": "final_rate_error", "at_most": 0.5}, {"id": "run", "metric": "lost"}]
     frame = campaign(tmp_path / "c", requirement=asked).frame()
     assert (frame["margin.effort"] == 0.5 - frame["final_rate_error"]).all()
     assert (frame["margin.run"] == 1.0).all()
@@ -46,7 +46,7 @@ def test_columns_of_metrics_and_of_requirements_stay_apart(tmp_path):
 
 def test_each_worst_run_has_a_file_of_its_own(tmp_path, brief):
     long = "ü" * 100
-    asked = [{"name": name, "metric": "effort", "at_most": bound} for name, bound in (("a b", 3), ("a-b", 2), (long, 1))]
+    asked = [{"id": name, "metric": "effort", "at_most": bound} for name, bound in (("a b", 3), ("a-b", 2), (long, 1))]
     found = campaign(tmp_path / "c", short(laws=laws(long, "pd")), requirement=asked, search=True, runs=2)
     files = [bracket.file for law in found.laws for bracket in law.brackets]
     assert len({file.casefold() for file in files}) == 6
@@ -141,7 +141,7 @@ def test_values_of_other_libraries_and_single_runs(tmp_path):
 
 WRONG = [
     ({"metrics": "overshoot"}, "campaign.metrics"),
-    ({"requirement": {"metric": "lost"}}, "campaign.requirement"),
+    ({"requirement": {"metric": "lost"}}, "requirement"),
     ({"over": [1]}, "campaign.over"),
     ({"over": {"x" * 10_000: NORMAL}}, 'campaign.over."xxx'),
     ({"over": {"initial.rate\nx": NORMAL}}, "campaign.over"),
@@ -156,7 +156,7 @@ WRONG = [
     ({"over": {"orbit.altitude": uniform("600 km", "700 km")}}, "no [orbit] table"),
     ({"over": {"part.x.y": NORMAL}}, "part.x.y"),
     ({"requirement": [{"metric": "effort", "at_most": math.nan}]}, "at_most: found nan"),
-    ({"requirement": [{"name": "../x", "metric": "lost"}]}, "requirement[1].name"),
+    ({"requirement": [{"id": "a\nb", "metric": "lost"}]}, "requirement[1].id"),
     ({"runs": 10**10}, "campaign.runs"),
     ({"law": "../pd"}, "law"),
     ({"over": {"initial.rate": NORMAL, "law.pd.k_rate": NORMAL}, "scenario": small(), "law": "lyapunov"}, "changes nothing"),
@@ -173,7 +173,7 @@ WRONG = [
     ({"requirement": [{"metric": "lost"}], "sampling": "sobol", "until_decided": True}, "independent"),
     ({"requirement": [{"metric": "effort", "at_most": 3, "share": 1}]}, "requirement[1].share: found 1.0; allowed: below 1"),
     ({"requirement": [{"metric": "effort", "at_most": 3, "at_least": 2}]}, "either at_most or at_least"),
-    ({"requirement": [{"metric": "lost"}, {"metric": "lost"}]}, "requirement[2].name"),
+    ({"requirement": [{"metric": "lost"}, {"metric": "lost"}]}, "requirement[2].id"),
     ({"over": {"initial.rate": uniform(0, True)}}, "high: found True"),
     ({"sampling": "halton"}, "campaign.sampling"),
     ({"workers": 2}, "beside threads"),

@@ -25,7 +25,7 @@ RUNS = 2 * CHUNK + 3000
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("crashes")
     tables = SMALL | {"simulation": SMALL["simulation"] | {"duration": 15.0}}
-    tables |= {"campaign": {"runs": RUNS, "over": OVER, "requirement": ASKED[:2]}}
+    tables |= {"campaign": {"runs": RUNS, "over": OVER}, "requirement": [one | {"method": "campaign"} for one in ASKED[:2]]}
     (folder / "long.toml").write_text(sh.scenario(tables).text)
     return folder
 

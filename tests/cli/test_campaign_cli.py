@@ -43,8 +43,9 @@ runs = 24
 "initial.rate" = { distribution = "shell", high = "4 deg/s" }
 "law.pd.k_rate" = { distribution = "uniform", low = 1.5, high = 2.5 }
 
-[[campaign.requirement]]
-name = "effort"
+[[requirement]]
+method = "campaign"
+id = "effort"
 metric = "final_rate_error"
 at_most = "60 deg/s"
 share = 0.5
@@ -253,7 +254,7 @@ def test_runs_that_are_none_are_refused(flown, words, told):
     complains(starhold("rerun", "out", *words, cwd=flown[0]), told)
 
 
-WITHOUT = SMALL[: SMALL.index("[[campaign")] + SMALL[SMALL.index("[[law") :]
+WITHOUT = SMALL[: SMALL.index("[[requirement")] + SMALL[SMALL.index("[[law") :]
 BAD = {
     "zero runs by option": (SMALL, ["--runs", "0"], ["campaign.runs", "at least 1"]),
     "two engines": (SMALL, ["--threads", "2", "--workers", "2"], ["workers", "beside threads"]),

@@ -62,7 +62,7 @@ class Lanes:
     def __init__(self, scenario: Scenario, law: str, plan: Plan) -> None:
         self.scenario, self.law, self.plan = scenario, law, plan
         # Of one run nothing else is read.
-        self._bare = scenario.with_({"campaign": None})
+        self._bare = scenario.with_({"campaign": None, "requirement": None})
         self.steps = scenario.table.simulation.steps
         self.first = plan.columns(0, 1)
         self.base = self.exact(self.first)

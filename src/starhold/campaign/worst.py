@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.campaign.job import scenario_of
-from starhold.campaign.requirements import LOST, Requirement
 from starhold.campaign.results import Bracket, LawResult
 from starhold.files import atomic_write
 from starhold.simulation.lanes import ThreadPool
+from starhold.studies.requirements import LOST, Requirement
 
 if TYPE_CHECKING:
     from starhold.campaign.job import Job

@@ -162,7 +162,7 @@ def study(
     A source's contribution is by how much it moves the error of the loop without any, run by run and instant by instant.
     `notice` hears the number done, that of all, and the flight that comes next. InputError where nothing disturbs the loop,
     the windows do not fit into the run, or a motion is lost."""
-    scenario = scenario.about("rigid-body").with_({"fault": None, "campaign": None})
+    scenario = scenario.about("rigid-body").with_({"fault": None, "campaign": None, "requirement": None})
     disturbing, clock = sources(scenario), _Clock.of(scenario)
     if not disturbing:
         allowed = "noise, a torque, wheel friction or another source of error"
