@@ -50,7 +50,7 @@ def test_compare_writes_everything_and_prints_the_table(short):
     assert not list(out.rglob(".writing-*"))
     # The certificates, too, of laws of which nothing is claimed among them.
     assert "Certified on this spacecraft" in done.stdout
-    assert "<h2>What is proved</h2>" in page
+    assert "<h2>Proofs</h2>" in page
     assert "Nothing is claimed" in page
     certificates = json.loads((out / "certificate.json").read_text())["certificates"]
     assert [one["name"] for one in certificates] == ["lyapunov", "sliding", "mpc"]

@@ -11,7 +11,7 @@ import starhold as sh
 from starhold.errors import InputError
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.epoch import EPOCH, START, date_of
-from starhold.report.page_parts import settings
+from starhold.report.settings import settings
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import part_schemas
 from starhold.scenario.reading import make_scenario, parse
@@ -308,7 +308,7 @@ def test_schemas_and_the_studio_know_the_one_place():
 
 def _epochs_told(scenario):
     """The rows of the page's settings that hold an epoch, each with its table."""
-    page = settings(scenario, "Settings")
+    page = settings(scenario)
     return re.findall(r"<h3>([^<]*)</h3>(?:(?!</section>).)*<td>epoch</td><td>([^<]*)</td>", page)
 
 

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from starhold.certification.wording import coverage, statement, strongest, unclaimed
+from starhold.certification.wording import coverage, listed, statement, strongest, unclaimed
+from starhold.report.campaign_units import plain_measure, with_unit
 from starhold.report.commands import Cell, Column, Table
-from starhold.report.tables import note, pill, swatch, table_html
+from starhold.report.tables import Markup, note, pill, swatch, table_html
 from starhold.report.text import lost_text, unknown_text
+from starhold.studies.requirements import LOST
+from starhold.studies.verification import verdicts_of_flight
 
 if TYPE_CHECKING:
     from starhold.analysis.ranking import MetricSet
     from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
+    from starhold.studies.verification import RequirementVerdict
 
-SPANS = ((172_800.0, 86_400.0, "days"), (7_200.0, 3_600.0, "h"), (600.0, 60.0, "min"))
+SPANS = ((63_115_200.0, 31_557_600.0, "years"), (172_800.0, 86_400.0, "days"), (7_200.0, 3_600.0, "h"), (600.0, 60.0, "min"))
 """From how many seconds on a time is told in a unit, and its seconds."""
 
 
@@ -29,11 +34,9 @@ def span_text(seconds: float) -> str:
 
 def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """Tell how long was flown, and how often the laws act."""
-    period, metric_set = scenario.table.simulation.control_period, flights[0].metric_set
-    end = max(float(flight.recording["time"][-1]) for flight in flights)
-    if metric_set.clock != "s":
-        return metric_set.moment(end, 4)
-    return f"{span_text(end)} at {1.0 / period:.4g} Hz" if period <= 1.0 else f"{span_text(end)}, a step every {period:g} s"
+    run = flights[0].recording.attrs
+    period, end = (x * run.get("time_unit_s", 1.0) for x in (run["control_period"], scenario.table.simulation.duration))
+    return f"{span_text(end)}, {f'{1.0 / period:.4g} Hz' if period <= 1.0 else f'a step every {span_text(period)}'}"
 
 
 def lost_alarm(flights: Sequence[Flight]) -> str:
@@ -44,7 +47,47 @@ def lost_alarm(flights: Sequence[Flight]) -> str:
     return "".join(f'<p class="alarm">{escape(said)}.</p>' for said in sentences)
 
 
-def leading(metric_set: MetricSet, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
+    """Make the table of what is required, with the verdicts on each law, and their counts; empty where nothing is."""
+    names = {entry.name for entry in scenario.laws} if scenario.table.requirement else set[str]()
+    judged = {number: verdicts_of_flight(scenario, one) for number, one in enumerate(flights) if one.name in names}
+    if not judged:
+        return "", ""
+    whose = {number: f"{swatch(number)}{escape(flights[number].name)} " if len(flights) > 1 else "" for number in judged}
+    counts = "".join(f"<span>{whose[number]}{_counted(of)}</span>" for number, of in judged.items())
+    found = list(judged.values())
+    if all(one.verdict == "not decided" for of in found for one in of):
+        asked = ", ".join(one.id for one in found[0])
+        return note(f"Required, and not decided by a flight: {asked}; starhold verify decides it."), counts
+    rows: list[list[Any]] = []
+    for same in zip(*found, strict=True):
+        first = same[0]
+        measure = flights[0].metric_set.measures.get(first.metric) or plain_measure(first.metric, first.unit)
+        limit = next((with_unit(one.limit, measure) for one in same if one.limit is not None), "")
+        asked = "the motion is not lost" if first.metric == LOST else measure.heading
+        cells = [_verdict(one, "" if one.number is None else with_unit(one.number, measure)) for one in same]
+        how = dict.fromkeys(
+            f"{one.evidence}{f'; leaving out {listed(one.left_out)}' if one.left_out else ''}" for one in same
+        )
+        name = Markup(f'<small class="id">{escape(first.id)}</small> {escape(first.text or asked)}')
+        rows.append([name, *cells, limit, "; ".join(how)])
+    laws = [Column(flights[number].name if len(flights) > 1 else "verdict") for number in judged]
+    table = Table([Column("requirement"), *laws, Column("limit"), Column("how it is known")], rows)
+    return table_html(table, "told verdicts"), counts
+
+
+def _verdict(verdict: RequirementVerdict, number: str) -> Markup:
+    return Markup(f"{pill(verdict.verdict)} {escape(number)}")
+
+
+def _counted(found: Sequence[RequirementVerdict]) -> str:
+    counts = Counter(one.verdict for one in found)
+    told = [pill("met", f"{counts['met']} of {len(found)} met")] if counts["met"] else []
+    told += [pill(word, f"{counts[word]} {word}") for word in ("missed", "not decided") if counts[word]]
+    return " ".join(told)
+
+
+def key_metrics(metric_set: MetricSet, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """List the metrics of the table, those first that laws are ranked by."""
     there = metric_set.columns(results)
     return [*(name for name in metric_set.order if name in there), *(name for name in there if name not in metric_set.order)]
@@ -63,11 +106,15 @@ def ranking(flights: Sequence[Flight]) -> str:
     """Make the ranked table: a row of key numbers for each law, below it what is best at what."""
     metric_set = flights[0].metric_set
     results = {flight.name: flight.metrics for flight in flights}
-    best, metrics = metric_set.winners(results), leading(metric_set, results)
+    best, metrics = metric_set.winners(results), key_metrics(metric_set, results)
     numbers = {flight.name: number for number, flight in enumerate(flights)}
     measures = [metric_set.measures[metric] for metric in metrics]
     columns = [Column("law"), Column("flown")]
-    columns += [Column(one.heading, one.unit or "\N{NO-BREAK SPACE}", ">", one.meaning) for one in measures]
+    # A name is not broken at its hyphen.
+    columns += [
+        Column(one.heading.replace("-", "\N{NON-BREAKING HYPHEN}"), one.unit or "\N{NO-BREAK SPACE}", ">", one.meaning)
+        for one in measures
+    ]
     rows: list[list[Any]] = []
     for name in metric_set.ranked(results):
         flight = flights[numbers[name]]
@@ -80,7 +127,7 @@ def ranking(flights: Sequence[Flight]) -> str:
         for one in metric_set.order
         if best.get(one)
     )
-    said = f'<p class="best-at"{"" if won else " hidden"}><b>Best</b> {won}</p>' if len(flights) > 1 else ""
+    said = f'<p class="best-at"{"" if won else " hidden"}><strong>Best</strong> {won}</p>' if len(flights) > 1 else ""
     return f"{said}{table_html(Table(columns, rows), 'ranking', rows=lost)}\n{note(metric_set.late(results))}"
 
 
@@ -93,7 +140,7 @@ def columns_list(flights: Sequence[Flight]) -> str:
     metric_set, results = flights[0].metric_set, {flight.name: flight.metrics for flight in flights}
     items = "".join(
         f"<dt>{escape(one.heading)}{f', {escape(one.unit)}' if one.unit else ''}</dt><dd>{escape(one.meaning)}</dd>"
-        for one in (metric_set.measures[metric] for metric in leading(metric_set, results))
+        for one in (metric_set.measures[metric] for metric in key_metrics(metric_set, results))
     )
     order = escape(", then ".join(metric_set.headings(results)))
     return (
@@ -113,7 +160,7 @@ def proofs(flights: Sequence[Flight]) -> str:
 
 def _strongest(number: int, flight: Flight, count: int) -> str:
     claims = [(claim, place) for place, one in enumerate(flight.certificates) for claim in one.claims]
-    whose = f"<b>{swatch(number)}{escape(flight.name)}</b> " if count > 1 else ""
+    whose = f"<strong>{swatch(number)}{escape(flight.name)}</strong> " if count > 1 else ""
     if not claims:
         return f"<p>{pill('undecided')} {whose}nothing is claimed: {escape(unclaimed(flight.certificates[0].subject))}.</p>"
     claim = strongest([claim for claim, _ in claims])[0]

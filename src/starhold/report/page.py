@@ -14,7 +14,7 @@ from starhold.algebra.structure import flatten
 from starhold.analysis.rigid_body import recorded_meter
 from starhold.certification.assumptions import standing
 from starhold.laws.interface import Gain
-from starhold.report.answer import columns_list, facts, leading, lost_alarm, proofs, ranking
+from starhold.report.answer import columns_list, facts, key_metrics, lost_alarm, proofs, ranking, verdicts
 from starhold.report.body import report_of
 from starhold.report.page_parts import (
     beside,
@@ -187,7 +187,7 @@ def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict
 def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
     """The measures that the page ranks laws by, and the metrics that the table began with."""
     metric_set = flights[0].metric_set
-    metrics = leading(metric_set, {flight.name: flight.metrics for flight in flights})
+    metrics = key_metrics(metric_set, {flight.name: flight.metrics for flight in flights})
     shown = [{"name": name} | asdict(metric_set.measures[name]) for name in metrics]
     rows = [
         {
@@ -217,7 +217,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """The report as HTML text. Whatever comes from files is escaped."""
     parts = report_of(scenario.body).page(flights, scenario)
     living = "the page of this body has none" if parts.sampling is None else living_data(scenario, flights, parts.sampling)
-    lead, *plots = parts.data["plots"]
+    (lead, *plots), (required, counts) = parts.data["plots"], verdicts(scenario, flights)
     folds = dict.fromkeys(FOLDS, "") | {"Proofs": proved(flights)}
     for plot in plots:
         folds[plot["topic"]] += plot_box(plot)
@@ -228,6 +228,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         folds["Try it"] = note(f"Nothing here can be flown again with sliders: {living}.")
     sections = [
         lost_alarm(flights),
+        required,
         ranking(flights),
         parts.measured,
         beside(plot_box(lead, transient_switch(parts.transient)), parts.views),
@@ -236,4 +237,4 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     ]
     data, moved = {"laws": law_data(flights), **parts.data}, None if isinstance(living, str) else living
     footer = f"{versions()}{parts.footer}."
-    return document(scenario, sections, data, parts.scripts, footer, facts(scenario, flights), living=moved)
+    return document(scenario, sections, data, parts.scripts, footer, facts(scenario, flights), counts, moved)

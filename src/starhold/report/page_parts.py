@@ -169,8 +169,8 @@ def transient_switch(transient: float | None) -> str:
         return ""
     first = f"{float(f'{transient:.3g}'):g}"
     return (
-        '<p class="switch"><button id="whole" type="button" aria-pressed="true">Whole run</button>'
-        f'<button id="transient-only" type="button" aria-pressed="false">Transient, first {first} s</button></p>'
+        '<p class="switch"><button id="whole" type="button" aria-pressed="true">Whole</button>'
+        f'<button id="transient-only" type="button" aria-pressed="false">first {first} s</button></p>'
     )
 
 

@@ -76,9 +76,9 @@ def _cell(value: Any, side: str) -> str:
     return f"<td{side}{title}>{code(value.text) if value.kind == 'typed' else pill(value.kind) or text}</td>"
 
 
-def pill(outcome: str) -> str:
-    """Show an outcome in its colour; nothing where there is none."""
-    return f'<span class="outcome {PILLS[outcome]}">{outcome}</span>' if outcome in PILLS else ""
+def pill(outcome: str, text: str = "") -> str:
+    """Show an outcome, or a text in its place, in its colour; nothing where there is none."""
+    return f'<span class="outcome {PILLS[outcome]}">{escape(text or outcome)}</span>' if outcome in PILLS else ""
 
 
 def swatch(number: int) -> str:

@@ -219,7 +219,7 @@ function rank() {
   const won = measures.flatMap(({ name, heading }, k) => (order.includes(name) && best[k].length ? [`<span>${plain(heading)}: ${names(best[k])}</span>`] : []));
   const told = document.querySelector(".best-at");
   if (told) {
-    told.innerHTML = `<b>Best</b> ${won.join("")}`;
+    told.innerHTML = `<strong>Best</strong> ${won.join("")}`;
     told.hidden = !won.length;
   }
   const body = document.querySelector("table.ranking tbody");

@@ -49,7 +49,7 @@ function startShow(views, paint, timeText) {
     clock.textContent = text;
     slider.setAttribute("aria-valuetext", text);
     views.forEach((view) => paint(view, place));
-    document.dispatchEvent(new CustomEvent("moment", { detail: timeAt(place) }));
+    document.dispatchEvent(new CustomEvent("moment", { detail: timeAt(place) / (scene.tick || 1) }));
   }
 
   // The frame of a time; between two of them it need not be whole.
@@ -77,7 +77,7 @@ function startShow(views, paint, timeText) {
   slider.max = last;
   slider.addEventListener("input", () => { play(false); show(Number(slider.value)); });
   button.addEventListener("click", () => play(!playing));
-  document.addEventListener("looked-at", ({ detail }) => { if (!playing) show(frameAt(detail)); });
+  document.addEventListener("looked-at", ({ detail }) => { if (!playing) show(frameAt(detail * (scene.tick || 1))); });
   for (const { canvas } of views) {
     canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
     canvas.addEventListener("pointermove", (event) => {

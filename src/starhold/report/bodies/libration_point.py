@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.analysis.libration_point import DAY, goal_of
+from starhold.analysis.libration_point import DAY, YEAR, goal_of
 from starhold.report.body import PageParts
 from starhold.report.figures import POINTS, Picture, headed, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
@@ -133,6 +133,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight], plots: PathPlots) -> d
     farthest = max((float(np.abs(flight.recording["position"]).max()) for flight in sound), default=0.0)
     return {
         "times": rounded(times * units.time / DAY),
+        "tick": YEAR / DAY if plots.over_time[0].clock == "years" else 1.0,
         "paths": paths,
         "rings": rounded(plots.rings),
         "size": max([farthest, *plots.rings]) or 1.0,
