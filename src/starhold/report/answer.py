@@ -73,7 +73,7 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
         rows.append([name, *cells, limit, "; ".join(how)])
     laws = [Column(flights[number].name if len(flights) > 1 else "verdict") for number in judged]
     table = Table([Column("requirement"), *laws, Column("limit"), Column("how it is known")], rows)
-    return table_html(table, "told verdicts"), counts
+    return table_html(table, "told tight verdicts"), counts
 
 
 def _verdict(verdict: RequirementVerdict, number: str) -> Markup:
