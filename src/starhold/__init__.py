@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         simulate,
         sweep,
         to_pandas,
+        verify,
     )
     from starhold.api import make_scenario as scenario
     from starhold.errors import InputError
@@ -76,6 +77,7 @@ __all__ = [
     "simulate",
     "sweep",
     "to_pandas",
+    "verify",
 ]
 
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
     from starhold.studies.linear import LinearLoop
     from starhold.studies.modal_roots import Study
+    from starhold.studies.verification import RequirementVerdict
 
 
 @shortly
@@ -305,6 +306,14 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> B
     Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
     a DataFrame with every axis. InputError where nothing disturbs the loop, windows do not fit, or a motion is lost."""
     return studied("budget", scenario, law)
+
+
+@shortly
+def verify(scenario: reading.Scenario | str | Path, law: str | None = None) -> tuple[RequirementVerdict, ...]:
+    """Tell which requirements of a scenario a law keeps, the first law if not given: a verdict for each [[requirement]], in
+    the order of the file, with its number, limit and margin (SI), and what it rests on. Each method is used once, and only
+    those that are asked for. InputError for any mistake in a requirement, before anything is flown."""
+    return studied("verify", scenario, law)
 
 
 @shortly

@@ -189,7 +189,9 @@ def test_faults_never_come():
         ({"budget.confidence": 1.5}, "budget.confidence"),
         ({"budget.boresight": [0, 0, 0]}, "budget.boresight"),
         ({"budget.interpretation": "often"}, "budget.interpretation"),
-        ({"budget.requirement": {"ape": -1}}, "budget.requirement.ape"),
+        ({"budget.requirement": {"ape": 1}}, "an old key; allowed: [[requirement]] tables"),
+        ({"requirement": [{"method": "budget", "metric": "ake", "at_most": 1}]}, "did you mean ape?"),
+        ({"requirement": [{"method": "budget", "metric": "ape", "at_least": 1}]}, "requirement[1].at_least"),
         ({"environment": None, "sensor": None}, "nothing that disturbs the loop"),
         ({"initial.rate": [3e3, 0, 0]}, "the motion is lost at"),
     ],
@@ -262,9 +264,21 @@ def test_command_writes_what_its_page_quotes(folder):
     complains(starhold("budget", "imager.toml", "-o", "out", cwd=folder), "results already there")
 
 
+STRICT = """
+[[requirement]]
+method = "budget"
+metric = "ape"
+at_most = "1 mas"
+[[requirement]]
+method = "budget"
+metric = "rpe"
+at_most = "1 deg"
+"""
+
+
 def test_options_take_the_place_of_the_files_keys_and_a_missed_requirement_is_told(folder):
     text = (folder / "full.toml").read_text(encoding="utf-8")
-    (folder / "strict.toml").write_text(text + '\n[budget.requirement]\nape = "1 mas"\nrpe = "1 deg"\n', encoding="utf-8")
+    (folder / "strict.toml").write_text(text + STRICT, encoding="utf-8")
     options = ("--start", "20", "--window", "0.1 min", "--separation", "8 s", "--runs", "2")
     done = starhold("budget", "strict.toml", *options, "-o", "out", cwd=folder, code=3)
     assert "missed" in done.stdout

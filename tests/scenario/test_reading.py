@@ -284,4 +284,8 @@ def test_template_runs_as_it_is_and_names_every_key(body):
         options = [field.annotation, *getattr(field.annotation, "__args__", ())]
         for model in (o for o in options if hasattr(o, "model_fields")):
             assert f"[{name}]" in text or f"[[{name}]]" in text
-            assert [key for key in model.model_fields if f"{key} = " not in text] in ([], ["deficit"])
+            assert [key for key in model.model_fields if f"{key} = " not in text] in (
+                [],
+                ["deficit"],
+                ["in_mode", "axis", "direction"],
+            )

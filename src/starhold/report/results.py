@@ -158,6 +158,10 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
             result.certificate(hidden)
         if json.loads(written["Certificate"].read_text(encoding="utf-8"))["claims"]:
             _write_kernel(folder)
+    for file, text in result.texts.items():
+        written[file] = folder / file
+        with atomic_write(written[file]) as hidden:
+            hidden.write_text(text, encoding="utf-8")
     if result.figure is not None:
         written["Picture"] = write_part(result, "png", folder / f"{name}.png")
     return written

@@ -13,7 +13,8 @@ from pydantic import Field, model_validator
 from starhold.laws.interface import Gain
 from starhold.scenario.distributions import Dispersed
 from starhold.scenario.quantity import quantity
-from starhold.scenario.tables import Table, told_at
+from starhold.scenario.requirement import without_requirements
+from starhold.scenario.tables import Table
 
 MOST_RUNS = 10**9
 
@@ -33,6 +34,4 @@ class CampaignTable(Table):
     @model_validator(mode="before")
     @classmethod
     def _without_requirements(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "requirement" in given:
-            raise told_at("requirement", "an old key", '[[requirement]] with method = "campaign", and its name as id')
-        return given
+        return without_requirements(given, "campaign")

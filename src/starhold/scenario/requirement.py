@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, cast
 
 from pydantic import AfterValidator, Field, model_validator
 
 from starhold.laws.interface import Gain
 from starhold.scenario.quantity import quantity, raw
-from starhold.scenario.tables import LONGEST_NAME, Table, at_key, refuse
+from starhold.scenario.tables import LONGEST_NAME, Table, at_key, refuse, told_at
 
 CONE = "exclusion-cone"
 Method: TypeAlias = Literal["proof", "flight", "campaign", "budget", "margin", "inspection"]
@@ -73,7 +73,7 @@ class RequirementTable(Table):
     @model_validator(mode="after")
     def _has_a_metric(self) -> RequirementTable:
         if self.metric is None and self.method not in (None, "inspection"):
-            raise at_key("metric", f'what method = "{self.method}" measures', None)
+            raise at_key("metric", f'this key is required with method = "{self.method}"', None)
         if self.metric is None and self.id is None:
             raise at_key("id", "an id, where there is no metric", None)
         return self
@@ -108,6 +108,13 @@ class RequirementTable(Table):
     def called(self) -> str:
         """Its id, by default the metric's name."""
         return self.id or str(self.metric)
+
+
+def without_requirements(given: Any, method: Method) -> Any:
+    """A raw table, refused where it holds the requirements that [[requirement]] tables of a method are now."""
+    if isinstance(given, dict) and "requirement" in given:
+        raise told_at("requirement", "an old key", f'[[requirement]] tables with id, metric and method = "{method}"')
+    return cast(Any, given)
 
 
 def check_family(requirements: Sequence[RequirementTable]) -> None:

@@ -96,6 +96,14 @@ def read_requirements(
     return tuple(requirements)
 
 
+def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: Mapping[str, str]) -> tuple[Requirement, ...]:
+    """The requirements of tables of methods that bound metrics from above alone, as `read_requirements` has them."""
+    for key, table in tables.items():
+        if table.at_least is not None:
+            raise InputError(scenario.where, f"{key}.at_least", show(table.at_least), f"at_most, with a {table.method}")
+    return read_requirements(tables, units, scenario.where)
+
+
 def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
     side = "at_least" if table.at_most is None else "at_most"
     value = getattr(table, side)

@@ -14,7 +14,7 @@ from starhold.errors import InputError
 from starhold.laws.modes import Modes
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest, show
-from starhold.scenario.units import to_number
+from starhold.scenario.units import apart, to_number
 from starhold.studies.body import study_of
 from starhold.studies.modes import stretches
 from starhold.studies.requirements import LOST, Requirement, cones_of, read_requirements, tables_of
@@ -51,6 +51,9 @@ class RequirementVerdict:
     left_out: tuple[str, ...] = ()
     parent: str = ""
     rationale: str = ""
+    typed_unit: str = ""
+    scale: float = 1.0
+    """The unit that the limit is typed in, and the worth of a unit of SI in it."""
 
     @property
     def margin(self) -> float | None:
@@ -70,19 +73,29 @@ def undecided(table: RequirementTable, why: str, **known: Any) -> RequirementVer
     return told(table, "not decided", why, **known)
 
 
+def limits(table: RequirementTable, required: Requirement) -> dict[str, Any]:
+    """The fields of a verdict that tell its limit, in its unit and in the one that is typed."""
+    fields: dict[str, Any] = {"limit": required.bound, "unit": required.unit, "at_most": required.at_most}
+    typed = table.at_most if required.at_most else table.at_least
+    if isinstance(typed, str) and required.bound:
+        number, unit = apart(typed)
+        fields |= {"typed_unit": unit, "scale": number / required.bound}
+    return fields
+
+
 def told(table: RequirementTable, verdict: Outcome, evidence: str, **known: Any) -> RequirementVerdict:
     """The verdict on the requirement of a table; known: number, limit, unit and others of its fields."""
     stated = {"metric": table.metric or "", "parent": table.parent or "", "rationale": table.rationale}
-    return RequirementVerdict(table.called, table.text, table.method or "", verdict, evidence, **stated | known)
+    fields: dict[str, Any] = stated | known
+    return RequirementVerdict(table.called, table.text, table.method or "", verdict, evidence, **fields)
 
 
 def compared(
     table: RequirementTable, required: Requirement, number: float | None, evidence: str, **known: Any
 ) -> RequirementVerdict:
     """The verdict of a number, which misses the limit where it is None or not a number."""
-    limit = {"limit": required.bound, "unit": required.unit, "at_most": required.at_most}
     there = None if number is None or math.isnan(number) else float(number)
-    found = told(table, "missed", evidence, number=there, **limit, **known)
+    found = told(table, "missed", evidence, number=there, **limits(table, required) | known)
     return replace(found, verdict="met") if found.margin is not None and found.margin >= 0.0 else found
 
 
@@ -226,8 +239,8 @@ def _flown(
         verdict = "met" if lost is None else "missed"
         return told(table, verdict, flight if lost is None else f"{flight}, which is lost")
     if not parts and lost is None:
-        return undecided(table, f"{flight}: it has no such time", limit=required.bound, unit=required.unit)
-    values = [part.get(required.column) for part in parts]
+        return undecided(table, f"{flight}: it has no such time", **limits(table, required))
+    values: list[Any] = [part.get(required.column) for part in parts]
     if not values or None in values:
         return compared(table, required, None, f"{flight}: {'it is lost' if lost is not None else 'there is no such value'}")
     return compared(table, required, (max if required.at_most else min)(values), flight)

@@ -147,7 +147,7 @@ function guides(panel, plot) {
     ctx.textAlign = "left";
     ctx.font = `${12 * dot}px system-ui, sans-serif`;
     const { factor, label } = unitOf(panel, u), top = bbox.top - 6 * dot - wordsAbove(plot, panel) * dot;
-    ctx.fillText(label, bbox.left - 30 * dot, top);
+    ctx.fillText(label, bbox.left, top);
     ctx.fillStyle = colours.soft;
     ctx.textAlign = "right";
     const sizes = [...new Set(panel.levels.map(Math.abs))], off = panel.levels.some((level) => level < y.min || level > y.max);
@@ -218,8 +218,8 @@ function options(plot, panel, k, chart, size) {
   const grid = { stroke: () => colours.line, width: 1 };
   const axis = { stroke: () => colours.ink, grid, ticks: { show: false }, font: "12px system-ui, sans-serif", labelFont: "12.5px system-ui, sans-serif" };
   const [tick, unit] = plot.split ? [1, ""] : clockOf(plot);
-  const told = plot.split ? { label: plot.xlabel, incrs: [1], values: (u, splits) => splits }
-    : { label: `time, ${unit}`, incrs: STEPS.map((step) => step * tick), values: (u, splits) => splits.map((v) => short(v / tick, 6)) };
+  const told = plot.split ? { space: 50, label: plot.xlabel, incrs: [1], values: (u, splits) => splits }
+    : { space: 75, label: `time, ${unit}`, incrs: STEPS.map((step) => step * tick), values: (u, splits) => splits.map((v) => short(v / tick, 6)) };
   return {
     ...size, plugins: [readout(panel, k, chart)], legend: { show: false }, padding: [22 + wordsAbove(plot, panel), 16, 0, 0],
     cursor: { sync: { key: plot.split ? `${plot.name}${k}` : "time", setSeries: false }, drag: { x: true, y: false }, points: { size: 6 } },
