@@ -8,8 +8,9 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from starhold.certification.wording import coverage, listed, statement, strongest, unclaimed
-from starhold.report.campaign_units import plain_measure, with_unit
+from starhold.report.campaign_units import plain_measure
 from starhold.report.commands import Cell, Column, Table
+from starhold.report.commands.verify import shown
 from starhold.report.tables import Markup, note, pill, swatch, table_html
 from starhold.report.text import lost_text, unknown_text
 from starhold.studies.requirements import LOST
@@ -63,9 +64,9 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
     for same in zip(*found, strict=True):
         first = same[0]
         measure = flights[0].metric_set.measures.get(first.metric) or plain_measure(first.metric, first.unit)
-        limit = next((with_unit(one.limit, measure) for one in same if one.limit is not None), "")
+        limit = next((f"{'≤' if one.at_most else '≥'} {told}" for one in same if (told := shown(one, one.limit))), "")
         asked = "the motion is not lost" if first.metric == LOST else measure.heading
-        cells = [_verdict(one, "" if one.number is None else with_unit(one.number, measure)) for one in same]
+        cells = [Markup(f"{pill(one.verdict)} {escape(shown(one, one.number) or '')}") for one in same]
         how = dict.fromkeys(
             f"{one.evidence}{f'; leaving out {listed(one.left_out)}' if one.left_out else ''}" for one in same
         )
@@ -74,10 +75,6 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
     laws = [Column(flights[number].name if len(flights) > 1 else "verdict") for number in judged]
     table = Table([Column("requirement"), *laws, Column("limit"), Column("how it is known")], rows)
     return table_html(table, "told tight verdicts"), counts
-
-
-def _verdict(verdict: RequirementVerdict, number: str) -> Markup:
-    return Markup(f"{pill(verdict.verdict)} {escape(number)}")
 
 
 def _counted(found: Sequence[RequirementVerdict]) -> str:

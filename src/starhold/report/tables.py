@@ -30,8 +30,13 @@ def table_html(table: Table, kind: str = "", fit: bool = False, rows: Mapping[in
     it has no head. rows: attributes of rows by their number."""
     headed = any(column.name for column in table.columns)
     sides = [f' class="{"number" if column.format else "words"}"' if headed else "" for column in table.columns]
+    # On a narrow screen each cell of such a table is a line of its own.
+    named = [
+        f'{side} data-head="{escape(column.name)}"' if "rows" in kind else side
+        for side, column in zip(sides, table.columns, strict=True)
+    ]
     body = "".join(
-        f"<tr{f' {rows[i]}' if rows and i in rows else ''}>{''.join(map(_cell, row, sides))}</tr>\n"
+        f"<tr{f' {rows[i]}' if rows and i in rows else ''}>{''.join(map(_cell, row, named))}</tr>\n"
         for i, row in enumerate(table.rows)
     )
     head = f"<thead><tr>{''.join(map(_head, table.columns, sides))}</tr></thead>\n" if headed else ""

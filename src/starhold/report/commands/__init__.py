@@ -78,7 +78,8 @@ Block: TypeAlias = Table | Heading | str
 class Result(NamedTuple):
     """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
     and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; texts, by the names of their files, are written as they are; certificate writes one. outcome: whether all that is required is met, or proved."""
+    summary.json; texts, by the names of their files, are written as they are; certificate writes one. outcome: whether all
+    that is required is met, or proved."""
 
     title: str
     blocks: Sequence[Block]

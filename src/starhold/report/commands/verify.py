@@ -24,9 +24,9 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
         style = STYLES[one.verdict]
         told = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
         side = "≤ " if one.at_most else "≥ "
-        limit = _shown(one, one.limit)
+        limit = shown(one, one.limit)
         rows.append(
-            [escape(one.id), _shown(one, one.number), limit and side + limit, _shown(one, one.margin), one.method, told]
+            [escape(one.id), shown(one, one.number), limit and side + limit, shown(one, one.margin), one.method, told]
         )
     blocks: list[Block] = ["", Table([*head, Column("method"), Column("verdict")], rows), ""]
     blocks += [f"{one.id}: {one.evidence}." for one in verdicts if one.verdict != "met"]
@@ -37,7 +37,7 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
     return Result(title, blocks, _matrix(verdicts), texts=texts, outcome=outcome)
 
 
-def _shown(one: RequirementVerdict, value: float | None) -> str | None:
+def shown(one: RequirementVerdict, value: float | None) -> str | None:
     """A number in the unit that the limit is typed in, rounded for reading."""
     if value is None:
         return None
@@ -67,7 +67,7 @@ def junit(title: str, law: str, verdicts: Sequence[RequirementVerdict]) -> str:
     for one in verdicts:
         case = Tree.SubElement(suite, "testcase", {"classname": law, "name": one.id})
         if one.verdict in JUNIT:
-            number, limit = (_shown(one, value) or "none" for value in (one.number, one.limit))
+            number, limit = (shown(one, value) or "none" for value in (one.number, one.limit))
             message = f"{one.verdict}: {number}, limit {limit}"
             Tree.SubElement(case, JUNIT[one.verdict], {"message": message, "type": one.method or "derived"})
         Tree.SubElement(case, "system-out").text = f"{one.text}\n{one.sentence}\n{one.evidence}".strip()
