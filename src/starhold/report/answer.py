@@ -28,9 +28,8 @@ SPANS = ((63_115_200.0, 31_557_600.0, "years"), (172_800.0, 86_400.0, "days"), (
 
 def span_text(seconds: float) -> str:
     """Tell a time in the unit in which it is large and round."""
-    fits = ((size, unit) for least, size, unit in SPANS if seconds >= least and not (10.0 * seconds / size) % 1.0)
-    size, unit = next(fits, (1.0, "s"))
-    return f"{seconds / size:.4g} {unit}"
+    told = ((seconds / size, unit) for least, size, unit in SPANS if seconds >= least)
+    return "{:g} {}".format(*next((one for one in told if abs(one[0] - round(one[0], 2)) < 1e-9), (seconds, "s")))
 
 
 def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
@@ -59,7 +58,7 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
     found = list(judged.values())
     if all(one.verdict == "not decided" for of in found for one in of):
         asked = ", ".join(one.id for one in found[0])
-        return note(f"Required, and not decided by a flight: {asked}; starhold verify decides it."), counts
+        return note(f"Required, and not decided by a flight: {asked}; starhold verify tells."), ""
     rows: list[list[Any]] = []
     for same in zip(*found, strict=True):
         first = same[0]

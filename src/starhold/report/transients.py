@@ -19,9 +19,9 @@ def section(flights: Sequence[Flight]) -> str:
     if not all("limits_kept" in flight.metrics for flight in flights):
         return ""
     told = [(number, flight, *_cells(flight)) for number, flight in enumerate(flights)]
-    rows = [[Cell(flight.name, "name", number), *cells, Cell("", fate)] for number, flight, *cells, fate in told]
-    heads = ("law", "transient", "peak rate", "peak accelerations x, y, z", "limits")
-    return table_html(Table([*map(Column, heads)], rows))
+    rows = [[Cell(flight.name, "name", number), Cell("", fate), *cells] for number, flight, *cells, fate in told]
+    heads = ("law", "limits", "transient", "peak rate", "peak accelerations x, y, z")
+    return table_html(Table([*map(Column, heads)], rows), "told tight lines")
 
 
 def _cells(flight: Flight) -> tuple[str, str, str, str]:
