@@ -11,9 +11,11 @@ import pytest
 
 from starhold.analysis.rigid_body import MEASURES, METRICS
 from starhold.parts.craft import check_inertia
+from starhold.report.attitude_plots import closest_limit
 from starhold.report.bodies.rigid_body import _box
 from starhold.report.page import render, write_page
 from starhold.report.settings import settings
+from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.simulation.lane import Recording, fly, label
@@ -64,6 +66,20 @@ def test_every_law_and_every_metric_is_there(reader: Reader) -> None:
     marked = sum(tag == "td" and attrs.get("class") == "number best" for tag, attrs in reader.tags)
     assert marked == sum(map(len, best.values())) > 0
     assert flown.text().split("[spacecraft]")[1] in reader.text
+
+
+def test_what_comes_closest_to_a_limit_is_told(reader: Reader) -> None:
+    for flight in flown.flights():
+        share = np.abs(flight.recording["torque"]).max() / 0.01
+        assert f"torque {100.0 * share:.3g} %" in reader.words
+    flight, scenario = flown.flights()[0], load("wheels-orbital")
+    arrays = flight.recording.arrays | {"wheel_momentum": np.full((3, 4), -0.45), "wheel_torque": np.zeros((3, 4))}
+    wheeled = replace(flight, recording=Recording(arrays, flight.recording.attrs | {"torque_limit": 1.0}))
+    wheels = wheels_of(scenario)
+    assert wheels is not None
+    assert closest_limit(wheeled, scenario) == (pytest.approx(0.45 / min(wheels.momentum_limit)), "wheels' momentum")
+    free = flight.recording.attrs | {"torque_limit": np.inf, "limit": "none"}
+    assert closest_limit(replace(flight, recording=Recording(flight.recording.arrays, free)), flown.scenario()) == (0.0, "")
 
 
 def test_the_data_is_json_and_small(reader: Reader) -> None:

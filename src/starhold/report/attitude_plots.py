@@ -225,6 +225,19 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple
     return tuple(plots)
 
 
+def closest_limit(flight: Flight, scenario: Scenario) -> tuple[float, str]:
+    """The limit of torque or wheels that a flight comes closest to: its largest value as a share of that, and what it is
+    of; (0, "") where there is no limit."""
+    run, wheels = flight.recording, wheels_of(scenario)
+    torque, attrs = run["torque"], run.attrs
+    found = [("torque", np.linalg.norm(torque, axis=1) if attrs["limit"] == "norm" else torque, attrs["torque_limit"])]
+    if wheels is not None and "wheel_momentum" in run.arrays:
+        found.append(("wheels' momentum", run["wheel_momentum"], np.array(wheels.momentum_limit)))
+        found.append(("motors' torque", run["wheel_torque"], np.array(wheels.torque_limit)))
+    shares = [(float(np.abs(values / limit).max(initial=0.0)), name) for name, values, limit in found]
+    return max(shares) if max(shares)[0] > 0.0 else (0.0, "")
+
+
 def _peak(flights: Sequence[Flight], name: str) -> float:
     sound = [flight for flight in flights if flight.lost is None] or flights
     return max(float(np.abs(flight.recording[name]).max(initial=0.0)) for flight in sound)

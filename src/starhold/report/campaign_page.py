@@ -202,7 +202,7 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     sections = [
         table_html(required.table, "told tight") if required else note("Nothing is required, so there are no verdicts."),
         _switches(result),
-        beside(*map(plot_box, leads)) if leads else "",
+        beside(*(plot_box(plot, 2) for plot in leads)),
         *_headlines(result, words),
         fold("Verdicts in words", note(required.note) + _in_words(result) if required else ""),
         fold("Runs", _shown(tables.runs(result)._replace(heading=""), fit=True)),

@@ -231,7 +231,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         required,
         ranking(flights),
         parts.measured,
-        beside(plot_box(lead, transient_switch(parts.transient)), parts.views),
+        beside(plot_box(lead, 2, transient_switch(parts.transient)), parts.views),
         proofs(flights),
         *(fold(name, content, FOLDS.get(name, "")) for name, content in folds.items()),
     ]

@@ -84,7 +84,7 @@ def fold(name: str, content: str, hint: str = "") -> str:
 def beside(*boxes: str) -> str:
     """Boxes side by side, the first the widest; those that are empty are left out."""
     there = [box for box in boxes if box]
-    return f'<div class="{"two" if len(there) > 1 else "one"}">{"".join(there)}</div>'
+    return f'<div class="{"two" if len(there) > 1 else "one"}">{"".join(there)}</div>' if there else ""
 
 
 def plain_document(title: str, body: Iterable[str]) -> str:
@@ -155,12 +155,13 @@ def over_time(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
     return told | {"panels": panels}
 
 
-def plot_box(plot: Mapping[str, Any], more: str = "") -> str:
-    """The box of a plot, which a script fills; more: what stands beside its title."""
+def plot_box(plot: Mapping[str, Any], level: int = 3, more: str = "") -> str:
+    """The box of a plot, which a script fills; level: of its heading, more: what stands beside that."""
     notes = plot["notes"] if "notes" in plot else [f"– – {plot['dashed']}"] * bool(plot["dashed"])
     spans = "".join(f"<span>{escape(note)}</span>" for note in notes)
     below = f'<p class="note">{escape(plot["note"])}</p>' if plot.get("note") else ""
-    return f'<div class="plot"><h3>{escape(plot["title"])}{spans}</h3>{more}<div id="{plot["name"]}"></div>{below}</div>'
+    head = f"<h{level}>{escape(plot['title'])}{spans}</h{level}>"
+    return f'<div class="plot">{head}{more}<div id="{plot["name"]}"></div>{below}</div>'
 
 
 def transient_switch(transient: float | None) -> str:
@@ -201,8 +202,6 @@ def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, 
         "widths": [round((1.7 if thin else 2.6) * share, 2) for share in slimmer],
         "order": order,
         "log": panel.log,
-        # Ticks at powers of ten where there are several of them, else where Plotly likes.
-        "ticks": max(1, math.ceil(panel.decades() / 6.0)) if panel.decades() > 2.0 else None,
         "levels": rounded(panel.levels),
         "span": None if panel.span is None else rounded(panel.span),
         "source": panel.source,

@@ -15,13 +15,23 @@ from starhold.algebra.quaternion import conjugate, multiply, to_body
 from starhold.analysis.rigid_body import DECADES
 from starhold.parts.craft import EARTH, total_inertia
 from starhold.report import transients
-from starhold.report.attitude_plots import ACCURACIES, AttitudePlots, begun, collect, early, steps_within, until
+from starhold.report.attitude_plots import (
+    ACCURACIES,
+    AttitudePlots,
+    begun,
+    closest_limit,
+    collect,
+    early,
+    steps_within,
+    until,
+)
 from starhold.report.body import PageParts, Sampling
 from starhold.report.figures import POINTS, Picture, blank, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import panel_data, rounded, views
 from starhold.report.plots import Panel, Plot, colour, thinning
+from starhold.report.tables import swatch
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 from starhold.studies.flight import Begun, Flight
 
@@ -82,13 +92,20 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
     return PageParts(
         data,
         views=views(flights, len(scene["times"]), "The turning body", "Attitude", _simplification(scene)),
-        measured=transients.section(flights),
+        measured=_limits(flights, scenario) + transients.section(flights),
         folds={"Linear loop": section(scenario, flights)},
         transient=end,
         scripts=("space.js", "body.js"),
         footer=f"; seed {scenario.table.simulation.seed}",
         sampling=sampling,
     )
+
+
+def _limits(flights: Sequence[Flight], scenario: Scenario) -> str:
+    """Tell what limits each flight."""
+    told = [(number, *closest_limit(flight, scenario)) for number, flight in enumerate(flights)]
+    said = "".join(f"<span>{swatch(number)}{name} {100.0 * share:.3g} %</span>" for number, share, name in told if name)
+    return f'<p class="best-at of-file"><strong>Of torque and wheels, closest to a limit</strong>{said}</p>' if said else ""
 
 
 def _accuracy_figure(flights: Sequence[Flight], name: str) -> Any:
