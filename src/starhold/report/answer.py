@@ -28,8 +28,8 @@ SPANS = ((63_115_200.0, 31_557_600.0, "years"), (172_800.0, 86_400.0, "days"), (
 
 def span_text(seconds: float) -> str:
     """Tell a time in the unit in which it is large and round."""
-    told = ((seconds / size, unit) for least, size, unit in SPANS if seconds >= least)
-    return "{:g} {}".format(*next((one for one in told if abs(one[0] - round(one[0], 2)) < 1e-9), (seconds, "s")))
+    sizes = ((seconds / size, unit) for least, size, unit in SPANS if seconds >= least)
+    return "{:g} {}".format(*next((one for one in sizes if abs(one[0] - round(one[0], 2)) < 1e-9), (seconds, "s")))
 
 
 def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
@@ -55,32 +55,34 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
         return "", ""
     whose = {number: f"{swatch(number)}{escape(flights[number].name)} " if len(flights) > 1 else "" for number in judged}
     counts = "".join(f"<span>{whose[number]}{_counted(of)}</span>" for number, of in judged.items())
-    found = list(judged.values())
-    if all(one.verdict == "not decided" for of in found for one in of):
-        asked = ", ".join(one.id for one in found[0])
-        return note(f"Required, and not decided by a flight: {asked}; starhold verify tells."), ""
+    by_law = list(judged.values())
+    if all(one.verdict == "not decided" for of in by_law for one in of):
+        subject = ", ".join(one.id for one in by_law[0])
+        return note(f"Required, and not decided by a flight: {subject}; starhold verify tells."), ""
     rows: list[list[Any]] = []
-    for same in zip(*found, strict=True):
+    for same in zip(*by_law, strict=True):
         first = same[0]
         measure = flights[0].metric_set.measures.get(first.metric) or plain_measure(first.metric, first.unit)
-        limit = next((f"{'≤' if one.at_most else '≥'} {told}" for one in same if (told := shown(one, one.limit))), "")
-        asked = "the motion is not lost" if first.metric == LOST else measure.heading
+        limit = next(
+            (f"{'≤' if one.at_most else '≥'} {limit_text}" for one in same if (limit_text := shown(one, one.limit))), ""
+        )
+        subject = "the motion is not lost" if first.metric == LOST else measure.heading
         cells = [Markup(f"{pill(one.verdict)} {escape(shown(one, one.number) or '')}") for one in same]
         how = dict.fromkeys(
             f"{one.evidence}{f'; leaving out {listed(one.left_out)}' if one.left_out else ''}" for one in same
         )
-        name = Markup(f'<small class="id">{escape(first.id)}</small> {escape(first.text or asked)}')
+        name = Markup(f'<small class="id">{escape(first.id)}</small> {escape(first.text or subject)}')
         rows.append([name, *cells, limit, "; ".join(how)])
     laws = [Column(flights[number].name if len(flights) > 1 else "verdict") for number in judged]
     table = Table([Column("requirement"), *laws, Column("limit"), Column("how it is known")], rows)
     return table_html(table, "told tight verdicts"), counts
 
 
-def _counted(found: Sequence[RequirementVerdict]) -> str:
-    counts = Counter(one.verdict for one in found)
-    told = [pill("met", f"{counts['met']} of {len(found)} met")] if counts["met"] else []
-    told += [pill(word, f"{counts[word]} {word}") for word in ("missed", "not decided") if counts[word]]
-    return " ".join(told)
+def _counted(given: Sequence[RequirementVerdict]) -> str:
+    counts = Counter(one.verdict for one in given)
+    pills = [pill("met", f"{counts['met']} of {len(given)} met")] if counts["met"] else []
+    pills += [pill(word, f"{counts[word]} {word}") for word in ("missed", "not decided") if counts[word]]
+    return " ".join(pills)
 
 
 def key_metrics(metric_set: MetricSet, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -168,6 +170,6 @@ def _strongest(number: int, flight: Flight, count: int) -> str:
     if left and claim.outcome == "proved":
         start = left[0].time
         when = f"this flight leaves it {'from the start' if start == 0.0 else f'at {flight.metric_set.moment(start, 4)}'}"
-    told = "; ".join(filter(None, (coverage(claim, certificate.subject), when)))
-    text = f"{f'{about}: ' if about else ''}{statement(claim, certificate.subject)}{f' ({told})' if told else ''}."
+    more = "; ".join(filter(None, (coverage(claim, certificate.subject), when)))
+    text = f"{f'{about}: ' if about else ''}{statement(claim, certificate.subject)}{f' ({more})' if more else ''}."
     return f"<p>{pill(claim.outcome)} {whose}{escape(text)}</p>"

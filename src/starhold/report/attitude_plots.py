@@ -110,8 +110,8 @@ def begun(flights: Sequence[Flight]) -> list[Mark]:
 
 def readers_of(scenario: Scenario) -> tuple[str, ...]:
     """How the names of what sensors and estimators tell begin."""
-    told = [fitted.called for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator")]
-    return tuple(f"{name.replace('-', '_')}_" for name in told)
+    readers = [fitted.called for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator")]
+    return tuple(f"{name.replace('-', '_')}_" for name in readers)
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:
@@ -230,11 +230,11 @@ def closest_limit(flight: Flight, scenario: Scenario) -> tuple[float, str]:
     of; (0, "") where there is no limit."""
     run, wheels = flight.recording, wheels_of(scenario)
     torque, attrs = run["torque"], run.attrs
-    found = [("torque", np.linalg.norm(torque, axis=1) if attrs["limit"] == "norm" else torque, attrs["torque_limit"])]
+    limited = [("torque", np.linalg.norm(torque, axis=1) if attrs["limit"] == "norm" else torque, attrs["torque_limit"])]
     if wheels is not None and "wheel_momentum" in run.arrays:
-        found.append(("wheels' momentum", run["wheel_momentum"], np.array(wheels.momentum_limit)))
-        found.append(("motors' torque", run["wheel_torque"], np.array(wheels.torque_limit)))
-    shares = [(float(np.abs(values / limit).max(initial=0.0)), name) for name, values, limit in found]
+        limited.append(("wheels' momentum", run["wheel_momentum"], np.array(wheels.momentum_limit)))
+        limited.append(("motors' torque", run["wheel_torque"], np.array(wheels.torque_limit)))
+    shares = [(float(np.abs(values / limit).max(initial=0.0)), name) for name, values, limit in limited]
     return max(shares) if max(shares)[0] > 0.0 else (0.0, "")
 
 

@@ -151,8 +151,8 @@ def over_time(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
     """A plot over time for the script that draws it."""
     order = back_to_front(flights, plot)
     panels = [panel_data(panel, order, thin=plot.chatters) for panel in plot.panels]
-    told = {"name": plot.name, "title": plot.title, "dashed": plot.dashed, "topic": plot.topic, "clock": plot.clock}
-    return told | {"panels": panels}
+    data = {"name": plot.name, "title": plot.title, "dashed": plot.dashed, "topic": plot.topic, "clock": plot.clock}
+    return data | {"panels": panels}
 
 
 def plot_box(plot: Mapping[str, Any], level: int = 3, more: str = "") -> str:

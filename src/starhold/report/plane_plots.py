@@ -129,8 +129,8 @@ def plane_data(plot: PlanePlot) -> dict[str, Any]:
         }
         for plane in plot.planes
     ]
-    told = {"name": plot.name, "title": plot.title, "dashed": plot.dashed, "note": plot.note, "topic": "Motion"}
-    return told | {"planes": planes}
+    data = {"name": plot.name, "title": plot.title, "dashed": plot.dashed, "note": plot.note, "topic": "Motion"}
+    return data | {"planes": planes}
 
 
 def _guide_data(guide: Guide) -> dict[str, Any]:

@@ -96,7 +96,7 @@ def _size(plots: PathPlots, flights: Sequence[Flight]) -> float:
 
 
 def _units(scenario: Scenario) -> list[tuple[str, str]]:
-    """What one of the scaled numbers in the settings is worth."""
+    """Tell how much one of the scaled numbers in the settings is worth."""
     units, plant = scenario.table.libration.units, scenario.craft
     pair = scenario.table.libration.pair
     return [

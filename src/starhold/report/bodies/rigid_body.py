@@ -103,8 +103,8 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
 
 def _limits(flights: Sequence[Flight], scenario: Scenario) -> str:
     """Tell what limits each flight."""
-    told = [(number, *closest_limit(flight, scenario)) for number, flight in enumerate(flights)]
-    said = "".join(f"<span>{swatch(number)}{name} {100.0 * share:.3g} %</span>" for number, share, name in told if name)
+    closest = [(number, *closest_limit(flight, scenario)) for number, flight in enumerate(flights)]
+    said = "".join(f"<span>{swatch(number)}{name} {100.0 * share:.3g} %</span>" for number, share, name in closest if name)
     return f'<p class="best-at of-file"><strong>Of torque and wheels, closest to a limit</strong>{said}</p>' if said else ""
 
 
