@@ -68,6 +68,7 @@ class RequirementTable(Table):
     record: Annotated[str | None, Field(description="a file of its inspection, relative to this one")] = None
     parent: Annotated[Id | None, Field(description="the id of the requirement that it is derived from")] = None
     rationale: Annotated[str, Field(description="why it is required")] = ""
+    file: Annotated[str | None, Field(description="a CSV or ReqIF file of requirements, relative to this one")] = None
     attributes: dict[str, str] = Field(default={}, description="what else another tool says of it, kept as it is")
 
     @model_validator(mode="after")

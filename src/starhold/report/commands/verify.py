@@ -33,8 +33,7 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
     outcomes = {one.verdict for one in verdicts}
     outcome = "missed" if "missed" in outcomes else "undecided" if "not decided" in outcomes else "met"
     title = f"{scenario.name}, {entry.name}: what is required"
-    texts = {"junit.xml": junit(title, entry.name, verdicts)}
-    return Result(title, blocks, _matrix(verdicts), texts=texts, outcome=outcome)
+    return Result(title, blocks, _matrix(verdicts), xml=junit(title, entry.name, verdicts), outcome=outcome)
 
 
 def _shown(one: RequirementVerdict, value: float | None) -> str | None:
@@ -79,7 +78,7 @@ JUNIT = {"missed": "failure", "not decided": "error"}
 """How JUnit calls verdicts; a requirement that is met passed."""
 
 COMMAND = Command(
-    "Tell which requirements of a file are met, each by its own method: a table, verify.csv and junit.xml.",
+    "Tell which requirements of a file are met, each by its own method: a table, verify.csv, and verify.xml for JUnit.",
     "verify",
     later("campaign.verify.study"),
     present,
