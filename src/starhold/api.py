@@ -282,7 +282,7 @@ def export_requirements(
         write_requirement_file(tables, into, None if original is None else Path(original))
     except OSError as error:
         raise InputError(
-            str(error.filename or into), "", f"{error.strerror}", "files that can be read and written"
+            str(error.filename or into), "", f"{error.strerror}", "files that can be used"
         ) from None
     return into
 
