@@ -281,9 +281,7 @@ def export_requirements(
         tables = reading.open_scenario(scenario).table.requirement
         write_requirement_file(tables, into, None if original is None else Path(original))
     except OSError as error:
-        raise InputError(
-            str(error.filename or into), "", f"{error.strerror}", "files that can be used"
-        ) from None
+        raise InputError(str(error.filename or into), "", f"{error.strerror}", "files that can be used") from None
     return into
 
 

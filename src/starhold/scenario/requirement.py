@@ -44,7 +44,7 @@ Id: TypeAlias = Annotated[str, AfterValidator(_check_id)]
 
 
 class RequirementTable(Table):
-    """What is required, with the method that verifies it. Without a method it is as those are that have it as parent."""
+    """A requirement, with the method that verifies it; without a method it is as those are that have it as parent."""
 
     id: Annotated[Id | None, Field(description="how tables, columns and other tools call it; the metric if absent")] = None
     text: Annotated[str, Field(description="the requirement in words")] = ""

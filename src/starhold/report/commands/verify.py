@@ -22,11 +22,11 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
     rows: list[list[Any]] = []
     for one in verdicts:
         style = STYLES[one.verdict]
-        told = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
+        shown = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
         side = "≤ " if one.at_most else "≥ "
         limit = _shown(one, one.limit)
         rows.append(
-            [escape(one.id), _shown(one, one.number), limit and side + limit, _shown(one, one.margin), one.method, told]
+            [escape(one.id), _shown(one, one.number), limit and side + limit, _shown(one, one.margin), one.method, shown]
         )
     blocks: list[Block] = ["", Table([*head, Column("method"), Column("verdict")], rows), ""]
     blocks += [f"{one.id}: {one.evidence}." for one in verdicts if one.verdict != "met"]
