@@ -99,16 +99,16 @@ def written(rows: Sequence[Mapping[str, str]], title: str, original: bytes | Non
     it lacks is added. InputError where the original is none, or a formatted text or a choice would have to change."""
     bundle = _parsed(_empty(title) if original is None else original, where)
     content = bundle.core_content.req_if_content
-    there = {dict(_keyed(row))["id"]: (one, row) for one, row in _rows(content)}
+    there = {dict(keyed(row))["id"]: (one, row) for one, row in _rows(content)}
     for row in rows:
         one, old = there.get(row["id"]) or (_added(content, title, row["id"], where), {})
         for column, text in row.items():
-            if dict(_keyed(old)).get(column) != text:
+            if dict(keyed(old)).get(column) != text:
                 _put(content, one, column, text, where)
     return _module("unparser", where).ReqIFUnparser.unparse(bundle)
 
 
-def _keyed(row: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+def keyed(row: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """The row by keys of requirements where columns hold those."""
     from starhold.scenario.requirement_files import key_of
 
