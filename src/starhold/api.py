@@ -268,6 +268,24 @@ def export_aem(
 
 
 @shortly
+def export_requirements(
+    scenario: reading.Scenario | str | Path, file: str | Path, original: str | Path | None = None
+) -> Path:
+    """Write the requirements of a scenario, with their attributes, to a CSV or ReqIF file, by its suffix, and return the
+    path. original: a ReqIF file whose content is kept but for what differs in the requirements. A scenario reads such files
+    where a [[requirement]] names one as its `file`. InputError for another suffix and for what cannot be written."""
+    from starhold.scenario.requirement_files import write_requirement_file
+
+    into = Path(file)
+    try:
+        tables = reading.open_scenario(scenario).table.requirement
+        write_requirement_file(tables, into, None if original is None else Path(original))
+    except OSError as error:
+        raise InputError(str(error.filename or into), "", f"{error.strerror}", "files that can be used") from None
+    return into
+
+
+@shortly
 def read_aem(file: str | Path) -> Aem:
     """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
     the reference frame to the body's axes), and what it is about. InputError where it is none."""

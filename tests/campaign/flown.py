@@ -34,7 +34,7 @@ ASKED = [
     {"id": "pointing", "metric": "final_attitude_error", "at_most": "0.5 deg", "share": "90 %"},
     {"id": "kept", "metric": "lost"},
     {
-        "name": "sun",
+        "id": "sun",
         "metric": "exclusion-cone",
         "axis": [0, 0, 1],
         "direction": [0, 1, 0],

@@ -77,7 +77,7 @@ class Job:
 
     @cached_property
     def required(self) -> Mapping[str, RequirementTable]:
-        """What runs must keep, by how errors call it."""
+        """The tables of what runs must keep, by how errors call them."""
         return tables_of(self.scenario, "campaign")
 
     @cached_property

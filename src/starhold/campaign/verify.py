@@ -1,4 +1,4 @@
-"""Whether a law keeps the requirements of its scenario: each method is used once, and only those that are asked for."""
+"""Whether a law keeps the requirements of its scenario: each method is used once, and only those that are wanted for."""
 
 from __future__ import annotations
 
@@ -24,7 +24,15 @@ from starhold.studies.deciding import (
     refuse_other_bodies,
 )
 from starhold.studies.requirements import LOST, tables_of
-from starhold.studies.verification import RequirementVerdict, by_flight, by_inspection, check_flight, in_order, limits, told
+from starhold.studies.verification import (
+    RequirementVerdict,
+    by_flight,
+    by_inspection,
+    check_flight,
+    in_order,
+    limits,
+    verdict_on,
+)
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -47,13 +55,13 @@ def study(
         "budget": lambda: by_budget(scenario, entry, lambda done, total, name: None),
         "campaign": lambda: by_campaign(scenario, entry),
     }
-    asked = [method for method in methods if tables_of(scenario, method)]
-    found: Verdicts = {}
-    for done, method in enumerate(asked):
-        notice(done, len(asked), method)
-        found |= methods[method]()
-    notice(len(asked), len(asked), "")
-    return in_order(scenario, found)
+    wanted = [method for method in methods if tables_of(scenario, method)]
+    decided: Verdicts = {}
+    for done, method in enumerate(wanted):
+        notice(done, len(wanted), method)
+        decided |= methods[method]()
+    notice(len(wanted), len(wanted), "")
+    return in_order(scenario, decided)
 
 
 def check(scenario: Scenario, entry: LawEntry) -> None:
@@ -86,5 +94,5 @@ def by_campaign(scenario: Scenario, entry: LawEntry) -> Verdicts:
             number = None if kept is None or not math.isfinite(kept) else required.bound - side * kept
             known = limits(table, required) | {"number": number}
         said = verdict.sentence().removeprefix(f"{verdict.name}: ")
-        verdicts[key] = told(table, verdict.outcome, f"{said} Digest of the runs: {result.digest}", **known)
+        verdicts[key] = verdict_on(table, verdict.outcome, f"{said} Digest of the runs: {result.digest}", **known)
     return verdicts

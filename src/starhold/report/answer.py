@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from starhold.certification.wording import coverage, listed, statement, strongest, unclaimed
 from starhold.report.campaign_units import plain_measure
 from starhold.report.commands import Cell, Column, Table
-from starhold.report.commands.verify import shown
+from starhold.report.commands.verify import amount
 from starhold.report.tables import Markup, note, pill, swatch, table_html
 from starhold.report.text import lost_text, unknown_text
 from starhold.studies.requirements import LOST
@@ -63,11 +63,10 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
     for same in zip(*by_law, strict=True):
         first = same[0]
         measure = flights[0].metric_set.measures.get(first.metric) or plain_measure(first.metric, first.unit)
-        limit = next(
-            (f"{'≤' if one.at_most else '≥'} {limit_text}" for one in same if (limit_text := shown(one, one.limit))), ""
-        )
+        limit = next((text for one in same if (text := amount(one, one.limit))), "")
+        limit = f"{'≤' if first.at_most else '≥'} {limit}" if limit else ""
         subject = "the motion is not lost" if first.metric == LOST else measure.heading
-        cells = [Markup(f"{pill(one.verdict)} {escape(shown(one, one.number) or '')}") for one in same]
+        cells = [Markup(f"{pill(one.verdict)} {escape(amount(one, one.number) or '')}") for one in same]
         how = dict.fromkeys(
             f"{one.evidence}{f'; leaving out {listed(one.left_out)}' if one.left_out else ''}" for one in same
         )

@@ -44,7 +44,7 @@ Id: TypeAlias = Annotated[str, AfterValidator(_check_id)]
 
 
 class RequirementTable(Table):
-    """What is required, with the method that verifies it. Without a method it is as those are that have it as parent."""
+    """A requirement, with the method that verifies it; without a method it is as those are that have it as parent."""
 
     id: Annotated[Id | None, Field(description="how tables, columns and other tools call it; the metric if absent")] = None
     text: Annotated[str, Field(description="the requirement in words")] = ""
@@ -68,6 +68,7 @@ class RequirementTable(Table):
     record: Annotated[str | None, Field(description="a file of its inspection, relative to this one")] = None
     parent: Annotated[Id | None, Field(description="the id of the requirement that it is derived from")] = None
     rationale: Annotated[str, Field(description="why it is required")] = ""
+    file: Annotated[str | None, Field(description="a CSV or ReqIF file of requirements, relative to this one")] = None
     attributes: dict[str, str] = Field(default={}, description="what else another tool says of it, kept as it is")
 
     @model_validator(mode="after")

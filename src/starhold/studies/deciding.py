@@ -79,7 +79,8 @@ def check_proofs(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]
     tables = tables_of(scenario, "proof")
     check_modes(scenario, entry, tables)
     for key, table in tables.items():
-        times_of(scenario, key, table, scenario.table.simulation.duration)
+        # A proof is about all times, however long the flight is.
+        times_of(scenario, key, table)
     return at_most(scenario, tables, {metric: unit for metric, (unit, _, _) in BOUNDS.items()})
 
 
@@ -117,7 +118,7 @@ def _proved(
     if modes and table.in_mode is None:
         return undecided(table, f"claims are about each mode by itself: in_mode = {modes[0]}", **limits(table, required))
     place = modes.index(str(table.in_mode)) + 1 if modes else None
-    why, found = f"no claim {kind} is proved", list[RequirementVerdict]()
+    why, verdicts = f"no claim {kind} is proved", list[RequirementVerdict]()
     for one in (one for one in issued if one.mode == place):
         claim = one.certificate.claim(kind)
         if claim is None or claim.outcome != "proved":
@@ -135,8 +136,8 @@ def _proved(
         most = max((x for x in number if x is not None), default=None) if isinstance(number, list) else number
         evidence = f"proved: {sentence(claim, one.certificate.subject)}"
         verdict = compared(table, required, most, evidence, left_out=tuple(absent))
-        found.append(verdict if verdict.verdict == "met" else _open(table, required, verdict))
-    return min(found, key=lambda one: (one.verdict != "met", len(one.left_out)), default=None) or undecided(
+        verdicts.append(verdict if verdict.verdict == "met" else _open(table, required, verdict))
+    return min(verdicts, key=lambda one: (one.verdict != "met", len(one.left_out)), default=None) or undecided(
         table, why, **limits(table, required)
     )
 
@@ -177,10 +178,10 @@ def by_margins(scenario: Scenario, entry: LawEntry) -> Verdicts:
         linear = linear_of(scenario, entry)
     except InputError as error:
         return {key: undecided(table, error.given, **limits(table, one)) for (key, table), one in pairs}
-    found = margins(linear) if linear.is_stable else []
+    axes = margins(linear) if linear.is_stable else []
     verdicts: Verdicts = {}
     for (key, table), one in pairs:
-        values = [(getattr(axis, MARGINS[one.metric]), axis.axis) for axis in found]
+        values = [(getattr(axis, MARGINS[one.metric]), axis.axis) for axis in axes]
         values = [pair for pair in values if not math.isnan(pair[0])]
         number, axis = (max if one.at_most else min)(values, default=(None, ""))
         evidence = f"the linear loop near rest, about {axis}" if values else "the linear loop is not stable"

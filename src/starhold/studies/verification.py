@@ -70,7 +70,7 @@ class RequirementVerdict:
 
 def undecided(table: RequirementTable, why: str, **known: Any) -> RequirementVerdict:
     """The verdict that nothing decides a requirement, with the reason."""
-    return told(table, "not decided", why, **known)
+    return verdict_on(table, "not decided", why, **known)
 
 
 def limits(table: RequirementTable, required: Requirement) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def limits(table: RequirementTable, required: Requirement) -> dict[str, Any]:
     return fields
 
 
-def told(table: RequirementTable, verdict: Outcome, evidence: str, **known: Any) -> RequirementVerdict:
+def verdict_on(table: RequirementTable, verdict: Outcome, evidence: str, **known: Any) -> RequirementVerdict:
     """The verdict on the requirement of a table; known: number, limit, unit and others of its fields."""
     stated = {"metric": table.metric or "", "parent": table.parent or "", "rationale": table.rationale}
     fields: dict[str, Any] = stated | known
@@ -95,15 +95,15 @@ def compared(
 ) -> RequirementVerdict:
     """The verdict of a number, which misses the limit where it is None or not a number."""
     there = None if number is None or math.isnan(number) else float(number)
-    found = told(table, "missed", evidence, number=there, **limits(table, required) | known)
-    return replace(found, verdict="met") if found.margin is not None and found.margin >= 0.0 else found
+    decided = verdict_on(table, "missed", evidence, number=there, **limits(table, required) | known)
+    return replace(decided, verdict="met") if decided.margin is not None and decided.margin >= 0.0 else decided
 
 
-def in_order(scenario: Scenario, found: Mapping[str, RequirementVerdict]) -> tuple[RequirementVerdict, ...]:
-    """The verdicts in the order of the file: those found, by what errors call the tables, and those without a method, which
-    are as the worst of those derived from them."""
+def in_order(scenario: Scenario, decided: Mapping[str, RequirementVerdict]) -> tuple[RequirementVerdict, ...]:
+    """The verdicts in the order of the file: those decided, by what errors call the tables, and those without a method,
+    which are as the worst of those derived from them."""
     tables = {f"requirement[{place}]": table for place, table in enumerate(scenario.table.requirement, 1)}
-    by_id = {tables[key].called: verdict for key, verdict in found.items()}
+    by_id = {tables[key].called: verdict for key, verdict in decided.items()}
 
     def of(table: RequirementTable) -> RequirementVerdict:
         if table.called not in by_id:
@@ -111,7 +111,7 @@ def in_order(scenario: Scenario, found: Mapping[str, RequirementVerdict]) -> tup
             verdict = WORST[max(WORST.index(one.verdict) for one in below)]
             named = ", ".join(f"{one.id} {one.verdict}" for one in below)
             left = tuple(dict.fromkeys(what for one in below for what in one.left_out))
-            by_id[table.called] = told(table, verdict, f"derived from it: {named}", left_out=left)
+            by_id[table.called] = verdict_on(table, verdict, f"derived from it: {named}", left_out=left)
         return by_id[table.called]
 
     return tuple(of(table) for table in tables.values())
@@ -121,9 +121,9 @@ def verdicts_of_flight(scenario: Scenario, flight: Flight) -> tuple[RequirementV
     """The verdicts on a scenario's requirements that a flight of one of its laws gives, and records of inspections: nothing
     is flown or proved, and what needs other methods is left to `starhold verify`. InputError as `check_flight` has it."""
     entry = scenario.pick(flight.name)
-    found = by_flight(scenario, entry, flight.recording) | by_inspection(scenario)
+    decided = by_flight(scenario, entry, flight.recording) | by_inspection(scenario)
     others = {key: table for method in DEARER for key, table in tables_of(scenario, method).items()}
-    return in_order(scenario, found | {key: undecided(table, ELSEWHERE) for key, table in others.items()})
+    return in_order(scenario, decided | {key: undecided(table, ELSEWHERE) for key, table in others.items()})
 
 
 # --- by inspection ----------------------------------------------------------------------------------------------------
@@ -142,7 +142,7 @@ def _inspected(scenario: Scenario, table: RequirementTable) -> RequirementVerdic
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except (OSError, ValueError):
         return undecided(table, f"its record {table.record} is not there")
-    return told(table, "met", f"as by record {table.record}, SHA-256 {digest}")
+    return verdict_on(table, "met", f"as by record {table.record}, SHA-256 {digest}")
 
 
 # --- by one flight ----------------------------------------------------------------------------------------------------
@@ -221,15 +221,15 @@ def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, 
         return {}
     study, cones = study_of(scenario.body), cones_of(tables.values())
     measured: dict[Any, list[dict[str, Any]]] = {}
-    found: dict[str, RequirementVerdict] = {}
+    decided: dict[str, RequirementVerdict] = {}
     modes = mode_names(entry)
     for (key, table), required in zip(tables.items(), check_flight(scenario, entry), strict=True):
         about = times_of(scenario, key, table), modes.index(table.in_mode) + 1 if table.in_mode else None
         if about not in measured:
             measured[about] = [study.measure_required(part, cones) for part in _parts(run, *about)]
         flight = f"one flight of {entry.name}{f', in its mode {table.in_mode}' if table.in_mode else ''}{about[0]}"
-        found[key] = _flown(table, required, measured[about], run.attrs.get("diverged_at"), flight)
-    return found
+        decided[key] = _flown(table, required, measured[about], run.attrs.get("diverged_at"), flight)
+    return decided
 
 
 def _flown(
@@ -237,7 +237,7 @@ def _flown(
 ) -> RequirementVerdict:
     if required.metric == LOST:
         verdict = "met" if lost is None else "missed"
-        return told(table, verdict, flight if lost is None else f"{flight}, which is lost")
+        return verdict_on(table, verdict, flight if lost is None else f"{flight}, which is lost")
     if not parts and lost is None:
         return undecided(table, f"{flight}: it has no such time", **limits(table, required))
     values: list[Any] = [part.get(required.column) for part in parts]
@@ -254,7 +254,7 @@ def _parts(run: Recording, times: Times, mode: int | None) -> list[Recording]:
     spans = [(0, None)]
     if mode is not None:
         spans = [(one.first, one.last) for one in stretches(run) if one.mode == mode]
-    found: list[Recording] = []
+    parts: list[Recording] = []
     for first, last in spans:
         since = (time - first * period) * clock
         inside = (since >= times.begin * (1.0 - 1e-12)) & (since <= times.end * (1.0 + 1e-12))
@@ -262,5 +262,5 @@ def _parts(run: Recording, times: Times, mode: int | None) -> list[Recording]:
         inside[len(time) if last is None else -(-last // every) :] = False
         if np.count_nonzero(inside) > 1:
             sampled = {name: values[inside] if len(values) == len(time) else values for name, values in run.arrays.items()}
-            found.append(replace(run, arrays=sampled))
-    return found
+            parts.append(replace(run, arrays=sampled))
+    return parts

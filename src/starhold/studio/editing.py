@@ -12,7 +12,7 @@ from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import builtin_names, parse
 
-TABLES = (".csv", ".aem")
+TABLES = (".csv", ".aem", ".reqif")
 """How files of numbers end; others that a scenario names are Python."""
 
 _HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")

@@ -78,15 +78,15 @@ Block: TypeAlias = Table | Heading | str
 class Result(NamedTuple):
     """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
     and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; texts, by the names of their files, are written as they are; certificate writes one. outcome: whether all
-    that is required is met, or proved."""
+    summary.json; xml is the text of NAME.xml; certificate writes one. outcome: whether all that is required is met, or
+    proved."""
 
     title: str
     blocks: Sequence[Block]
     numbers: Table | None = None
     figure: Callable[[], Any] | None = None
     summary: Mapping[str, Any] | None = None
-    texts: Mapping[str, str] = {}
+    xml: str | None = None
     certificate: Callable[[Path], None] | None = None
     outcome: Literal["met", "missed", "undecided"] = "met"
 

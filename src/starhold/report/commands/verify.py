@@ -22,22 +22,21 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
     rows: list[list[Any]] = []
     for one in verdicts:
         style = STYLES[one.verdict]
-        told = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
+        shown = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
         side = "≤ " if one.at_most else "≥ "
-        limit = shown(one, one.limit)
+        limit = amount(one, one.limit)
         rows.append(
-            [escape(one.id), shown(one, one.number), limit and side + limit, shown(one, one.margin), one.method, told]
+            [escape(one.id), amount(one, one.number), limit and side + limit, amount(one, one.margin), one.method, shown]
         )
     blocks: list[Block] = ["", Table([*head, Column("method"), Column("verdict")], rows), ""]
     blocks += [f"{one.id}: {one.evidence}." for one in verdicts if one.verdict != "met"]
     outcomes = {one.verdict for one in verdicts}
     outcome = "missed" if "missed" in outcomes else "undecided" if "not decided" in outcomes else "met"
     title = f"{scenario.name}, {entry.name}: what is required"
-    texts = {"junit.xml": junit(title, entry.name, verdicts)}
-    return Result(title, blocks, _matrix(verdicts), texts=texts, outcome=outcome)
+    return Result(title, blocks, _matrix(verdicts), xml=junit(title, entry.name, verdicts), outcome=outcome)
 
 
-def shown(one: RequirementVerdict, value: float | None) -> str | None:
+def amount(one: RequirementVerdict, value: float | None) -> str | None:
     """A number in the unit that the limit is typed in, rounded for reading."""
     if value is None:
         return None
@@ -67,7 +66,7 @@ def junit(title: str, law: str, verdicts: Sequence[RequirementVerdict]) -> str:
     for one in verdicts:
         case = Tree.SubElement(suite, "testcase", {"classname": law, "name": one.id})
         if one.verdict in JUNIT:
-            number, limit = (shown(one, value) or "none" for value in (one.number, one.limit))
+            number, limit = (amount(one, value) or "none" for value in (one.number, one.limit))
             message = f"{one.verdict}: {number}, limit {limit}"
             Tree.SubElement(case, JUNIT[one.verdict], {"message": message, "type": one.method or "derived"})
         Tree.SubElement(case, "system-out").text = f"{one.text}\n{one.sentence}\n{one.evidence}".strip()
@@ -79,7 +78,7 @@ JUNIT = {"missed": "failure", "not decided": "error"}
 """How JUnit calls verdicts; a requirement that is met passed."""
 
 COMMAND = Command(
-    "Tell which requirements of a file are met, each by its own method: a table, verify.csv and junit.xml.",
+    "Tell which requirements of a file are met, each by its own method: a table, verify.csv, and verify.xml for JUnit.",
     "verify",
     later("campaign.verify.study"),
     present,
