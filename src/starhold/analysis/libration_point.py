@@ -1,10 +1,9 @@
 """Metrics of a craft that holds a place or a circle near a libration point, all in SI units."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,7 @@ from starhold.algebra.vector import ZERO, Vector, dot, subtract
 from starhold.analysis.meter import INSTANT, LAST, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.parts.bodies.libration_point import Units
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from starhold.simulation.lane import Recording
+from starhold.simulation.lane import Recording
 
 DAY, YEAR = 86_400.0, 365.25 * 86_400.0
 """Seconds."""

@@ -4,14 +4,12 @@ The same notes are taken inside a kernel, of many flights at once without keepin
 are the instants. A row of a table says how a metric is made of the notes; the report's page reads that table too.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +21,8 @@ from starhold.algebra.vector import dot, most
 from starhold.algebra.words import number_of
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step, over_samples
+from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
-
-if TYPE_CHECKING:
-    from starhold.simulation.lane import Recording
-
 
 LAST = 0.25
 """Share of the run over which chatter and the final error are measured."""
