@@ -119,10 +119,17 @@ def make_meter(
         "x": Window(rows.window_x, lambda x: x * length, "distance from the plane of the circle or rest", "m"),
         "control": Window(rows.window_control, lambda x: np.sqrt(x) * push, "norm of the control", "m/s^2"),
     }
+    of_place = {"final_distance": Metric("m", "root", (rows.window_away,), (length,), since="tail", final=True)}
+    of_circle = {
+        "deviation": Metric("m", "number", (rows.window_off,), (length,), since="half", final=True),
+        "deviation_overall": Metric("m", "number", (rows.window_off,), (length,), since="start", final=True),
+        "radius_least": Metric("m", "number", (rows.radius_least,), (length,), final=True),
+        "radius_most": Metric("m", "number", (rows.radius_most,), (length,), final=True),
+    }
     table = {
         # A quarter, for these motions go to and fro slowly.
         "settling_time": Metric("s", INSTANT, (rows.outside,), (period * units.time,), kept=LAST),
-        **(_of_circle(rows, length) if circle else _of_place(rows, length)),
+        **(of_circle if circle else of_place),
         "largest_x": Metric("m", "number", (rows.window_x,), (length,), since="half", final=True),
         "limit_share": Metric("1", "number", (rows.limited,), over=("samples", 1.0)),
         "peak_control": Metric("m/s^2", "root", (rows.window_control,), (push,), since="start"),
@@ -135,19 +142,6 @@ def make_meter(
     marks = (half,) if circle else (half, tail)
     early, late = (_note(limit, circle, since) for since in (False, True))
     return Meter(first, given, (early, late), table, windows, steps, period * units.time, marks)
-
-
-def _of_circle(rows: Any, length: float) -> dict[str, Metric]:
-    return {
-        "deviation": Metric("m", "number", (rows.window_off,), (length,), since="half", final=True),
-        "deviation_overall": Metric("m", "number", (rows.window_off,), (length,), since="start", final=True),
-        "radius_least": Metric("m", "number", (rows.radius_least,), (length,), final=True),
-        "radius_most": Metric("m", "number", (rows.radius_most,), (length,), final=True),
-    }
-
-
-def _of_place(rows: Any, length: float) -> dict[str, Metric]:
-    return {"final_distance": Metric("m", "root", (rows.window_away,), (length,), since="tail", final=True)}
 
 
 def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float) -> dict[str, Any]:

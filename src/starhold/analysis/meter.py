@@ -208,7 +208,9 @@ class Meter:
 
     def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
         """Return the notes of a recording, (numbers, 1), and of its windows, (windows, quantities, 1)."""
-        sampled = {name: values for name, values in run.arrays.items() if name != "time" and _is_sampled(values, run)}
+        # Numbers of each sample, for users may add anything to a Dataset.
+        numbers = {name: values for name, values in run.arrays.items() if values.dtype.kind in "fiu" and name != "time"}
+        sampled = {name: x for name, x in numbers.items() if x.ndim in (1, 2) and len(x) == len(run["time"])}
         columns = tuple((name, values.shape[1:]) for name, values in sampled.items())
         kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
         shared = Arguments(self.numbers, limit).shared
@@ -226,11 +228,6 @@ class Meter:
             by_window[window] = noted[rows]
             noted[rows] = 0.0
         return noted, by_window
-
-
-def _is_sampled(values: Any, run: Recording) -> bool:
-    """Tell whether values are numbers of each sample: users may add anything to a Dataset."""
-    return values.dtype.kind in "fiu" and values.ndim in (1, 2) and len(values) == len(run["time"])
 
 
 _KERNELS: dict[Any, Kernel] = {}
