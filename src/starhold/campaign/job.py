@@ -19,7 +19,7 @@ from starhold.campaign.dispersions import Dispersion, read_dispersions
 from starhold.campaign.lanes import Lanes, Lot
 from starhold.campaign.requirements import Requirement, cones_of, extras_of, read_requirements
 from starhold.campaign.sampling import Plan
-from starhold.errors import InputError
+from starhold.errors import input_at
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
@@ -97,11 +97,9 @@ class Job:
         """The meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
         required = self.table.requirement
         extras, cones = extras_of(required, self.table.metrics), cones_of(required)
-        try:
+        key = "campaign.requirement" if cones else "campaign.metrics"
+        with input_at(self.source.where, key):
             return study_of(self.scenario.body).meter(self.scenario, loop, gains, extras, cones)
-        except ValueError as error:
-            key = "campaign.requirement" if cones else "campaign.metrics"
-            raise InputError(self.source.where, key, "", str(error)) from None
 
     def requirements(self, law: str) -> tuple[Requirement, ...]:
         """The requirements that runs of a law must keep."""
