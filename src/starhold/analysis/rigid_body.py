@@ -1,13 +1,11 @@
 """Metrics of a body that turns, all in SI units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +17,7 @@ from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
-
-if TYPE_CHECKING:
-    from starhold.simulation.lane import Recording
+from starhold.simulation.lane import Recording
 
 DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""

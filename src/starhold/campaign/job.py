@@ -18,7 +18,7 @@ from starhold.campaign.chunk import LEAST, MOST, Chunk
 from starhold.campaign.dispersions import Dispersion, read_dispersions
 from starhold.campaign.lanes import Lanes, Lot
 from starhold.campaign.sampling import Plan
-from starhold.errors import InputError
+from starhold.errors import input_at
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
@@ -103,11 +103,9 @@ class Job:
         """The meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
         required = self.required.values()
         extras, cones = extras_of(required, self.table.metrics), cones_of(required)
-        try:
+        key = "requirement" if cones else "campaign.metrics"
+        with input_at(self.source.where, key):
             return study_of(self.scenario.body).meter(self.scenario, loop, gains, extras, cones)
-        except ValueError as error:
-            key = "requirement" if cones else "campaign.metrics"
-            raise InputError(self.source.where, key, "", str(error)) from None
 
     def requirements(self, law: str) -> tuple[Requirement, ...]:
         """The requirements that runs of a law must keep."""

@@ -296,19 +296,18 @@ def write_index(made: Sequence[Reproduction], folder: Path) -> Path:
     summary = {
         "starhold_version": __version__,
         "changed": [f"{one.paper.letter}/{judged.row.name}" for one in made for judged in one.changed],
-        "papers": {one.paper.letter: _summary(one) for one in made},
+        "papers": {
+            one.paper.letter: {
+                "title": one.paper.title,
+                "figures": [item.model_dump(include={"name", "number", "caption"}) for item in one.paper.figures],
+                "rows": [judged.summary() for judged in one.rows.values()],
+            }
+            for one in made
+        },
     }
     _write(folder / INDEX, index_page(made))
     _write(folder / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=True) + "\n")
     return folder / INDEX
-
-
-def _summary(made: Reproduction) -> dict[str, Any]:
-    return {
-        "title": made.paper.title,
-        "figures": [{"name": item.name, "number": item.number, "caption": item.caption} for item in made.paper.figures],
-        "rows": [judged.summary() for judged in made.rows.values()],
-    }
 
 
 def _write(path: Path, text: str) -> None:

@@ -196,7 +196,11 @@ def study(
         kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
         moved = errors if kind != "source" else tuple(_less(a, b) for a, b in zip(errors, still, strict=True))
         rows.append(Contribution(name, kind, _figures(clock, *moved)))
-    rows.insert(-1, Contribution(COMBINED, "combined", _combined(rows[:-1])))
+    combined = {
+        index: {axis: root_sum_square([row.figures[index][axis] for row in rows[:-1]]) for axis in axes}
+        for index, axes in rows[0].figures.items()
+    }
+    rows.insert(-1, Contribution(COMBINED, "combined", combined))
     return Budget(scenario.name, entry.name, clock.settings, tuple(rows), required)
 
 
@@ -378,12 +382,4 @@ def _figures(clock: _Clock, errors: Array | None, knowledge: Array | None) -> di
             for axis, values in about_axes(samples, settings.boresight).items()
         }
         for index, samples in vectors.items()
-    }
-
-
-def _combined(rows: list[Contribution]) -> dict[str, dict[str, Figures]]:
-    """The root sum square of rows."""
-    return {
-        index: {axis: root_sum_square([row.figures[index][axis] for row in rows]) for axis in axes}
-        for index, axes in rows[0].figures.items()
     }

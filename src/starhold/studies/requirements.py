@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.rigid_body import EXTRAS, Cone
-from starhold.errors import InputError
+from starhold.errors import InputError, input_at
 from starhold.scenario.checking import nearest, show
 from starhold.scenario.requirement import CONE, RequirementTable
 from starhold.scenario.units import shown, to_number
@@ -118,10 +118,8 @@ def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
     if not isinstance(value, str | Real):
         allowed = f"one number, in {shown(unit)} or with its unit"
         raise InputError(where, f"{key}.{side}", show(value), allowed)
-    try:
+    with input_at(where, f"{key}.{side}", show(value)):
         return to_number(value, unit) if isinstance(value, str) else float(value)
-    except ValueError as error:
-        raise InputError(where, f"{key}.{side}", show(value), str(error)) from None
 
 
 def _unit(vector: Any) -> Any:
