@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from starhold.algebra.scalar import side
 from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_back, shown_at, start_inside, value_of
 from starhold.certification.assumptions import ASSUMPTIONS, WITHOUT, assumption
-from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
+from starhold.certification.certificate import BESIDE, Certificate, write
 from starhold.certification.certify import certify
 from starhold.certification.evidence.isotropic import Shape
 from starhold.certification.proofs import IN_THE_LOOP
@@ -26,7 +26,6 @@ from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import Recording, fly, label
-from starhold.studies.certificates import certify_scenario
 from starhold.studies.compare import fly_law, prove
 from tests.making import built
 from tests.missions import BASE as MISSION
@@ -180,36 +179,6 @@ def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
     assert "not even the linear loop is stable" in left["region"][0].how
 
 
-ROTOR = "[[wheel]]\naxis = {}\ninertia = 1e-5\ntorque_limit = 1.0\nmomentum_limit = 5.0\nmomentum = {}\n"
-
-
-WHIRLING = """
-name = "whirling"
-[spacecraft]
-inertia = [0.05, 0.05, 0.05]
-[initial]
-angles = ["3 deg", "2 deg", 0]
-[simulation]
-duration = 300
-control_period = 1.0
-substeps = 100
-[[law]]
-type = "wheel"
-k_rate = 0.004
-k_attitude = [5e-5, 5e-5, 5e-5]
-"""
-
-
-def test_momentum_that_turns_a_held_torque_leaves_every_claim_of_torque_applied_continuously():
-    """What is proved of held torque is proved without stored momentum; with it this one drives the body away."""
-    rotors = [ROTOR.format(axis, momentum) for axis, momentum in (("[1, 0, 0]", 0), ("[0, 1, 0]", 0), ("[0, 0, 1]", 0.3))]
-    flight = proved_flight(WHIRLING + "".join(rotors))
-    assert {claim.outcome for claim in flight.certificates[0].claims} == {"proved"}
-    assert all(left[0] == (0.0, TURNED.format(1.0)) for left in flight.departures[0].values())
-    angle = 2.0 * np.arcsin(np.linalg.norm(flight.recording["attitude_error"][:, 1:], axis=1))
-    assert angle[-1] > 4.0 * angle[0]
-
-
 def test_turning_leaves_claims_sooner_the_nearer_the_period_is_to_the_longest():
     slow = {"[2.0, 3.0, 4.0]": "[1.0, 1.0, 1.0]", "control_period = 0.1": "control_period = 1.0\nsubsteps = 40"}
     text = quiet(BASE, **slow).replace("rate = [0, 0, 0]", "rate = [0, 0, 0.5]").replace('torque_limit = "0.01 N m"', "")
@@ -294,17 +263,6 @@ def test_a_law_that_switches_at_rest_leaves_its_claim_where_its_torque_is_held()
     assert calm.departures[0]["sliding"] == ()
 
 
-def test_a_hand_over_is_left_where_the_next_mode_holds_its_torque_for_too_long():
-    text = MISSION.replace("control_period = 0.1", "control_period = 5.0") + DETUMBLE.replace("0.02", "0.005")
-    text = text.replace('rate_below = "0.5 deg/s", dwell = "2 s"', 'after = "10 s"')
-    text += POINT.replace('"pid"', '"pd"').partition("k_integral")[0].replace("0.006", "0.03")
-    flight = proved_flight(text.replace('quaternion_sign = "shortest"\n', ""))
-    handed = flight.certificates[2]
-    assert {c.kind: c.outcome for c in handed.claims} == {"hand-over": "proved", "sampling": "refuted"}
-    held = "the torque is held for 5 s, with which not even the linear loop is stable"
-    assert flight.left(2, "hand-over")[0] == (10.0, held)
-
-
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=60), st.floats(0.05, 0.9))
 @settings(max_examples=fewer(60))
 def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
@@ -386,15 +344,3 @@ def test_the_linear_loop_alone_proves_no_certificate(tmp_path):
     assert passed(check_file(path))
     path.write_text(path.read_text().replace('"outcome": "undecided"', '"outcome": "proved"', 1))
     assert "does not follow" in " ".join(finding.reason for finding in check_file(path) if finding.verdict == "fails")
-
-
-def test_noisy_sensors_do_not_keep_a_start_from_being_judged():
-    text = BASE + "\n[sensor]\nrate_noise = 1e-5\n" + LAW
-    (tried,) = certify_scenario(parse(text, "here"))
-    assert tried.start_inside["torque-limit"] is False
-
-
-def test_a_claim_that_is_not_proved_is_left_by_nothing():
-    loop, _, flight, _ = flown(BASE + LAW)
-    open_claim = Claim("convergence", {}, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "none"}),))
-    assert departures(Certificate("x", {}, (open_claim,)), loop, flight.recording) == {}

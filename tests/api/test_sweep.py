@@ -34,7 +34,7 @@ SWEPT = {
         {"spacecraft.limit": ["axis", "norm", "none"], "spacecraft.torque_limit": [0.01, 0.02]},
         None,
     ),
-    "whole numbers": (THREE, {"law.mpc.horizon": [5, 10], "law.mpc.r": [20, 50, 60, 70]}, None),
+    "whole numbers": (THREE, {"law.mpc.horizon": [5, 10]}, None),
     "periods": (THREE, {"simulation.control_period": [0.05, 0.1, 0.2, 0.1, 0.1, 0.1, 0.1]}, "sliding"),
     "noise and seeds": (
         THREE,

@@ -88,15 +88,6 @@ def test_sentences_name_what_they_assume():
     assert "0.01 N m about any axis" in check(text(contents("three-laws", "lyapunov", 1)))[0].statement.text
 
 
-def test_bundle_has_the_same_bytes_each_time_and_imports_nothing_installed(bundle, tmp_path):
-    assert bundle.read_bytes() == kernel_bundle()
-    done = subprocess.run([sys.executable, "-I", "-S", bundle, tmp_path / "none.json"], capture_output=True, text=True)
-    assert done.returncode == 1
-    assert done.stdout.startswith("refused: ")
-    assert len(done.stdout.splitlines()) == 1
-    assert done.stderr == ""
-
-
 def test_refusal_is_one_line(capsys, tmp_path):
     path = tmp_path / "c.json"
     for broken in ("", "[", "{}", "[" * 100_000, '{"a": 1, "a": 2}', "\x00", json.dumps({"format": "other"}), "1" * 50):

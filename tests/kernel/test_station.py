@@ -11,7 +11,7 @@ from starhold.kernel.check import check
 from starhold.kernel.numbers import RefusedError
 from tests.kernel.certificates import rekeyed, text
 from tests.kernel.mutations import refusals
-from tests.kernel.stations import BEST, PLANT, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
+from tests.kernel.stations import BEST, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
 from tests.tiers import WHOLE
 
 ROUND = {"level": 0.49999952, "outer": 1.4142133, "velocity": 0.9999995}
@@ -25,7 +25,7 @@ CIRCLES = [
     ("l2-deficit", "deficit 5"),
     ("l2-nonlinear", "full model"),
 ]
-PEAK, STEEP = 3.4295901709068626, 1.0 + 2.0 * PLANT.stiffness
+PEAK = 3.4295901709068626
 RELAY = SOFT._replace(boundary_layer=0.0)
 MADE = {
     "circle": lambda: flown("l2-circle", "smooth"),
