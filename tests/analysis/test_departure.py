@@ -33,6 +33,7 @@ from tests.missions import DETUMBLE, POINT
 from tests.tiers import fewer
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
+ROTOR = "[[wheel]]\naxis = {}\ninertia = 1e-5\ntorque_limit = 1.0\nmomentum_limit = 5.0\nmomentum = {}\n"
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
 
 
@@ -148,6 +149,11 @@ def test_a_flight_that_is_driven_out_of_its_set_is_told_when():
     assert departures(certificate, loop, struck)["convergence"] == ()
 
 
+def test_noisy_sensors_do_not_keep_a_start_from_being_judged():
+    loop = built(parse(BASE + "\n[sensor]\nrate_noise = 1e-5\n" + LAW, "here"))
+    assert start_inside(certify(loop, "lyapunov"), loop)["torque-limit"] is False
+
+
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.tuples(*[st.floats(-0.06, 0.06)] * 3))
 @settings(max_examples=fewer(30))
 def test_the_limit_is_kept_by_every_flight_that_does_not_leave_the_claim(turn, rate):
@@ -177,6 +183,33 @@ def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
     assert list(left) == ["region"]
     assert left["region"][0].time == 0.0
     assert "not even the linear loop is stable" in left["region"][0].how
+
+
+WHIRLING = """
+name = "whirling"
+[spacecraft]
+inertia = [0.05, 0.05, 0.05]
+[initial]
+angles = ["3 deg", "2 deg", 0]
+[simulation]
+duration = 300
+control_period = 1.0
+substeps = 100
+[[law]]
+type = "wheel"
+k_rate = 0.004
+k_attitude = [5e-5, 5e-5, 5e-5]
+"""
+
+
+def test_momentum_that_turns_a_held_torque_leaves_every_claim_of_torque_applied_continuously():
+    """What is proved of held torque is proved without stored momentum; with it this one drives the body away."""
+    rotors = [ROTOR.format(axis, momentum) for axis, momentum in (("[1, 0, 0]", 0), ("[0, 1, 0]", 0), ("[0, 0, 1]", 0.3))]
+    flight = proved_flight(WHIRLING + "".join(rotors))
+    assert {claim.outcome for claim in flight.certificates[0].claims} == {"proved"}
+    assert all(left[0] == (0.0, TURNED.format(1.0)) for left in flight.departures[0].values())
+    angle = 2.0 * np.arcsin(np.linalg.norm(flight.recording["attitude_error"][:, 1:], axis=1))
+    assert angle[-1] > 4.0 * angle[0]
 
 
 def test_turning_leaves_claims_sooner_the_nearer_the_period_is_to_the_longest():
@@ -261,6 +294,17 @@ def test_a_law_that_switches_at_rest_leaves_its_claim_where_its_torque_is_held()
     calm = proved_flight(text + law.format(0.05))
     assert calm.certificates[0].claim("sampling").outcome == "proved"
     assert calm.departures[0]["sliding"] == ()
+
+
+def test_a_hand_over_is_left_where_the_next_mode_holds_its_torque_for_too_long():
+    text = MISSION.replace("control_period = 0.1", "control_period = 5.0") + DETUMBLE.replace("0.02", "0.005")
+    text = text.replace('rate_below = "0.5 deg/s", dwell = "2 s"', 'after = "10 s"')
+    text += POINT.replace('"pid"', '"pd"').partition("k_integral")[0].replace("0.006", "0.03")
+    flight = proved_flight(text.replace('quaternion_sign = "shortest"\n', ""))
+    handed = flight.certificates[2]
+    assert {c.kind: c.outcome for c in handed.claims} == {"hand-over": "proved", "sampling": "refuted"}
+    held = "the torque is held for 5 s, with which not even the linear loop is stable"
+    assert flight.left(2, "hand-over")[0] == (10.0, held)
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=60), st.floats(0.05, 0.9))

@@ -1,4 +1,4 @@
-"""Indices of Ishigami's function against published ones, and what holes in a design do."""
+"""Indices of known functions against SALib, how often their intervals hold the truth, and what holes in a design do."""
 
 import numpy as np
 import pytest

@@ -20,6 +20,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.bodies.rigid_body import angular_acceleration
 from starhold.parts.craft import make_craft, tensor
+from starhold.parts.effectors.layouts import three_orthogonal
 from starhold.parts.effectors.wheels import lose
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
@@ -27,7 +28,7 @@ from starhold.studies.bodies.rigid_body import certify_law
 from tests import making
 from tests.certification.loops import FULL, free, loop_of, rotors
 from tests.making import ORBITAL, aimed, on_wheels
-from tests.tiers import fewer
+from tests.tiers import fewer, leading
 
 EVEN = wheel.Gains(0.3, (0.015, 0.015, 0.015))
 UNEVEN = wheel.Gains(0.3, (0.01, 0.015, 0.025))
@@ -167,6 +168,54 @@ def test_a_loop_that_counts_on_a_lost_wheel_claims_nothing():
     claim = after.claim("wheels")
     assert claim.numbers["motors"][0] == 0.0
     assert claim.numbers["level"] < certify(loop).claim("wheels").numbers["level"]
+
+
+@pytest.mark.parametrize(
+    ("law", "limits", "binding"),
+    leading(
+        [
+            ("wheel", (0.02, 10.0), "motors"),
+            ("pd", (10.0, 0.3), "wheel_momentum"),
+            ("pd", (0.02, 10.0), "motors"),
+            ("wheel", (10.0, 0.3), "wheel_momentum"),
+        ],
+        2,
+    ),
+)
+def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
+    """An optimiser over the certified set finds nothing beyond the told numbers, and comes near what binds."""
+    gains = EVEN if law == "wheel" else pd.examples()[0]
+    loop = rotors(law, gains, torque_limit=limits[0], momentum_limit=limits[1], layout=three_orthogonal)
+    certificate = certify(loop, "", Wanted(momentum=0.05))
+    claim = certificate.claim("wheels")
+    assert claim.outcome == "proved"
+    n, J = claim.numbers, tensor(loop.craft.inertia)
+    random = np.random.default_rng(4)
+    wheels, s = loop.wheels, 4.0 * gains.k_attitude[0] if law == "wheel" else 2.0 * gains.k_attitude
+    shares = -np.array(wheels.least)
+    begun = np.array(loop.rotors)
+    kept = begun - shares @ (begun @ np.array(wheels.axes))
+    most = {"motors": np.zeros(3), "wheel_momentum": np.zeros(3)}
+    for _ in range(20_000):
+        t = random.uniform(0.0, min(n["level"], s if law == "wheel" else 2.0 * s))
+        q0 = math.sqrt(1.0 - t / s) if law == "wheel" else 1.0 - t / s
+        axis, direction, total = random.normal(size=(3, 3))
+        if random.uniform() < 0.5:
+            # About one axis, where sums of sizes are reached.
+            axis = direction = np.eye(3)[random.integers(3)]
+        turned = np.linalg.solve(np.linalg.cholesky(J).T, direction / np.linalg.norm(direction))
+        w = math.sqrt(2.0 * (n["level"] - t)) * turned
+        q = (q0, *(math.sqrt(1.0 - q0 * q0) * axis / np.linalg.norm(axis)))
+        stored = n["momentum"] * total / np.linalg.norm(total) - J @ w
+        measurement = Measurement(q, tuple(w), tuple(w), ZERO, ZERO, ZERO, ZERO, 0.1, tuple(stored))
+        u = np.array(loop.law.command(measurement, loop.gains, loop.craft, NoMemory())[0])
+        most["motors"] = np.maximum(most["motors"], np.abs(shares @ u))
+        most["wheel_momentum"] = np.maximum(most["wheel_momentum"], np.abs(kept + shares @ stored))
+    for name in most:
+        assert (most[name] <= np.array(n[name]) * (1.0 + 1e-9)).all()
+    assert most[binding].max() > 0.8 * max(n[binding])
+    assert max(n["motors"]) <= limits[0]
+    assert max(n["wheel_momentum"]) <= 0.99 * limits[1]
 
 
 def test_flights_keep_within_the_wheels_and_catch_what_does_not():

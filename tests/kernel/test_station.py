@@ -12,7 +12,7 @@ from starhold.kernel.numbers import RefusedError
 from tests.kernel.certificates import rekeyed, text
 from tests.kernel.mutations import refusals
 from tests.kernel.stations import BEST, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
-from tests.tiers import WHOLE
+from tests.tiers import WHOLE, leading
 
 ROUND = {"level": 0.49999952, "outer": 1.4142133, "velocity": 0.9999995}
 WITHIN = {
@@ -70,7 +70,7 @@ def test_proofs_hold_and_take_no_time(name):
     assert all(StationOracle(content, content["claims"][0], seed).holds() for seed in range(3))
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", leading(MADE, 6))
 def test_nothing_false_is_accepted(name):
     def true(content, claim):
         return StationOracle(content, claim).holds()

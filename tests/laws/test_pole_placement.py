@@ -179,6 +179,17 @@ def test_annihilators_and_units_do_not_matter() -> None:
     assert place(1e-200 * a, b, 1e-200 * poles).error < 1e-8
 
 
+def test_directions_of_choice() -> None:
+    random = np.random.default_rng(6)
+    a, b = chains(random, (3, 2, 1))
+    poles = spread(random, 6, 3)
+    usual = place(a, b, poles)
+    turned = place(a, b, poles, directions=lambda k, given: random.normal(size=(given.shape[1], (3, 2, 1)[k])))
+    assert any(map(np.iscomplexobj, turned.spectra))
+    assert max(usual.error, turned.error) < 1e-9
+    assert np.abs(usual.K - turned.K).max() > 1e-3
+
+
 @settings(max_examples=fewer(150))
 @given(st.data(), st.integers(1, 6), st.integers(1, 3))
 def test_controllable_as_in_rationals(data: st.DataObject, n: int, m: int) -> None:

@@ -1,5 +1,4 @@
-"""Flexible appendages against Lagrange's equations of hub and panels, written by SymPy and integrated by SciPy, and against
-Basilisk."""
+"""Flexible appendages: hinged panels against Basilisk, modes against their coupled equations, integrated by SciPy."""
 
 import numpy as np
 import pytest

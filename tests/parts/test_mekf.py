@@ -1,4 +1,4 @@
-"""The Kalman filter against the most likely motion given all readings at once, and its errors in 10 000 flights."""
+"""The Kalman filter against the most likely motion given all readings at once."""
 
 import math
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Drag, sunlight, and its shadow against Basilisk, an independent simulator in C++, and against sums by hand."""
+"""Drag and sunlight against Basilisk, an independent simulator in C++."""
 
 import numpy as np
 
