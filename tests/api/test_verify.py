@@ -117,15 +117,15 @@ def test_each_method_is_used_once_and_only_if_it_is_asked_for(monkeypatch):
         function = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, **more: used.append(name) or function(*given, **more))
 
-    for module, name in ((verify, "record"), (verify, "fly_campaign"), (deciding, "study"), (deciding, "linear_of")):
+    for module, name in ((verify, "fly_law"), (verify, "fly_campaign"), (budget, "study"), (verify, "linear_of")):
         counted(module, name)
     study = deciding.study_of("rigid-body")
     monkeypatch.setattr(type(study), "certify", lambda *given, **more: used.append("certify") or [])
     flown = [name for name in ("fly",) if counted(compare, name) is None]
     sh.verify(turn(*ALL, *(one | {"id": one["id"] + "-2"} for one in ALL)))
-    assert sorted(used) == sorted(["record", *flown, "fly_campaign", "study", "linear_of", "certify"])
+    assert sorted(used) == sorted(["fly_law", *flown, "fly_campaign", "study", "linear_of", "certify"])
     for method, names in {
-        "flight": ["record", "fly"],
+        "flight": ["fly_law", "fly"],
         "margin": ["linear_of"],
         "proof": ["certify"],
         "inspection": [],
@@ -246,7 +246,7 @@ def test_an_inspection_is_met_as_by_its_record(tmp_path):
     ],
 )
 def test_a_mistake_is_told_in_one_line_before_anything_is_flown(monkeypatch, required, line):
-    monkeypatch.setattr(verify, "record", None)
+    monkeypatch.setattr(verify, "fly_law", None)
     with refused(line):
         sh.verify(turn(*required))
 
