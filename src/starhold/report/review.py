@@ -6,7 +6,8 @@ import hashlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from starhold.certification.wording import (
     listed,
     methods,
     reasons,
-    shown,
+    sentence,
     statement,
     strongest,
     unclaimed,
@@ -58,8 +59,16 @@ class Open(str):
     """A sentence about what is left open."""
 
 
-def sections_of(review: Review) -> list[Section]:
-    """Make the sections of the document."""
+class Listed(Open):
+    """One that stands in the list alone, for its section says the same otherwise."""
+
+
+Points: TypeAlias = list[tuple[str, str]]
+"""What is left open, with the section that says so."""
+
+
+def sections_of(review: Review) -> tuple[list[Section], Points]:
+    """Make the sections of the document; and tell what it leaves open."""
     makers: dict[str, Callable[[Review], Iterator[Piece]]] = {
         MISSION: _mission,
         ASSUMPTIONS: _assumptions,
@@ -72,18 +81,14 @@ def sections_of(review: Review) -> list[Section]:
     fresh = (MISSION, REQUIREMENTS, POINTING, CERTIFICATES)
     sections = [Section(name, [*make(review)], name in fresh) for name, make in makers.items()]
     sections.append(Section(CREDIBILITY, [*_credibility(review)], True))
-    points = points_of(sections)
+    points = [(one.name, str(piece)) for one in sections for piece in one.pieces if isinstance(piece, Open)]
     rows = [[str(number), Cell(name, "section", detail=name), _safe(text)] for number, (name, text) in enumerate(points, 1)]
     columns = [Column("no."), Column("from"), Column("what is open")]
     sections.append(Section(OPEN, [Table(columns, rows) if rows else "No point is open."]))
     scenario = review.evidence.scenario
     sections.append(Section("Scenario", ["The text that all of this is computed from.", Listing(scenario.text)], True))
-    return [Section("Outcome", [*_outcome(review, len(points))]), *sections]
-
-
-def points_of(sections: Iterable[Section]) -> list[tuple[str, str]]:
-    """List what is left open, with the section that says so."""
-    return [(one.name, str(piece)) for one in sections for piece in one.pieces if isinstance(piece, Open)]
+    shown = [one._replace(pieces=[piece for piece in one.pieces if not isinstance(piece, Listed)]) for one in sections]
+    return [Section("Outcome", [*_outcome(review, len(points))]), *shown], points
 
 
 def _safe(text: str) -> str:
@@ -112,8 +117,7 @@ def _outcome(review: Review, points: int) -> Iterator[Piece]:
     limited = [one.id for one in judged if one.verdict == "met" and one.left_out]
     if limited:
         yield f"Met only without something that flies: {listed(limited)}."
-    if points:
-        yield _table("open points|", [[str(points), Cell(OPEN, "section", detail=OPEN)]])
+    yield f"{OPEN}: {points}, which have a section of their own." if points else "No point is open."
 
 
 # --- sections ---------------------------------------------------------------------------------------------------------
@@ -126,7 +130,7 @@ def _mission(review: Review) -> Iterator[Piece]:
     evidence = review.evidence
     scenario, entry, flight = evidence.scenario, evidence.entry, evidence.flight
     rows = [
-        ["scenario", f"{scenario.name} ({scenario.where})"],
+        ["scenario", f"{scenario.name} ({Path(scenario.where).name})"],
         ["law", f"{entry.name}: {entry.law.card.title}"],
         *([f"gain {name}", value_text(value, unit)] for name, (value, unit) in flight.gains.items()),
         ["body", evidence.loop.body.card.title],
@@ -172,20 +176,21 @@ def _requirements(review: Review) -> Iterator[Piece]:
         return
     matrix: list[list[Any]] = []
     rests: list[list[Any]] = []
+    derived = any(one.parent for one in review.verdicts)
     for one in review.verdicts:
         text = ": ".join(filter(None, (one.text, one.rationale)))
         place = PLACES[one.method]
         link = Cell(one.method or "what is derived", "section", detail=place)
-        matrix.append([one.id, one.parent, text, *numbers(one), link, Cell(one.verdict, one.verdict)])
+        matrix.append([one.id, *[one.parent] * derived, text, *numbers(one), link, Cell(one.verdict, one.verdict)])
         rests.append([one.id, f"{one.evidence}.", "; ".join(one.left_out) or "nothing"])
-    columns = [Column("requirement"), Column("parent"), Column("text"), *NUMBERS, Column("known by"), Column("verdict")]
-    yield Table(columns, _safe_rows(matrix))
-    yield _table("requirement|rests on|leaves out", rests, "Evidence")
+    columns = [Column("requirement"), *[Column("parent")] * derived, Column("text"), *NUMBERS]
+    yield Table([*columns, Column("known by"), Column("verdict")], _safe_rows(matrix))
+    yield _table("requirement|rests on|leaves out of the loop", rests, "Evidence")
     for one in review.verdicts:
         if one.verdict != "met":
-            yield Open(f"{one.id} is {one.verdict}: {one.evidence}.")
+            yield Listed(f"{one.id} is {one.verdict}: {one.evidence.removeprefix(f'{one.verdict}. ')}.")
         elif one.left_out:
-            yield Open(f"{one.id} is {one.sentence}.")
+            yield Listed(f"{one.id} is {one.sentence}.")
 
 
 def _pointing(review: Review) -> Iterator[Piece]:
@@ -237,15 +242,18 @@ def _momentum(review: Review) -> Iterator[Piece]:
         told = [limit, 100.0 * peak / limit, limit - peak] if math.isfinite(limit) else [None] * 3
         rows.append([str(number), begun, peak, *told])
     heads = [Column(name, "N m s", ".4g") for name in ("at the start", "largest flown", "limit")]
-    yield Table([Column("wheel"), *heads, Column("share", "%", ".1f"), Column("left", "N m s", ".4g")], rows, "Momentum budget")
+    yield Table(
+        [Column("wheel"), *heads, Column("share", "%", ".1f"), Column("left", "N m s", ".4g")],
+        rows,
+        "Momentum budget of the samples recorded",
+    )
     spreads = evidence.campaign.laws[0].spreads if review.has_campaign else ()
     worst = [one.quantiles[-1] for one in spreads if one.metric == "peak_wheel_momentum"]
     yield from (f"Over all runs of the campaign no wheel stores more than {most:.4g} N m s." for most in worst)
     for one in _issued(review):
         claim = one.claim("wheels")
-        bounds = [x for x in claim.numbers.get("wheel_momentum", ()) if x is not None] if claim else []
-        if claim is not None and claim.outcome == "proved" and bounds:
-            yield f"Proved of {one.name}: no wheel stores more than {shown(max(bounds), ' N m s', up=True)}; see {CERTIFICATES}."
+        if claim is not None and claim.outcome == "proved" and "momentum" in claim.numbers:
+            yield f"Proved of {one.name}: {sentence(claim, one.subject)}."
 
 
 def _margins(review: Review) -> Iterator[Piece]:
@@ -274,7 +282,9 @@ def _campaign(review: Review) -> Iterator[Piece]:
     from starhold.report.campaign_units import Wording, flown_text, headline
 
     if not review.has_campaign:
-        yield Open("No campaign was flown, so nothing is known of numbers other than the file's: it has no [campaign] table.")
+        yield Open(
+            "No campaign was flown, so nothing is known of numbers other than the file's: it has no [campaign] table."
+        )
         return
     result = review.evidence.campaign
     law, words = result.laws[0], Wording.of(review.evidence.scenario.body, result)
@@ -342,7 +352,9 @@ def _credibility(review: Review) -> Iterator[Piece]:
     yield "The factors are those of NASA-STD-7009. What is known here is told, and what is not is named; no level is assigned."
     rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in _factors(review).items()]
     yield _table("factor|known|not stated", rows)
-    yield from (Open(f"{name}: {blank}") for name, (_, blanks) in _factors(review).items() for blank in blanks)
+    yield from (
+        Listed(f"{name}: not stated: {_lower(blank)}") for name, (_, blanks) in _factors(review).items() for blank in blanks
+    )
 
 
 @cache
@@ -363,7 +375,9 @@ def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
     proved = sum(claim.outcome == "proved" for claim in claims)
     reasons_given = sum(bool(one.rationale) for one in review.verdicts)
     checked = [f"The kernel checked {proved} of {len(claims)} claims as proved."] if claims else []
-    models = f"{len(parts) - len(own)} of {len(parts)} models come with the release, whose tests hold them to their equations."
+    models = (
+        f"{len(parts) - len(own)} of {len(parts)} models come with the release, whose tests hold them to their equations."
+    )
     verification = [_release(), models, *checked]
     open_models = [f"Who verified the models in files of their own: {', '.join(own)}."] if own else []
     open_models.append("The error of the integration step: starhold run --check-step tells it.")
@@ -376,7 +390,9 @@ def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
         drawn = ", ".join(result.over) or "nothing but noise"
         uncertainty.append(f"{result.runs} runs, by {result.sampling} sampling, draw {drawn}.")
         causes = result.laws[0].drivers
-        robustness += [] if causes is None else [f"{causes.failures} of {causes.runs} runs fail, whose causes were looked for."]
+        robustness += (
+            [] if causes is None else [f"{causes.failures} of {causes.runs} runs fail, whose causes were looked for."]
+        )
     else:
         unknown.insert(0, "The spread of results: there is no [campaign].")
         frail.append("What makes requirements fail: there is no [campaign].")
@@ -386,7 +402,8 @@ def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
         robustness.append("Margins of gain, phase and delay of the linear loop.")
     elif scenario.body == ATTITUDE:
         frail.append("Margins of a linear loop.")
-    robustness += [f"{_name(claim)} is proved." for claim in claims if claim.kind == "inertia" and claim.outcome == "proved"]
+    if any(claim.kind == "inertia" and claim.outcome == "proved" for claim in claims):
+        robustness.append(f"Proved with {HEADINGS['inertia']}, see {CERTIFICATES}.")
     pedigree = ["All inputs stand in one text, whose digest is told; units are checked as it is read."]
     if review.verdicts:
         pedigree.append(f"{reasons_given} of {len(review.verdicts)} requirements give a rationale.")
@@ -410,5 +427,5 @@ def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
     }
 
 
-def _name(claim: Any) -> str:
-    return f"{HEADINGS[claim.kind][:1].upper()}{HEADINGS[claim.kind][1:]}"
+def _lower(text: str) -> str:
+    return f"{text[:1].lower()}{text[1:]}"

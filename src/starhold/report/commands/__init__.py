@@ -80,8 +80,8 @@ Block: TypeAlias = Table | Heading | str
 class Result(NamedTuple):
     """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
     and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; xml is the text of NAME.xml; certificate writes one; document is for NAME.html and NAME.md. outcome: whether all that is required is met, or
-    proved."""
+    summary.json; xml is the text of NAME.xml; certificate writes one; document is for NAME.html and NAME.md. outcome:
+    whether all that is required is met, or proved."""
 
     title: str
     blocks: Sequence[Block]
@@ -132,8 +132,8 @@ class Command(NamedTuple):
     with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
     whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
     command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
-    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. kinds: the endings of
-    the files NAME.* that may be written."""
+    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. kinds: how the
+    files NAME.* may end."""
 
     summary: str
     suffix: str

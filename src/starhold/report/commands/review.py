@@ -14,15 +14,19 @@ if TYPE_CHECKING:
 def present(scenario: Scenario, entry: LawEntry, review: Review) -> Result:
     """The verdicts, as `verify` shows them, the points that are open, and the document."""
     from starhold.report.commands import verify
-    from starhold.report.review import OPEN, points_of, sections_of
+    from starhold.report.review import OPEN, sections_of
 
     judged = verify.present(scenario, entry, review.verdicts)
     blocks: list[Block] = [*(judged.blocks[:2] if review.verdicts else []), ""]
-    sections = sections_of(review)
-    points = points_of(sections)
+    sections, points = sections_of(review)
     blocks.append(f"{OPEN}: {len(points)}." if points else "No point is open.")
     blocks += [f"{number}. {text}" for number, (_, text) in enumerate(points, 1)]
-    return Result(f"{scenario.name}, {entry.name}: review", blocks, document=sections, outcome=judged.outcome if review.verdicts else "undecided")
+    return Result(
+        f"{scenario.name}, {entry.name}: review",
+        blocks,
+        document=sections,
+        outcome=judged.outcome if review.verdicts else "undecided",
+    )
 
 
 COMMAND = Command(
