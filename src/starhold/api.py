@@ -349,10 +349,10 @@ def review(
     declared = command("review")
     subject = declared.prepare(reading.open_scenario(scenario), law)
     into = None if folder is None else open_folder(Path(folder), force)
-    found: Review = declared.study(*subject)
+    gathered: Review = declared.study(*subject)
     if into is not None:
-        write_result(declared.present(*subject, found), "review", subject[0].name, into)
-    return found
+        write_result(declared.present(*subject, gathered), "review", subject[0].name, into)
+    return gathered
 
 
 @shortly

@@ -55,7 +55,7 @@ OTHER_BODY = "it is known of attitudes alone"
 
 @dataclass(frozen=True)
 class Evidence:
-    """What can be known of a law of a scenario: each is computed when it is first asked for, and only then. A text stands in
+    """All evidence about a law of a scenario, each piece computed when it is first asked for, and only then. A text stands in
     place of what there is none of, and tells why."""
 
     scenario: Scenario

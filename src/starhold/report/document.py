@@ -30,7 +30,7 @@ Piece: TypeAlias = Block | Figure | Listing
 
 
 class Section(NamedTuple):
-    """A section under its name. fresh: it begins a page. A `Cell` of kind "section" leads to that whose name is its detail."""
+    """A section under its name. fresh: it begins a page. A `Cell` of kind "section" leads to that of the name in detail."""
 
     name: str
     pieces: Sequence[Piece]

@@ -44,7 +44,7 @@ class Known(NamedTuple):
 
     @classmethod
     def of(cls, number: int, name: str, linear: Linear) -> Self:
-        """What is known of a linear loop."""
+        """Gather what is known of a linear loop."""
         shown = response(linear)
         return cls(number, name, linear, shown, margins(linear, shown))
 

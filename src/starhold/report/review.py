@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -78,9 +77,9 @@ def sections_of(review: Review) -> tuple[list[Section], Points]:
         CAMPAIGN: _campaign,
         CERTIFICATES: _certificates,
     }
-    fresh = (MISSION, REQUIREMENTS, POINTING, CERTIFICATES)
+    fresh = (MISSION, REQUIREMENTS)
     sections = [Section(name, [*make(review)], name in fresh) for name, make in makers.items()]
-    sections.append(Section(CREDIBILITY, [*_credibility(review)], True))
+    sections.append(Section(CREDIBILITY, [*_credibility(review)]))
     points = [(one.name, str(piece)) for one in sections for piece in one.pieces if isinstance(piece, Open)]
     rows = [[str(number), Cell(name, "section", detail=name), _safe(text)] for number, (name, text) in enumerate(points, 1)]
     columns = [Column("no."), Column("from"), Column("what is open")]
@@ -110,7 +109,7 @@ def _table(names: str, rows: Iterable[Sequence[Any]], title: str = "") -> Table:
 def _outcome(review: Review, points: int) -> Iterator[Piece]:
     scenario, judged = review.evidence.scenario, review.verdicts
     counts = {word: sum(one.verdict == word for one in judged) for word in ("met", "missed", "not decided")}
-    said = listed([f"{count} {word}" for word, count in counts.items() if count])
+    said = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     if scenario.table.description:
         yield f"{scenario.table.description}."
     yield f"Required of the law {review.evidence.entry.name}: {said} of {len(judged)}." if judged else "Nothing is required."
@@ -137,7 +136,7 @@ def _mission(review: Review) -> Iterator[Piece]:
         ["flight", facts(scenario, [flight])],
     ]
     yield _table("item|value", rows, "Configuration")
-    digests = {"the scenario's text": hashlib.sha256(scenario.text.encode()).hexdigest()}
+    digests = {"text of the scenario": hashlib.sha256(scenario.text.encode()).hexdigest()}
     digests |= hashes(scenario.text, scenario.where, scenario.folder)
     digests |= {f"program of the law, {one.name}": one.law for one in _issued(review) if one.law}
     digests |= {"runs of the campaign": evidence.campaign.digest} if review.has_campaign else {}
@@ -145,8 +144,8 @@ def _mission(review: Review) -> Iterator[Piece]:
 
 
 def _issued(review: Review) -> list[Certificate]:
-    found = review.evidence.issued
-    return [] if isinstance(found, str) else [one.certificate for one in found]
+    issued = review.evidence.issued
+    return [] if isinstance(issued, str) else [one.certificate for one in issued]
 
 
 def _assumptions(review: Review) -> Iterator[Piece]:
@@ -239,8 +238,8 @@ def _momentum(review: Review) -> Iterator[Piece]:
     peaks, rotors = np.nanmax(np.abs(run["wheel_momentum"]), axis=0), evidence.loop.rotors
     rows: list[list[Any]] = []
     for number, (begun, peak, limit) in enumerate(zip(rotors, peaks, wheels.momentum_limit, strict=True), 1):
-        told = [limit, 100.0 * peak / limit, limit - peak] if math.isfinite(limit) else [None] * 3
-        rows.append([str(number), begun, peak, *told])
+        margin = [limit, 100.0 * peak / limit, limit - peak] if math.isfinite(limit) else [None] * 3
+        rows.append([str(number), begun, peak, *margin])
     heads = [Column(name, "N m s", ".4g") for name in ("at the start", "largest flown", "limit")]
     yield Table(
         [Column("wheel"), *heads, Column("share", "%", ".1f"), Column("left", "N m s", ".4g")],
@@ -282,19 +281,17 @@ def _campaign(review: Review) -> Iterator[Piece]:
     from starhold.report.campaign_units import Wording, flown_text, headline
 
     if not review.has_campaign:
-        yield Open(
-            "No campaign was flown, so nothing is known of numbers other than the file's: it has no [campaign] table."
-        )
+        yield Open("No campaign is flown, so nothing is known of other numbers: the scenario has no [campaign] table.")
         return
     result = review.evidence.campaign
     law, words = result.laws[0], Wording.of(review.evidence.scenario.body, result)
     yield f"{flown_text(result)[:1].upper()}{flown_text(result)[1:]}"
     yield f"{law.law} {headline(law, result.sampling, words)}"
-    told: list[Told | None] = [tables.verdicts(result, words), tables.runs(result), tables.metrics(result, words)]
-    told += [tables.dispersions(result), *tables.indices(result, words)]
+    shown: list[Told | None] = [tables.verdicts(result, words), tables.runs(result), tables.metrics(result, words)]
+    shown += [tables.dispersions(result), *tables.indices(result, words)]
     if law.drivers is not None:
-        told.append(tables.drivers(law.drivers, words, DRIVERS)._replace(heading="What drives failures and metrics"))
-    for one in told:
+        shown.append(tables.drivers(law.drivers, words, DRIVERS)._replace(heading="What drives failures and metrics"))
+    for one in shown:
         if one is not None and one.table.rows:
             yield one.table._replace(rows=_safe_rows(one.table.rows), title=one.heading)
         if one is not None and one.note:
@@ -304,23 +301,25 @@ def _campaign(review: Review) -> Iterator[Piece]:
 
 
 def _certificates(review: Review) -> Iterator[Piece]:
-    found = review.evidence.issued
-    if isinstance(found, str):
-        yield Open(f"Nothing is certified: {found}.")
+    issued = review.evidence.issued
+    if isinstance(issued, str):
+        yield Open(f"Nothing is certified: {issued}.")
         return
     from starhold.studies.body import study_of
 
     rows: list[list[Any]] = []
     points: list[Open] = []
     covered: list[str] = []
-    for issued in found:
-        one = issued.certificate
+    for given in issued:
+        one = given.certificate
         subject, name = one.subject, one.name
         for claims in grouped(one).values():
             for claim in claims:
                 absent = enumerated(left_out(claim)) if left_out(claim) else "nothing"
                 outcome = Cell(claim.outcome, claim.outcome)
-                rows.append([name, HEADINGS[claim.kind], outcome, f"{statement(claim, subject)}.", absent, methods(claim)])
+                rows.append(
+                    [name, HEADINGS[claim.kind], outcome, f"{statement(claim, subject)}. By {methods(claim)}.", absent]
+                )
         points += [
             Open(f"{name}, {HEADINGS[claim.kind]} is {claim.outcome}: {'; '.join(reasons(claim))}.")
             for claim in one.claims
@@ -334,12 +333,12 @@ def _certificates(review: Review) -> Iterator[Piece]:
         if first.outcome == "proved" and left_out(first):
             points.append(Open(f"{name}: no proof about the motion takes in {enumerated(left_out(first))}."))
         # Certificates of later phases begin where this flight is not looked at.
-        inside = study_of(review.evidence.scenario.body).start_inside(issued) if issued.step == 0 else {}
+        inside = study_of(review.evidence.scenario.body).start_inside(given) if given.step == 0 else {}
         outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
         if outside:
             points.append(Open(f"{name}: the flight begins outside the sets of {listed(outside)}."))
     if rows:
-        yield _table("certificate|claim|outcome|what is claimed|leaves out|by", rows)
+        yield _table("certificate|claim|outcome|what is claimed|leaves out", rows)
         yield from covered
     yield from points
 
@@ -349,55 +348,51 @@ def _certificates(review: Review) -> Iterator[Piece]:
 
 def _credibility(review: Review) -> Iterator[Piece]:
     """Tell what is known for each factor that NASA-STD-7009 names; a level is for people to assign."""
-    yield "The factors are those of NASA-STD-7009. What is known here is told, and what is not is named; no level is assigned."
-    rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in _factors(review).items()]
+    yield "The factors are those of NASA-STD-7009; no level is assigned, for that is left to people."
+    factors = _factors(review)
+    rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in factors.items()]
     yield _table("factor|known|not stated", rows)
-    yield from (
-        Listed(f"{name}: not stated: {_lower(blank)}") for name, (_, blanks) in _factors(review).items() for blank in blanks
-    )
-
-
-@cache
-def _release() -> str:
-    from starhold.report.page_parts import versions
-
-    return f"Computed by {versions()}."
+    for name, (_, blanks) in factors.items():
+        yield from (Listed(f"{name}: not stated: {_lower(blank)}") for blank in blanks)
 
 
 def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
-    """What the program knows for each factor, and what it does not."""
+    """List what the program knows for each factor, and what it does not."""
+    from starhold.report.campaign_units import counted
+    from starhold.report.page_parts import versions
+
     evidence = review.evidence
     scenario, tables = evidence.scenario, evidence.scenario.table
     parts = [evidence.entry.law, evidence.loop.body, *(fitted.part for fitted in evidence.loop.parts)]
-    own = [part.name for part in parts if part.file is not None]
+    foreign = [part.name for part in parts if not _released(part.module)]
     sources = dict.fromkeys(source for part in parts for source in part.card.sources)
     claims = [claim for one in _issued(review) for claim in one.claims]
     proved = sum(claim.outcome == "proved" for claim in claims)
     reasons_given = sum(bool(one.rationale) for one in review.verdicts)
     checked = [f"The kernel checked {proved} of {len(claims)} claims as proved."] if claims else []
-    models = (
-        f"{len(parts) - len(own)} of {len(parts)} models come with the release, whose tests hold them to their equations."
-    )
-    verification = [_release(), models, *checked]
-    open_models = [f"Who verified the models in files of their own: {', '.join(own)}."] if own else []
-    open_models.append("The error of the integration step: starhold run --check-step tells it.")
+    models = f"{len(parts) - len(foreign)} of {len(parts)} models are those of this release."
+    verification = [f"Computed by {versions()}.", models, *checked]
+    open_models = [f"Who verified the models of others: {', '.join(foreign)}."] if foreign else []
+    open_models += ["Which tests of the release were run here."]
+    open_models += ["The error of the integration step: starhold run --check-step tells it."]
     uncertainty: list[str] = []
     unknown: list[str] = ["How uncertain the numbers are that are not drawn."]
-    robustness = [f"{len(tables.fault)} faults are flown."] if getattr(tables, "fault", []) else []
+    robustness = [f"Flown with {counted(len(tables.fault), 'fault')}."] if getattr(tables, "fault", []) else []
     frail: list[str] = []
     if review.has_campaign:
         result = evidence.campaign
         drawn = ", ".join(result.over) or "nothing but noise"
         uncertainty.append(f"{result.runs} runs, by {result.sampling} sampling, draw {drawn}.")
         causes = result.laws[0].drivers
-        robustness += (
-            [] if causes is None else [f"{causes.failures} of {causes.runs} runs fail, whose causes were looked for."]
-        )
+        if causes is not None:
+            robustness.append(
+                f"{causes.failures} of {counted(causes.runs, 'run')} failed, and causes of it were looked for."
+            )
     else:
         unknown.insert(0, "The spread of results: there is no [campaign].")
         frail.append("What makes requirements fail: there is no [campaign].")
     if review.has_budget and not isinstance(evidence.budget, str):
-        uncertainty.append(f"A pointing budget of {len(evidence.budget.rows) - 3} sources.")
+        uncertainty.append(f"A pointing budget of {counted(len(evidence.budget.rows) - 3, 'source')}.")
     if not isinstance(evidence.linear, str) and evidence.linear.is_stable:
         robustness.append("Margins of gain, phase and delay of the linear loop.")
     elif scenario.body == ATTITUDE:
@@ -425,6 +420,11 @@ def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
         ),
         "People qualifications": ([], ["Who made and who reviewed this analysis, and their qualifications."]),
     }
+
+
+def _released(module: Any) -> bool:
+    """Whether a model is one of starhold's own; a law made of modes is an object."""
+    return getattr(module, "__name__", type(module).__module__).startswith("starhold.")
 
 
 def _lower(text: str) -> str:

@@ -170,7 +170,7 @@ def check_margins(scenario: Scenario) -> tuple[Requirement, ...]:
 
 
 def by_margins(scenario: Scenario, linear: Linear | str) -> Verdicts:
-    """The verdicts that the margins of a linear loop give, of the worst axis each. A text tells why there is no such loop."""
+    """The verdicts that the margins of a linear loop give, of the worst axis each. A text tells why there is no loop."""
     tables, required = tables_of(scenario, "margin"), check_margins(scenario)
     pairs = list(zip(tables.items(), required, strict=True))
     if isinstance(linear, str):

@@ -132,8 +132,8 @@ class Command(NamedTuple):
     with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
     whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
     command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
-    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. kinds: how the
-    files NAME.* may end."""
+    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. kinds: how
+    the files NAME.* may end."""
 
     summary: str
     suffix: str

@@ -21,16 +21,13 @@ def present(scenario: Scenario, entry: LawEntry, review: Review) -> Result:
     sections, points = sections_of(review)
     blocks.append(f"{OPEN}: {len(points)}." if points else "No point is open.")
     blocks += [f"{number}. {text}" for number, (_, text) in enumerate(points, 1)]
-    return Result(
-        f"{scenario.name}, {entry.name}: review",
-        blocks,
-        document=sections,
-        outcome=judged.outcome if review.verdicts else "undecided",
-    )
+    # Where nothing is required nothing is shown to be met.
+    outcome = judged.outcome if review.verdicts else "undecided"
+    return Result(f"{scenario.name}, {entry.name}: review", blocks, document=sections, outcome=outcome)
 
 
 COMMAND = Command(
-    "Gather what is known of a law for a review, with the points that are open: review.html, which prints well, and review.md.",
+    "Gather what is known of a law for a review, and what is left open: review.html, which prints well, and review.md.",
     "review",
     later("campaign.verify.examine"),
     present,
