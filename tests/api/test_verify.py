@@ -103,6 +103,13 @@ def test_each_number_is_that_of_its_own_command():
     assert (proof.number, proof.verdict) == (claim.numbers["angle"], "met")
 
 
+def test_what_is_measured_where_it_is_asked_for_is_the_same_in_a_campaign_and_in_a_flight():
+    asked = [{"metric": metric, "at_most": 9} for metric in ("peak_attitude_error", "peak_rate_error", "overshoot")]
+    rows = sh.campaign(turn(), runs=1, over={}, requirement=asked, search=False).frame()
+    for one in sh.verify(turn(*(one | {"method": "flight"} for one in asked))):
+        assert rows[one.metric][0] == pytest.approx(one.number, rel=1e-12)
+
+
 def test_each_method_is_used_once_and_only_if_it_is_asked_for(monkeypatch):
     used = []
 
@@ -224,7 +231,7 @@ def test_an_inspection_is_met_as_by_its_record(tmp_path):
         ([SETTLES | {"at_most": "3 deg"}], 'requirement[1].at_most: found "3 deg"; allowed: a quantity in s'),
         ([PHASE | {"at_least": "3 s"}], 'requirement[1].at_least: found "3 s"; allowed: a quantity in rad'),
         ([STILL, STILL | {"id": "STILL"}], 'requirement[2].id: found "STILL"; allowed: an id that no other'),
-        ([STILL | {"parent": "S"}], 'requirement[1].parent: found "S"; allowed: the id of another requirement'),
+        ([{"id": "T"}, STILL | {"parent": "S"}], 'requirement[2].parent: found "S"; allowed: the id of another requirement'),
         ([STILL | {"parent": "i"}, {"id": "i", "parent": "still"}], "requirement[1].parent"),
         ([STILL | {"in_mode": "nadir"}], 'requirement[1].in_mode: found "nadir"; allowed: no mode, for the law pd has none'),
         ([STILL | {"after": "1 h"}], 'requirement[1].after: found "1 h"; allowed: between 0 s and the flight\'s 400 s'),

@@ -132,5 +132,6 @@ def check_family(requirements: Sequence[RequirementTable]) -> None:
             if above not in parents or above in line:
                 raise at_key(f"{key}.parent", "the id of another requirement, which is not derived from it", one.parent)
             line, above = line | {above}, parents[above]
+    for number, one in enumerate(requirements, 1):
         if one.method is None and one.called not in parents.values():
-            raise at_key(f"{key}.method", "proof, flight, campaign, budget, margin or inspection", None)
+            raise at_key(f"requirement[{number}].method", "proof, flight, campaign, budget, margin or inspection", None)
