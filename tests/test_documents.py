@@ -81,10 +81,11 @@ def test_readme_is_a_first_screen(run):
 
 MEASURED = {
     "starhold certify cubesat-nadir --law wheel": (
-        r"within 1.041° of the target after 1199 s at all times, in at least 99.73 % of orbits",
-        r"12 of the loop's 13 parts",
+        "within 1.041° of the target after 1199 s at all times, in at least 99.73 % of orbits",
+        "from up to 30° at up to 0.2692°/s",
+        "of the loop's 13 parts 12 are in",
     ),
-    "starhold verify cubesat-mission": (r"0.027819 deg",),
+    "starhold verify cubesat-mission": ("0.027819 deg",),
 }
 """What README says of the output of its commands."""
 
@@ -92,12 +93,10 @@ MEASURED = {
 @pytest.mark.slow
 @pytest.mark.parametrize("line", MEASURED)
 def test_numbers_of_the_readme_are_measured_by_its_commands(line, tmp_path):
-    readme = " ".join(read("README.md").split())
-    assert f"`{line}`" in readme
-    printed = " ".join(starhold(*line.split()[1:], cwd=tmp_path, code=0).stdout.split())
-    for number in MEASURED[line]:
-        assert number in readme
-        assert number.replace("12 of the loop's 13 parts", "of the loop's 13 parts 12 are in it") in printed
+    assert f"`{line}`" in read("README.md")
+    printed = starhold(*line.split()[1:], cwd=tmp_path, code=0).stdout
+    for text in (read("README.md"), printed):
+        assert [number for number in MEASURED[line] if number not in " ".join(text.lower().split())] == []
 
 
 def test_version_is_said_alike():
@@ -112,8 +111,7 @@ def test_paper_is_as_its_journal_asks():
     assert len(body.split()) <= 1000
     asked = {"Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"}
     assert asked | {"AI usage disclosure", "References"} == {*re.findall(r"^# (.+)$", body, flags=re.MULTILINE)}
-    cited = {key for key in re.findall(r"@(\w+)", body)}
-    assert cited == {*re.findall(r"^@\w+\{(\w+),", read("paper/paper.bib"), flags=re.MULTILINE)}
+    assert {*re.findall(r"@(\w+)", body)} == {*re.findall(r"^@\w+\{(\w+),", read("paper/paper.bib"), flags=re.MULTILINE)}
 
 
 @pytest.fixture

@@ -136,7 +136,7 @@ def claims_table() -> str:
             by = "every claim" if name in READ.get(role, ()) else "pointing" if tells else "none"
             found[by].append(f"`{name}`")
         rows.append([role, *(", ".join(names) for names in found.values())])
-    return table(["role", "taken in by its equations", "by its bounds, of \"pointing as it flies\" alone", "left out"], rows)
+    return table(["role", "taken in by its equations", 'by its bounds, of "pointing as it flies" alone', "left out"], rows)
 
 
 def required_table() -> str:
@@ -156,9 +156,9 @@ def counts_text() -> str:
     others = sum(len(parts(role)) for role in PACKAGES if role != "law")
     known = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     return (
-        f"{len(catalogue())} [laws](docs/laws.md) of attitude and {len(catalogue(POINT))} of station keeping, {others} other "
-        f"[parts](docs/parts.md), {len(builtin_names())} scenarios,\n{len(known)} [commands](docs/commands.md), and "
-        f"{len(PAPERS)} [publications](docs/publications.md) made again."
+        f"{len(catalogue())} [laws](docs/laws.md) of attitude and {len(catalogue(POINT))} of station keeping, "
+        f"{others} other [parts](docs/parts.md), {len(builtin_names())} scenarios,\n"
+        f"{len(known)} [commands](docs/commands.md), and {len(PAPERS)} [publications](docs/publications.md) made again."
     )
 
 
