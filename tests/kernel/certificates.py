@@ -9,8 +9,7 @@ import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations
-from starhold.certification.evidence.noise import find_radii
-from starhold.certification.evidence.pointing import POINTS, Pushed
+from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.openness import Pushes
 from starhold.certification.subject import make_subject
 from starhold.kernel.programs import digest
@@ -72,7 +71,7 @@ def flying(name):
     given = sh.scenario({"spacecraft": {"inertia": inertia}, "part": NOISY.get(name, [])} | kept)
     loop = Loop(make_subject(build(given, given.laws[0])))
     outside, error, *start = told
-    assert Pushed(loop, Pushes(outside, command=error), find_radii(loop, POINTS)).find(*start), loop.failed
+    assert Pushed(loop, Pushes(outside, command=error), noisy=True).find(*start), loop.failed
     return loop
 
 

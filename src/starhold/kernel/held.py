@@ -8,10 +8,11 @@ Docs/kernel.md, 10.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from math import prod
+from typing import NamedTuple
 
 from .loops import AXES, NONE, AttitudeLoop, slopes
 from .numbers import (
@@ -33,29 +34,36 @@ from .numbers import (
 from .polynomials import Poly, apply, dot, minus, most, poly, var, variables
 
 STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
-RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
+RATE, TURN, ITERATIONS, WEIGHT = slice(0, 3), slice(3, 6), 60, Fraction(8)
+SPEED, ANGLE = "|w", "|q"
+"""Under which the sizes have those of |w| and |q|."""
 Sizes = dict[str, Fraction]
+Radii = tuple[Fraction, Fraction]
+"""Bounds of |w| and |q| of a motion."""
+AT_REST: Radii = (Fraction(0), Fraction(0))
 
 
 @dataclass(frozen=True)
 class Region:
-    """A set of states at samples: x.X^-1 x <= 1 for x = (w, q1, q2, q3), q0 >= least, and |x_i| at most the sizes."""
+    """A set of states at samples: x.X^-1 x <= 1 for x = (w, q1, q2, q3), q0 >= least, and sizes of |x_i|, |w|, |q|."""
 
     X: Rows
     sizes: Sizes
     least: Fraction
 
-    def within(self, X: Rows) -> Region:
-        """Return the part that lies in an ellipsoid too."""
-        sizes = {name: min(self.sizes[name], root(X[i][i])) for i, name in enumerate(STATE)}
-        return Region(X, self.sizes | sizes, self.least)
+    def within(self, X: Rows, swayed: Radii = AT_REST) -> Region:
+        """Return the part that lies no further than `swayed` from an ellipsoid."""
+        sizes = {name: root(X[i][i]) + swayed[i // 3] for i, name in enumerate(STATE)}
+        sizes |= {name: x + more for (name, x), more in zip(lengths(X).items(), swayed, strict=True)}
+        return Region(widened(X, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
 
 
 @dataclass(frozen=True)
 class Tube:
     """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
     drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
-    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time."""
+    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time.
+    Of what is held, `uneven` has not what errors that noise drives add linearly."""
 
     sizes: Sizes
     drift: list[Fraction]
@@ -63,11 +71,22 @@ class Tube:
     held: Fraction
     pushed: Fraction
     stale: Fraction
+    uneven: Fraction
 
     @property
     def push(self) -> Fraction:
         """Return the bound of all together, in the mean."""
         return self.held + self.pushed + self.stale
+
+
+class Near(NamedTuple):
+    """A loop near its target: the law's torque and the acceleration as matrices on (w, q), and A and B such that samples are
+    followed by Ax + Bu, with a torque u that is held beside the law's."""
+
+    torque: Rows
+    rates: Rows
+    A: Rows
+    B: Rows
 
 
 class Held:
@@ -78,10 +97,10 @@ class Held:
         self.loop, self.h = loop, numbers["period"]
         self.constant = {name: numbers[name] for name in ("outside", "error")}
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
-        self.turned, self.rated = (
-            sum((numbers.get(f"{kind}.{name}") or Fraction(0) for kind in ("error", "noise")), Fraction(0))
-            for name in ("attitude", "rate")
+        self.noise, errors = (
+            [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")
         )
+        self.turned, self.rated = (x + y for x, y in zip(self.noise, errors, strict=True))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
         names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}
@@ -111,7 +130,15 @@ class Held:
         for _ in range(3):
             self.rates.append(loop.slopes_along(self.rates[-1], acceleration))
         mean = self.rates[0] + self.h / 2 * self.rates[1] + self.h * self.h / 6 * self.rates[2]
-        self.mean = mean.at({f"u{k + 1}": p for k, p in enumerate(self.pull)})
+        held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
+        self.mean = mean.at(held)
+        # The acceleration at samples, what V' has of the rates, and that linearly.
+        on = {"q0": 1 - var("v")}
+        self.speeding = [(p - g).at(on) for p, g in zip(self.pull, self.bend, strict=True)]
+        self.steep = [self.rates[0].slope(name).at(held).at(on) for name in STATE[RATE]]
+        at = dict.fromkeys((*STATE, "v", *self.others), 0)
+        self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in self.steep]
+        self.near = near_target(loop, self.h)
         self.s = -V.terms.get(("q0",), Fraction(0))
         self.G = [[V.slope(i).slope(k).at(dict.fromkeys(STATE, 0)).number / 2 for k in STATE] for i in STATE]
         demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
@@ -137,23 +164,30 @@ class Held:
         turn = root(1 - least * least) if least > 0 else Fraction(1)
         X = [[c * x for x in row] for row in inverse(self.under)]
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
-        sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in STATE[TURN]}
+        sizes |= lengths(X)
+        sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)}
         return Region(X, sizes | self.others, least)
 
-    def misread(self, region: Region) -> Fraction:
-        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told."""
+    def misread(self, region: Region) -> tuple[Fraction, Fraction]:
+        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
+        far from there and what errors that noise drives add linearly on target."""
         if not self.turned + self.rated:
-            return Fraction(0)
+            return Fraction(0), Fraction(0)
         e, r, a, _ = (self.size(letter) for letter in "erah")
         J = [[poly(x).number for x in row] for row in self.loop.J]
         wrong = {"q": self.turned / 2, "w": self.rated + self.turned * r, "r": self.turned * r, "a": self.turned * a}
         wrong |= {"h": stretch(J) * self.rated, "e": 2 * e}
-        sizes = {name: x + wrong[name[0]] for name, x in region.sizes.items()}
-        columns = {letter: [name for name in sizes if name[0] == letter] for letter in wrong}
-        slopes = {
-            k: [[most(p.slope(name), sizes) for name in own] for p in self.loop.u] for k, own in columns.items() if own
-        }
-        return sum((stretch(rows) * wrong[letter] for letter, rows in slopes.items()), Fraction(0))
+        sizes = {name: x + wrong[name[-1] if name in (SPEED, ANGLE) else name[0]] for name, x in region.sizes.items()}
+        full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
+        all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
+        # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
+        away, (turned, rated) = sizes[ANGLE], self.noise
+        near, on = sizes | {"v": away * away}, {"q0": 1 - var("v")}
+        unlike = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE]))
+        linear = {"q": turned / 2, "w": rated}
+        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
+        less = [(full[k] - felt(unlike, k, near, on)) * x - full[k] * curved[k] for k, x in linear.items()]
+        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
 
     def size(self, letter: str) -> Fraction:
         """Return a bound of the norm of a vector from outside."""
@@ -162,55 +196,73 @@ class Held:
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds of the torque from outside and of the error of the command at rates, to which the target's adds."""
-        turning = norm(sizes[name] for name in STATE[RATE]) + self.size("r")
-        outside, error = (x + self.per_rate[name] * turning for name, x in self.constant.items())
+        outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside, "both": outside + error}
 
     def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
         """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
         nothing on, what is told at once."""
         e, r, a, H = (self.size(letter) for letter in "erah")
-        w, outside = norm(sizes[name] for name in STATE[RATE]), self.pushed(sizes)["outside"]
+        w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
         change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
         return sum((felt(parts, letter, sizes) * x for letter, x in change.items()), Fraction(0))
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
         sizes, held = region.sizes, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
-        steady = self.misread(region)
-        steady += sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
+        steady, uneven = self.misread(region)
+        rigid = sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
+        steady, uneven = steady + rigid, uneven + rigid
         widths = [norm(row) for row in self.N]
 
+        def within(wide: list[Fraction]) -> Sizes:
+            drift = norm(x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True))
+            return sizes | named(STATE[RATE], wide) | {SPEED: sizes[SPEED] + drift}
+
         def reached(wide: list[Fraction]) -> list[Fraction]:
-            within = sizes | named(STATE[RATE], wide)
-            push = steady + self.pushed(within)["both"] + self.stale(within, self.beside)
+            own = within(wide)
+            push = steady + self.pushed(own)["both"] + self.stale(own, self.beside)
             columns = zip(STATE[RATE], held.values(), widths, self.bend, strict=True)
-            return [sizes[x] + self.h * (u + push * n + most(g, within)) for x, u, n, g in columns]
+            return [sizes[x] + self.h * (u + push * n + most(g, own)) for x, u, n, g in columns]
 
         wide = settled(reached, [sizes[name] for name in STATE[RATE]])
-        turned = self.h / 2 * norm(wide)
-        far = {name: min(sizes[name] + turned, Fraction(1)) for name in STATE[TURN]}
+        far = within(wide)
+        turned = self.h / 2 * far[SPEED]
+        far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | held
         drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
-        within = sizes | {"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held
-        return Tube(within, drift, turned, steady, self.pushed(within)["both"], self.stale(within, self.beside))
+        return Tube(far, drift, turned, steady, self.pushed(far)["both"], self.stale(far, self.beside), uneven)
 
-    def fall(self, region: Region) -> tuple[Rows, Rows, Fraction, Fraction]:
-        """Return Q, H, p and r such that V changes in a period by h (p |felt x| + r - x.Qx) at most, and V <= x.Hx."""
-        h, tube = self.h, self.tube(region)
+    def fall(self, region: Region) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
+        """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
+        h, tube, L = self.h, self.tube(region), self.rates[0]
+        x, x_sizes = [var(name) for name in STATE], region.sizes | {"v": 1 - region.least}
         bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
-        pushed = [tube.push * norm(row) for row in self.N]
-        # How far pushes take the rates from where they go without.
-        away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(bent, d), strict=True)])
-        slope = {name: most(self.rates[0].slope(name), tube.sizes) for name in ("q0", *STATE)}
-        rest, push = h**3 / 24 * most(self.rates[3], tube.sizes), tube.held + tube.pushed
+        push = tube.held + tube.pushed
+        # How far pushes of size 1 take the rates from where they go without.
+        away = settled(lambda d: [h * (norm(n) + y) for n, y in zip(self.N, reach(bent, d), strict=True)])
+        slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
+        moved = [*tube.drift, *[tube.turned] * 3]
         # What changes of momentum do to V, which is less than what their torques do to the body.
-        rest += self.stale(tube.sizes, [self.worked])
-        rest += push / 2 * norm(reach(self.felt, [*tube.drift, *[tube.turned] * 3]))
-        rest += reach([[slope[name] for name in STATE[RATE]]], away)[0] / 2
-        rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
+        rest = h**3 / 24 * most(self.rates[3], tube.sizes) + self.stale(tube.sizes, [self.worked])
+        # What pushes do to V grows with what the state does in the period: linearly, and what is left.
+        left = [most(p, x_sizes) for p in minus(self.speeding, apply(self.near.rates, x))]
+        drift = [h * (a + b) + push * c for a, b, c in zip(left, reach(bent, tube.drift), away, strict=True)]
+        turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
+        rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
+        # So does what V' has of the rates, which pushes change.
+        left = [most(p, x_sizes) for p in minus(self.steep, apply(self.steepness, x))]
+        for name, d, off in zip(STATE[RATE], away, left, strict=True):
+            curved = [most(L.slope(name).slope(other), tube.sizes) for other in ("q0", *STATE)]
+            rest += push * d / 2 * (off + reach([curved], [tube.turned, *moved])[0])
+        rest += h / 12 * push * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
+        onward = self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0))
+        growing = [[h / 2 * y for y in row] for row in times(self.felt, onward)]
+        growing += [[norm(away) / 2 * y for y in row] for row in self.steepness]
+        # |a| + |b| + |c| <= sqrt(1 + 2/w) |(a, wb, wc)| with w = sqrt(WEIGHT).
+        F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        return least_form(-self.mean, region), over, push, rest
+        return least_form(-self.mean, region), over, F, push * root(1 + 2 / WEIGHT), rest
 
     def swing(self, region: Region) -> Fraction:
         """Return a bound of |V'| between samples."""
@@ -220,29 +272,38 @@ class Held:
             reach(self.felt, [sizes[name] for name in STATE])
         )
 
-    def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
-        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, of
-        what is not linear and what comes from outside."""
+    def linear(self, region: Region) -> list[tuple[Rows, Fraction]]:
+        """Return pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, and what
+        noise adds linearly."""
         h, N, tube, u = self.h, self.N, self.tube(region), self.u
-        rest = self.loop.on_target | self.loop.still
-        linear = beside(*(slopes(u, letter, rest) for letter in "wq"))
-        A = over_period([[-x for x in row] for row in times(N, linear)], h)
-        wide, turn = (norm(tube.sizes[name] for name in STATE[part]) for part in (RATE, TURN))
+        wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         x, near = [var(name) for name in STATE], region.sizes | {"v": turn * turn}
-        parts = zip(u, self.more, apply(linear, x), self.gyroscopic, strict=True)
+        parts = zip(u, self.more, apply(self.near.torque, x), self.gyroscopic, strict=True)
         unlike = [p + more - own - g for p, more, own, g in parts]
-        bent = [[most(g.slope(name), tube.sizes) for name in STATE[RATE]] for g in self.gyroscopic]
-        odd = norm(most(p.at({"q0": 1 - var("v")}), near) for p in unlike)
+        bent = stretched([[g.slope(name) for name in STATE[RATE]] for g in self.gyroscopic], tube.sizes)
+        carried = [Poly({m: c for m, c in p.terms.items() if {name[0] for name in m} == {"h", "w"}}) for p in unlike]
+        odd = norm(most(p.at({"q0": 1 - var("v")}), near) for p in minus(unlike, carried))
+        odd += felt(carried, "w", near) * region.sizes[SPEED]
         # Rates drift from nothing on, too.
-        mean = tube.pushed + tube.stale + odd + stretch(bent) * norm(tube.drift) / 2
+        mean = tube.pushed + tube.stale + odd + bent * norm(tube.drift) / 2
         uneven = 2 * mean - tube.pushed - odd
-        return A, [
-            ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], tube.held + mean),
+        return [
+            (self.near.B, tube.uneven + mean),
             (scalar(0) + N, h * h / 8 * uneven),
             (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))),
         ]
+
+
+def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
+    """Return the linear loop with its torque held for h, where nothing comes from outside."""
+    at = loop.on_target | loop.still | {f"{letter}{k + 1}": 0 for letter in "erah" for k in AXES}
+    torque = beside(*(slopes(loop.u, letter, at) for letter in "wq"))
+    N = [[poly(p).number for p in row] for row in loop.J_inverse]
+    rates = times(N, torque)
+    A = over_period([[-x for x in row] for row in rates], h)
+    return Near(torque, rates, A, [[h * x for x in row] for row in N] + [[h * h / 4 * x for x in row] for row in N])
 
 
 def over_period(held: Rows, h: Fraction) -> Rows:
@@ -272,9 +333,38 @@ def least_form(p: Poly, region: Region) -> Rows:
     return middle
 
 
-def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
-    """Return how much parts change at most with a vector, in norms."""
-    return stretch([[most(p.slope(f"{letter}{k + 1}"), sizes) for k in AXES] for p in parts])
+def felt(parts: list[Poly], letter: str, sizes: Sizes, at: Mapping[str, Poly] | None = None) -> Fraction:
+    """Return how much parts change at most with a vector, in norms; `at`: with polynomials in place of variables."""
+    names = [name for name in sizes if name[0] == letter]
+    return stretched([[p.slope(name).at(at or {}) for name in names] for p in parts], sizes) if names else Fraction(0)
+
+
+def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
+    """Return a bound of how much longer a matrix of polynomials makes a vector: |y x z| <= |y| |z|, and what is left by its
+    entries. Vectors from outside are no longer than each of their components may be."""
+    found = Fraction(0)
+    for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
+        names = [f"{letter}{k + 1}" for k in AXES]
+        x, y, z = map(var, names)
+        turn = [[Poly({}), -z, y], [z, Poly({}), -x], [-y, x, Poly({})]]
+        c = rows[1][0].terms.get((names[2],), Fraction(0))
+        rest = [[p - c * q for p, q in zip(a, b, strict=True)] for a, b in zip(rows, turn, strict=True)]
+        if c and not any((name,) in p.terms for row in rest for p in row for name in names):
+            rows = rest
+            found += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
+    return found + stretch([[most(p, sizes) for p in row] for row in rows])
+
+
+def lengths(X: Rows) -> Sizes:
+    """Return bounds of |w| and |q| where x.X^-1 x <= 1: no eigenvalue exceeds the largest sum of a row."""
+    parts = (([row[part] for row in X[part]], name) for part, name in ((RATE, SPEED), (TURN, ANGLE)))
+    return {name: root(max(sum(map(abs, row), Fraction(0)) for row in rows)) for rows, name in parts}
+
+
+def widened(X: Rows, swayed: Radii) -> Rows:
+    """Return the matrix of an ellipsoid that holds all that is no further than `swayed` from another one."""
+    near = [4 * swayed[i // 3] ** 2 for i in range(6)]
+    return [[2 * x + near[i] * (i == k) for k, x in enumerate(row)] for i, row in enumerate(X)] if any(near) else X
 
 
 def first(p: Poly, letter: str) -> Poly:
@@ -293,9 +383,9 @@ def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
 
 
 def stretch(rows: Rows) -> Fraction:
-    """Return a bound of how much longer a matrix makes a vector, of the sums of its rows and of its columns."""
+    """Return a bound of how much longer a matrix makes a vector: of the sums of its rows and of its columns, or of all."""
     across, down = (max(sum(map(abs, row), Fraction(0)) for row in own) for own in (rows, transpose(rows)))
-    return root(across * down)
+    return min(root(across * down), norm(x for row in rows for x in row))
 
 
 def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:
