@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from math import prod
 from typing import NamedTuple
 
@@ -132,10 +133,13 @@ class Held:
         mean = self.rates[0] + self.h / 2 * self.rates[1] + self.h * self.h / 6 * self.rates[2]
         held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         self.mean = mean.at(held)
+        # What wheels' momentum makes of the rates, beside what the law's torque does about it.
+        both = [p - g for p, g in zip(self.more, self.gyroscopic, strict=True)]
+        self.turning = [Poly({m: c for m, c in p.terms.items() if [x[0] for x in m] == ["h", "w"]}) for p in both]
         # The acceleration at samples, what V' has of the rates, and that linearly.
-        on = {"q0": 1 - var("v")}
-        self.speeding = [(p - g).at(on) for p, g in zip(self.pull, self.bend, strict=True)]
-        self.steep = [self.rates[0].slope(name).at(held).at(on) for name in STATE[RATE]]
+        self.on = {"q0": 1 - var("v")}
+        self.speeding = [(p - g).at(self.on) for p, g in zip(self.pull, self.bend, strict=True)]
+        self.steep = [self.rates[0].slope(name).at(held).at(self.on) for name in STATE[RATE]]
         at = dict.fromkeys((*STATE, "v", *self.others), 0)
         self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in self.steep]
         self.near = near_target(loop, self.h)
@@ -182,11 +186,11 @@ class Held:
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
         away, (turned, rated) = sizes[ANGLE], self.noise
-        near, on = sizes | {"v": away * away}, {"q0": 1 - var("v")}
+        near = sizes | {"v": away * away}
         unlike = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE]))
         linear = {"q": turned / 2, "w": rated}
         curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
-        less = [(full[k] - felt(unlike, k, near, on)) * x - full[k] * curved[k] for k, x in linear.items()]
+        less = [(full[k] - felt(unlike, k, near, self.on)) * x - full[k] * curved[k] for k, x in linear.items()]
         return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
 
     def size(self, letter: str) -> Fraction:
@@ -209,7 +213,12 @@ class Held:
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
-        sizes, held = region.sizes, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
+        sizes, x = region.sizes, [var(name) for name in STATE]
+        near = sizes | {"v": 1 - region.least}
+        # In an ellipsoid c.x is no more than the root of c.Xc.
+        even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
+        odd = [most(p.at(self.on), near) for p in minus(self.pull, apply(self.near.rates, x))]
+        held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
         steady, uneven = self.misread(region)
         rigid = sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
         steady, uneven = steady + rigid, uneven + rigid
@@ -272,9 +281,19 @@ class Held:
             reach(self.felt, [sizes[name] for name in STATE])
         )
 
-    def linear(self, region: Region) -> list[tuple[Rows, Fraction]]:
-        """Return pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, and what
-        noise adds linearly."""
+    def corners(self) -> list[Rows]:
+        """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
+        most = self.size("h")
+        found = list[Rows]()
+        for signs in product((-most, most), repeat=3) if any(p.terms for p in self.turning) else [()]:
+            at = {f"h{k + 1}": x for k, x in enumerate(signs)}
+            turning = [[p.slope(name).at(at).number for name in STATE[RATE]] for p in self.turning]
+            found.append(plus(self.near.A, beside(times(self.near.B, turning), [[Fraction(0)] * 3] * 6)))
+        return found
+
+    def linear(self, region: Region, swayed: Radii) -> list[tuple[Rows, Fraction]]:
+        """Return pairs B, b such that samples in the region, less what noise adds linearly, which is no more than `swayed`, are
+        followed by x+ = Ax + the sum of B v, |v| <= b, with A between those of `corners`."""
         h, N, tube, u = self.h, self.N, self.tube(region), self.u
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
@@ -283,9 +302,8 @@ class Held:
         parts = zip(u, self.more, apply(self.near.torque, x), self.gyroscopic, strict=True)
         unlike = [p + more - own - g for p, more, own, g in parts]
         bent = stretched([[g.slope(name) for name in STATE[RATE]] for g in self.gyroscopic], tube.sizes)
-        carried = [Poly({m: c for m, c in p.terms.items() if {name[0] for name in m} == {"h", "w"}}) for p in unlike]
-        odd = norm(most(p.at({"q0": 1 - var("v")}), near) for p in minus(unlike, carried))
-        odd += felt(carried, "w", near) * region.sizes[SPEED]
+        odd = norm(most(p.at(self.on), near) for p in minus(unlike, self.turning))
+        odd += felt(self.turning, "w", near) * swayed[0]
         # Rates drift from nothing on, too.
         mean = tube.pushed + tube.stale + odd + bent * norm(tube.drift) / 2
         uneven = 2 * mean - tube.pushed - odd

@@ -37,6 +37,8 @@ LEAST = 1e-6
 """By how much (rad) a spring as stiff as the law gives to the least torque from outside that is told of."""
 HEED = 0.5
 """How much the rates of an ellipsoid count beside its turns, until that makes no more of them smaller."""
+NEARLY = 1e-3
+"""By which share the linear motion is multiplied first, for what wheels' momentum makes of it."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
 MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 8.0, 20, 24, 2000
@@ -122,13 +124,14 @@ class Chain:
         angle, fastest = self.ends(region, region.X)
         heed = HEED
         for _ in range(ELLIPSOIDS):
-            A, pushes = self.held.near.A, self.held.linear(region)
-            found = smallest(floats(A), [floats(B) * float(b) for B, b in pushes], heed)
+            pushes, corners = self.held.linear(region, swayed), self.held.corners()
+            own = [floats(B) * float(b) for B, b in pushes]
+            found = smallest(floats(self.held.near.A), np.array(list(map(floats, corners))), own, heed)
             if found is None:
                 break
             shape, shares = found
             X, a = [[Fraction(x) for x in row] for row in shape.tolist()], [Fraction(x) for x in shares]
-            rate = highest_ratio(image(X, a, A, pushes), X)
+            rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
             reach = highest_ratio(widened(region.X, swayed), X)
             inner = region.within(X, swayed)
             end = self.ends(inner, X, swayed)
@@ -304,29 +307,36 @@ def feedback(loop: AttitudeLoop) -> float:
     return -float(sum(row[3 + k] for k, row in enumerate(near_target(loop, Fraction(0)).torque))) / 3.0
 
 
-def smallest(A: Array, pushes: list[Array], heed: float) -> tuple[Array, list[float]] | None:
-    """Return the matrix of the ellipsoid that pushes of size 1 do not leave and that turns least, and its shares. heed: how
-    much rates count beside turns, in powers."""
+def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tuple[Array, list[float]] | None:
+    """Return the matrix of the ellipsoid that pushes of size 1 do not leave, about the one that turns least, and its shares.
+    heed: how much rates count beside turns, in powers."""
     radius = float(np.abs(np.linalg.eigvals(A)).max())
     if radius >= 1.0:
         return None
 
     def shape(x: Array) -> tuple[float, Array, Array]:
-        shares = np.exp(x) / (1.0 + np.exp(x).sum()) * (1.0 - radius**2)
+        shares, more = np.exp(x[:-1]) / (1.0 + np.exp(x[:-1]).sum()) * (1.0 - radius**2), np.exp(x[-1])
         fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(A))
         fed += 1e-14 * np.diag(np.diag(fed))
-        X = linalg.solve_discrete_lyapunov(A / sqrt(1.0 - shares.sum()), fed)
+        kept = 1.0 - shares.sum()
+        if radius**2 * (1.0 + more) >= kept:
+            return inf, A, shares
+        X = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
+        X = (X + X.T) / 2.0
+        # So much larger that no corner leaves it.
+        room = X - corners @ X @ corners.transpose(0, 2, 1) / kept
+        if np.linalg.eigvalsh(room).min() <= 0.0:
+            return inf, A, shares
+        X = X * np.linalg.eigvals(np.linalg.solve(room, fed)).real.max()
         wide, turned = (float(np.log(np.linalg.eigvalsh(X[k, k])[-1])) for k in (RATE, TURN))
         return turned + heed * wide, X, shares
 
-    weight = np.log([np.linalg.norm(B, 2) / np.linalg.norm(pushes[0], 2) + 1e-12 for B in pushes])
-
+    weight = np.log([np.linalg.norm(B, 2) / np.linalg.norm(pushes[0], 2) + 1e-12 for B in pushes] + [NEARLY])
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
-    found = optimize.minimize(
-        lambda x: shape(x)[0], weight, method="Nelder-Mead", options={"maxfev": 400, "initial_simplex": begun}
-    )
-    _, X, shares = shape(found.x)
-    return (X + X.T) / 2.0 * LARGER, [float(a) for a in shares]
+    options = {"maxfev": 400, "initial_simplex": begun}
+    found = optimize.minimize(lambda x: shape(x)[0], weight, method="Nelder-Mead", options=options)
+    size, X, shares = shape(found.x)
+    return (X * LARGER, [float(a) for a in shares]) if isfinite(size) else None
 
 
 def highest_ratio(a: Rows, b: Rows) -> float:

@@ -56,8 +56,10 @@ def points(claim: Claim) -> Proof:
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        after = image(X, shares, held.near.A, held.linear(region))
-        yield f"ellipsoid {k}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
+        pushed = held.linear(region, swayed)
+        for corner, A in enumerate(held.corners()):
+            after = image(X, shares, A, pushed)
+            yield f"ellipsoid {k}, momentum {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
         yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(region.X, swayed), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
