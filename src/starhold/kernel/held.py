@@ -38,6 +38,9 @@ STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
 RATE, TURN, ITERATIONS, WEIGHT = slice(0, 3), slice(3, 6), 60, Fraction(8)
 SPEED, ANGLE = "|w", "|q"
 """Under which the sizes have those of |w| and |q|."""
+AROUND = [[c * Fraction(7072, 10000) for c in signs] for signs in product((-1, 1), repeat=3)]
+AROUND += [[sign * (i == k) * Fraction(14144, 10000) for i in AXES] for k in AXES for sign in (-1, 1)]
+"""The corners of a rhombic dodecahedron, which holds the unit ball: there |x| + |y| <= sqrt 2 for each two axes."""
 Sizes = dict[str, Fraction]
 Radii = tuple[Fraction, Fraction]
 """Bounds of |w| and |q| of a motion."""
@@ -134,8 +137,7 @@ class Held:
         held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         self.mean = mean.at(held)
         # What wheels' momentum makes of the rates, beside what the law's torque does about it.
-        both = [p - g for p, g in zip(self.more, self.gyroscopic, strict=True)]
-        self.turning = [Poly({m: c for m, c in p.terms.items() if [x[0] for x in m] == ["h", "w"]}) for p in both]
+        self.turning = [with_momentum(p - g) for p, g in zip(self.more, self.gyroscopic, strict=True)]
         # The acceleration at samples, what V' has of the rates, and that linearly.
         self.on = {"q0": 1 - var("v")}
         self.speeding = [(p - g).at(self.on) for p, g in zip(self.pull, self.bend, strict=True)]
@@ -244,7 +246,7 @@ class Held:
     def fall(self, region: Region) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
         h, tube, L = self.h, self.tube(region), self.rates[0]
-        x, x_sizes = [var(name) for name in STATE], region.sizes | {"v": 1 - region.least}
+        x, near = [var(name) for name in STATE], region.sizes | {"v": 1 - region.least}
         bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
         push = tube.held + tube.pushed
         # How far pushes of size 1 take the rates from where they go without.
@@ -254,12 +256,11 @@ class Held:
         # What changes of momentum do to V, which is less than what their torques do to the body.
         rest = h**3 / 24 * most(self.rates[3], tube.sizes) + self.stale(tube.sizes, [self.worked])
         # What pushes do to V grows with what the state does in the period: linearly, and what is left.
-        left = [most(p, x_sizes) for p in minus(self.speeding, apply(self.near.rates, x))]
-        drift = [h * (a + b) + push * c for a, b, c in zip(left, reach(bent, tube.drift), away, strict=True)]
+        drift = self.astray(region, tube)
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
         rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
         # So does what V' has of the rates, which pushes change.
-        left = [most(p, x_sizes) for p in minus(self.steep, apply(self.steepness, x))]
+        left = [most(p, near) for p in minus(self.steep, apply(self.steepness, x))]
         for name, d, off in zip(STATE[RATE], away, left, strict=True):
             curved = [most(L.slope(name).slope(other), tube.sizes) for other in ("q0", *STATE)]
             rest += push * d / 2 * (off + reach([curved], [tube.turned, *moved])[0])
@@ -281,18 +282,33 @@ class Held:
             reach(self.felt, [sizes[name] for name in STATE])
         )
 
+    def astray(self, region: Region, tube: Tube) -> list[Fraction]:
+        """Return how far the rates are in a period from where the acceleration that is linear in the sample takes them."""
+        sizes = region.sizes | {"v": 1 - region.least}
+        left = [most(p, sizes) for p in minus(self.speeding, apply(self.near.rates, [var(name) for name in STATE]))]
+        bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
+        columns = zip(left, reach(bent, tube.drift), self.N, strict=True)
+        return [self.h * (a + b + tube.push * norm(n)) for a, b, n in columns]
+
     def corners(self) -> list[Rows]:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
-        most = self.size("h")
-        found = list[Rows]()
-        for signs in product((-most, most), repeat=3) if any(p.terms for p in self.turning) else [()]:
-            at = {f"h{k + 1}": x for k, x in enumerate(signs)}
-            turning = [[p.slope(name).at(at).number for name in STATE[RATE]] for p in self.turning]
-            found.append(plus(self.near.A, beside(times(self.near.B, turning), [[Fraction(0)] * 3] * 6)))
+        if not self.loop.wheels:
+            return [self.near.A]
+        h, (A, B), found = self.h, self.near[2:], list[Rows]()
+        # A torque that grows from nothing on.
+        grown = [[h * h / 2 * x for x in row] for row in self.N] + [[h**3 / 12 * x for x in row] for row in self.N]
+        for corner in AROUND:
+            at = {f"h{k + 1}": x * self.size("h") for k, x in enumerate(corner)}
+            asked, turning = (
+                [[c * p.slope(name).at(at).number for name in STATE[RATE]] for p in parts]
+                for c, parts in ((1, self.turning), (-1, [with_momentum(p) for p in self.gyroscopic]))
+            )
+            more = plus(times(B, beside(asked, scalar(0))), times(grown, times(turning, self.near.rates)))
+            found.append(plus(A, more))
         return found
 
     def linear(self, region: Region, swayed: Radii) -> list[tuple[Rows, Fraction]]:
-        """Return pairs B, b such that samples in the region, less what noise adds linearly, which is no more than `swayed`, are
+        """Return pairs B, b such that samples in the region, less what noise adds linearly, at most `swayed`, are
         followed by x+ = Ax + the sum of B v, |v| <= b, with A between those of `corners`."""
         h, N, tube, u = self.h, self.N, self.tube(region), self.u
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
@@ -305,7 +321,7 @@ class Held:
         odd = norm(most(p.at(self.on), near) for p in minus(unlike, self.turning))
         odd += felt(self.turning, "w", near) * swayed[0]
         # Rates drift from nothing on, too.
-        mean = tube.pushed + tube.stale + odd + bent * norm(tube.drift) / 2
+        mean = tube.pushed + tube.stale + odd + bent * norm(self.astray(region, tube)) / 2
         uneven = 2 * mean - tube.pushed - odd
         return [
             (self.near.B, tube.uneven + mean),
@@ -388,6 +404,11 @@ def widened(X: Rows, swayed: Radii) -> Rows:
 def first(p: Poly, letter: str) -> Poly:
     """Return the terms of which the first variable but q0 has this letter."""
     return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
+
+
+def with_momentum(p: Poly) -> Poly:
+    """Return what of a polynomial is a product of wheels' momentum and a rate."""
+    return Poly({m: c for m, c in p.terms.items() if [name[0] for name in m] == ["h", "w"]})
 
 
 def growing(parts: list[Poly]) -> list[Poly]:
