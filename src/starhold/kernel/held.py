@@ -8,58 +8,42 @@ Docs/kernel.md, 10.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from math import prod
 from typing import NamedTuple
 
 from .loops import AXES, NONE, AttitudeLoop, slopes
-from .numbers import (
-    RefusedError,
-    Rows,
-    beside,
-    definite,
-    demand,
-    inverse,
-    norm,
-    plus,
-    reach,
-    root,
-    scalar,
-    times,
-    transpose,
-    up,
-)  # fmt: skip
+from .numbers import Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, dot, minus, most, poly, var, variables
+from .regions import (
+    ANGLE,
+    RATE,
+    SPEED,
+    STATE,
+    TURN,
+    Radii,
+    Region,
+    Sizes,
+    felt,
+    first,
+    growing,
+    least_form,
+    lengths,
+    named,
+    settled,
+    stretch,
+    with_momentum,
+)  # fmt: skip
 
-STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
-RATE, TURN, ITERATIONS, WEIGHT = slice(0, 3), slice(3, 6), 60, Fraction(8)
-SPEED, ANGLE = "|w", "|q"
-"""Under which the sizes have those of |w| and |q|."""
-AROUND = [[c * Fraction(7072, 10000) for c in signs] for signs in product((-1, 1), repeat=3)]
-AROUND += [[sign * (i == k) * Fraction(14144, 10000) for i in AXES] for k in AXES for sign in (-1, 1)]
-"""The corners of a rhombic dodecahedron, which holds the unit ball: there |x| + |y| <= sqrt 2 for each two axes."""
-Sizes = dict[str, Fraction]
-Radii = tuple[Fraction, Fraction]
-"""Bounds of |w| and |q| of a motion."""
-AT_REST: Radii = (Fraction(0), Fraction(0))
-
-
-@dataclass(frozen=True)
-class Region:
-    """A set of states at samples: x.X^-1 x <= 1 for x = (w, q1, q2, q3), q0 >= least, and sizes of |x_i|, |w|, |q|."""
-
-    X: Rows
-    sizes: Sizes
-    least: Fraction
-
-    def within(self, X: Rows, swayed: Radii = AT_REST) -> Region:
-        """Return the part that lies no further than `swayed` from an ellipsoid."""
-        sizes = {name: root(X[i][i]) + swayed[i // 3] for i, name in enumerate(STATE)}
-        sizes |= {name: x + more for (name, x), more in zip(lengths(X).items(), swayed, strict=True)}
-        return Region(widened(X, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
+WEIGHT = Fraction(8)
+HALF_ROOT = Fraction(7072, 10000)
+"""At least the root of 1/2."""
+AROUND = [
+    *([c * HALF_ROOT for c in signs] for signs in product((-1, 1), repeat=3)),
+    *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
+]
+"""The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +108,7 @@ class Held:
         left = [p + q for p, q in zip(minus(asked, self.more), minus(self.beside, turning), strict=True)]
         # What does not, by the first that it has of what comes from outside.
         self.rigid = {x: [first(p, x) for p in left] for x in ("e", "a", "h", "r")}
+        self.near = near_target(loop, self.h)
         self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
@@ -136,15 +121,22 @@ class Held:
         mean = self.rates[0] + self.h / 2 * self.rates[1] + self.h * self.h / 6 * self.rates[2]
         held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         self.mean = mean.at(held)
+        # What the law's torque has beside that near its target.
+        on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
+        self.unlike = [p.at(on) for p in minus(loop.u, linear)]
         # What wheels' momentum makes of the rates, beside what the law's torque does about it.
         self.turning = [with_momentum(p - g) for p, g in zip(self.more, self.gyroscopic, strict=True)]
         # The acceleration at samples, what V' has of the rates, and that linearly.
-        self.on = {"q0": 1 - var("v")}
-        self.speeding = [(p - g).at(self.on) for p, g in zip(self.pull, self.bend, strict=True)]
-        self.steep = [self.rates[0].slope(name).at(held).at(self.on) for name in STATE[RATE]]
+        rates = apply(self.near.rates, x)
+        self.odd = [p.at(on) for p in minus(self.pull, rates)]
+        self.speeding = [(p - g - own).at(on) for p, g, own in zip(self.pull, self.bend, rates, strict=True)]
+        parts = zip(self.u, self.more, linear, self.gyroscopic, self.turning, strict=True)
+        self.left = [(p + more - own - g - turning).at(on) for p, more, own, g, turning in parts]
+        steep = [self.rates[0].slope(name).at(held).at(on) for name in STATE[RATE]]
+        self.curvature = {name: [self.rates[0].slope(name).slope(other) for other in ("q0", *STATE)] for name in STATE[RATE]}
         at = dict.fromkeys((*STATE, "v", *self.others), 0)
-        self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in self.steep]
-        self.near = near_target(loop, self.h)
+        self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in steep]
+        self.steep = minus(steep, apply(self.steepness, x))
         self.s = -V.terms.get(("q0",), Fraction(0))
         self.G = [[V.slope(i).slope(k).at(dict.fromkeys(STATE, 0)).number / 2 for k in STATE] for i in STATE]
         demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
@@ -189,10 +181,9 @@ class Held:
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
         away, (turned, rated) = sizes[ANGLE], self.noise
         near = sizes | {"v": away * away}
-        unlike = minus(self.loop.u, apply(self.near.torque, [var(name) for name in STATE]))
         linear = {"q": turned / 2, "w": rated}
         curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
-        less = [(full[k] - felt(unlike, k, near, self.on)) * x - full[k] * curved[k] for k, x in linear.items()]
+        less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
         return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
 
     def size(self, letter: str) -> Fraction:
@@ -215,11 +206,11 @@ class Held:
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
-        sizes, x = region.sizes, [var(name) for name in STATE]
+        sizes = region.sizes
         near = sizes | {"v": 1 - region.least}
         # In an ellipsoid c.x is no more than the root of c.Xc.
         even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
-        odd = [most(p.at(self.on), near) for p in minus(self.pull, apply(self.near.rates, x))]
+        odd = [most(p, near) for p in self.odd]
         held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
         steady, uneven = self.misread(region)
         rigid = sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
@@ -246,11 +237,13 @@ class Held:
     def fall(self, region: Region) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
         h, tube, L = self.h, self.tube(region), self.rates[0]
-        x, near = [var(name) for name in STATE], region.sizes | {"v": 1 - region.least}
+        near = region.sizes | {"v": 1 - region.least}
         bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
         push = tube.held + tube.pushed
-        # How far pushes of size 1 take the rates from where they go without.
-        away = settled(lambda d: [h * (norm(n) + y) for n, y in zip(self.N, reach(bent, d), strict=True)])
+        demand(push > 0, "nothing pushes")
+        # How far pushes take the rates from where they go without.
+        pushed = [tube.push * norm(row) for row in self.N]
+        away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(bent, d), strict=True)])
         slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
         moved = [*tube.drift, *[tube.turned] * 3]
         # What changes of momentum do to V, which is less than what their torques do to the body.
@@ -260,14 +253,13 @@ class Held:
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
         rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
         # So does what V' has of the rates, which pushes change.
-        left = [most(p, near) for p in minus(self.steep, apply(self.steepness, x))]
-        for name, d, off in zip(STATE[RATE], away, left, strict=True):
-            curved = [most(L.slope(name).slope(other), tube.sizes) for other in ("q0", *STATE)]
-            rest += push * d / 2 * (off + reach([curved], [tube.turned, *moved])[0])
-        rest += h / 12 * push * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
+        for name, d, p in zip(STATE[RATE], away, self.steep, strict=True):
+            curved = [most(p, tube.sizes) for p in self.curvature[name]]
+            rest += d / 2 * (most(p, near) + reach([curved], [tube.turned, *moved])[0])
+        rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
         onward = self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0))
         growing = [[h / 2 * y for y in row] for row in times(self.felt, onward)]
-        growing += [[norm(away) / 2 * y for y in row] for row in self.steepness]
+        growing += [[norm(away) / (2 * push) * y for y in row] for row in self.steepness]
         # |a| + |b| + |c| <= sqrt(1 + 2/w) |(a, wb, wc)| with w = sqrt(WEIGHT).
         F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
@@ -285,7 +277,7 @@ class Held:
     def astray(self, region: Region, tube: Tube) -> list[Fraction]:
         """Return how far the rates are in a period from where the acceleration that is linear in the sample takes them."""
         sizes = region.sizes | {"v": 1 - region.least}
-        left = [most(p, sizes) for p in minus(self.speeding, apply(self.near.rates, [var(name) for name in STATE]))]
+        left = [most(p, sizes) for p in self.speeding]
         bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
         columns = zip(left, reach(bent, tube.drift), self.N, strict=True)
         return [self.h * (a + b + tube.push * norm(n)) for a, b, n in columns]
@@ -310,18 +302,15 @@ class Held:
     def linear(self, region: Region, swayed: Radii) -> list[tuple[Rows, Fraction]]:
         """Return pairs B, b such that samples in the region, less what noise adds linearly, at most `swayed`, are
         followed by x+ = Ax + the sum of B v, |v| <= b, with A between those of `corners`."""
-        h, N, tube, u = self.h, self.N, self.tube(region), self.u
+        h, N, tube = self.h, self.N, self.tube(region)
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
-        x, near = [var(name) for name in STATE], region.sizes | {"v": turn * turn}
-        parts = zip(u, self.more, apply(self.near.torque, x), self.gyroscopic, strict=True)
-        unlike = [p + more - own - g for p, more, own, g in parts]
-        bent = stretched([[g.slope(name) for name in STATE[RATE]] for g in self.gyroscopic], tube.sizes)
-        odd = norm(most(p.at(self.on), near) for p in minus(unlike, self.turning))
+        near = region.sizes | {"v": turn * turn}
+        odd = norm(most(p, near) for p in self.left)
         odd += felt(self.turning, "w", near) * swayed[0]
         # Rates drift from nothing on, too.
-        mean = tube.pushed + tube.stale + odd + bent * norm(self.astray(region, tube)) / 2
+        mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * norm(self.astray(region, tube)) / 2
         uneven = 2 * mean - tube.pushed - odd
         return [
             (self.near.B, tube.uneven + mean),
@@ -343,96 +332,3 @@ def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
 def over_period(held: Rows, h: Fraction) -> Rows:
     """Return the linear motion of (w, q) over a period in which the acceleration -held (w, q) does not change."""
     return plus(beside(scalar(1), scalar(0)), held, -h) + plus(beside(scalar(h / 2), scalar(1)), held, -h * h / 4)
-
-
-def least_form(p: Poly, region: Region) -> Rows:
-    """Return the matrix of a form that p is not below: two factors of x are taken out of every monomial, what is left lies
-    in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
-    sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
-    middle, radius = scalar(0, 6), scalar(0, 6)
-    for m, c in p.terms.items():
-        own, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
-        demand(set(own[-2:]) <= set(place) and len(own) > 1, "the torque is not zero at rest on target")
-        # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
-        *left, i, k = own
-        high = c * prod(sizes[name] for name in left)
-        even = all(left.count(name) % 2 == 0 for name in left) and (power == 0 or region.least >= 0)
-        low = -high if not even else Fraction(0) if left else high * region.least**power
-        ends = up(-min(low, high)), up(max(low, high))
-        for a, b in ((place[i], place[k]), (place[k], place[i])):
-            middle[a][b] += (ends[1] - ends[0]) / 4
-            radius[a][b] += (ends[1] + ends[0]) / 4
-    for i, row in enumerate(radius):
-        middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
-    return middle
-
-
-def felt(parts: list[Poly], letter: str, sizes: Sizes, at: Mapping[str, Poly] | None = None) -> Fraction:
-    """Return how much parts change at most with a vector, in norms; `at`: with polynomials in place of variables."""
-    names = [name for name in sizes if name[0] == letter]
-    return stretched([[p.slope(name).at(at or {}) for name in names] for p in parts], sizes) if names else Fraction(0)
-
-
-def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
-    """Return a bound of how much longer a matrix of polynomials makes a vector: |y x z| <= |y| |z|, and what is left by its
-    entries. Vectors from outside are no longer than each of their components may be."""
-    found = Fraction(0)
-    for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
-        names = [f"{letter}{k + 1}" for k in AXES]
-        x, y, z = map(var, names)
-        turn = [[Poly({}), -z, y], [z, Poly({}), -x], [-y, x, Poly({})]]
-        c = rows[1][0].terms.get((names[2],), Fraction(0))
-        rest = [[p - c * q for p, q in zip(a, b, strict=True)] for a, b in zip(rows, turn, strict=True)]
-        if c and not any((name,) in p.terms for row in rest for p in row for name in names):
-            rows = rest
-            found += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
-    return found + stretch([[most(p, sizes) for p in row] for row in rows])
-
-
-def lengths(X: Rows) -> Sizes:
-    """Return bounds of |w| and |q| where x.X^-1 x <= 1: no eigenvalue exceeds the largest sum of a row."""
-    parts = (([row[part] for row in X[part]], name) for part, name in ((RATE, SPEED), (TURN, ANGLE)))
-    return {name: root(max(sum(map(abs, row), Fraction(0)) for row in rows)) for rows, name in parts}
-
-
-def widened(X: Rows, swayed: Radii) -> Rows:
-    """Return the matrix of an ellipsoid that holds all that is no further than `swayed` from another one."""
-    near = [4 * swayed[i // 3] ** 2 for i in range(6)]
-    return [[2 * x + near[i] * (i == k) for k, x in enumerate(row)] for i, row in enumerate(X)] if any(near) else X
-
-
-def first(p: Poly, letter: str) -> Poly:
-    """Return the terms of which the first variable but q0 has this letter."""
-    return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
-
-
-def with_momentum(p: Poly) -> Poly:
-    """Return what of a polynomial is a product of wheels' momentum and a rate."""
-    return Poly({m: c for m, c in p.terms.items() if [name[0] for name in m] == ["h", "w"]})
-
-
-def growing(parts: list[Poly]) -> list[Poly]:
-    """Return what of polynomials vanishes with the state."""
-    return [Poly({m: c for m, c in p.terms.items() if set(m) & set(STATE)}) for p in parts]
-
-
-def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
-    """Return values by names."""
-    return dict(zip(names, values, strict=True))
-
-
-def stretch(rows: Rows) -> Fraction:
-    """Return a bound of how much longer a matrix makes a vector: of the sums of its rows and of its columns, or of all."""
-    across, down = (max(sum(map(abs, row), Fraction(0)) for row in own) for own in (rows, transpose(rows)))
-    return min(root(across * down), norm(x for row in rows for x in row))
-
-
-def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:
-    """Return bounds that a monotone change leaves bounds: what begins within them at no time leaves them."""
-    found = begun or [Fraction(0)] * 3
-    for _ in range(ITERATIONS):
-        further = change(found)
-        if all(x <= y for x, y in zip(further, found, strict=True)):
-            return found
-        found = [up(x + x / 2**20) for x in further]
-    raise RefusedError("the period is too long for the rates")

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import floats
 from starhold.certification.openness import driven_errors, measures_noisy_field, samples_of
-from starhold.kernel.held import RATE, TURN, near_target
+from starhold.kernel.held import near_target
 from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.regions import RATE, TURN
 from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, driven, linear
 from starhold.parts.contract import DEVIATIONS
 
@@ -61,7 +62,10 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     def radius(width: float, share: float) -> float:
         # Less, for what noise of the magnetic field takes.
         rarely = log(float(RARELY) * (1.0 - 1e-5) * share / samples)
-        missed: Any = lambda k: log(0.8 * (k + 1.0 / k)) - k * k / 2.0 - rarely  # noqa: E731
+
+        def missed(k: float) -> float:
+            return log(0.8 * (k + 1.0 / k)) - k * k / 2.0 - rarely
+
         return width * float(optimize.brentq(missed, 1.0, 12.0)) * MORE
 
     radii = [radius(width, share) for width, share in zip(deviations, SHARES, strict=True)]

@@ -19,9 +19,10 @@ from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.openness import Pushes, driven_errors, pushes
 from starhold.certification.subject import above
-from starhold.kernel.held import AT_REST, RATE, STATE, TURN, Held, Radii, Region, near_target, widened
+from starhold.kernel.held import Held, near_target
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
+from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Region, widened
 from starhold.kernel.theorems.pointing import image, periods, points
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
@@ -39,6 +40,8 @@ HEED = 0.5
 """How much the rates of an ellipsoid count beside its turns, until that makes no more of them smaller."""
 NEARLY = 1e-3
 """By which share the linear motion is multiplied first, for what wheels' momentum makes of it."""
+NEARER = 0.25
+"""Of the largest turn that a set holds motions end within so much, or nothing is said of where."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
 MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 8.0, 20, 24, 2000
@@ -135,7 +138,7 @@ class Chain:
             reach = highest_ratio(widened(region.X, swayed), X)
             inner = region.within(X, swayed)
             end = self.ends(inner, X, swayed)
-            if rate >= 1.0 or end[0] > angle * 0.998:
+            if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
                     break
                 heed = 0.0
@@ -282,7 +285,7 @@ class Pushed:
         told["level"] = chain.level
         told["highest"] = float(start + held.h / 2 * held.swing(held.region(start))) * MORE
         told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
-        if not isfinite(angle):
+        if not isfinite(angle) or angle > NEARER * told.get("angle", told.get("start.angle", 0.0)):
             loop.failed[POINTS] = "motions do not come near the target"
             return False
         claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids)
@@ -321,22 +324,26 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
         kept = 1.0 - shares.sum()
         if radius**2 * (1.0 + more) >= kept:
             return inf, A, shares
-        X = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
-        X = (X + X.T) / 2.0
+        found: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
+        own = (found + found.T) / 2.0
         # So much larger that no corner leaves it.
-        room = X - corners @ X @ corners.transpose(0, 2, 1) / kept
+        room = own - corners @ own @ corners.transpose(0, 2, 1) / kept
         if np.linalg.eigvalsh(room).min() <= 0.0:
             return inf, A, shares
-        X = X * np.linalg.eigvals(np.linalg.solve(room, fed)).real.max()
-        wide, turned = (float(np.log(np.linalg.eigvalsh(X[k, k])[-1])) for k in (RATE, TURN))
-        return turned + heed * wide, X, shares
+        own = own * max(float(linalg.eigh(fed, one, eigvals_only=True)[-1]) for one in room)
+        wide, turned = (float(np.log(np.linalg.eigvalsh(own[k, k])[-1])) for k in (RATE, TURN))
+        return turned + heed * wide, own, shares
 
-    weight = np.log([np.linalg.norm(B, 2) / np.linalg.norm(pushes[0], 2) + 1e-12 for B in pushes] + [NEARLY])
+    def size(x: Array) -> float:
+        return shape(x)[0]
+
+    sizes = [float(np.linalg.norm(B, 2)) for B in pushes]
+    weight = np.log(np.array([x / sizes[0] + 1e-12 for x in sizes] + [NEARLY]))
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
     options = {"maxfev": 400, "initial_simplex": begun}
-    found = optimize.minimize(lambda x: shape(x)[0], weight, method="Nelder-Mead", options=options)
-    size, X, shares = shape(found.x)
-    return (X * LARGER, [float(a) for a in shares]) if isfinite(size) else None
+    found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
+    least, X, shares = shape(found.x)
+    return (X * LARGER, [float(a) for a in shares]) if isfinite(least) else None
 
 
 def highest_ratio(a: Rows, b: Rows) -> float:

@@ -6,11 +6,12 @@ from collections.abc import Generator
 from fractions import Fraction
 from itertools import pairwise
 
-from ..held import RATE, STATE, TURN, Near, Radii
+from ..held import Near
 from ..numbers import Rows, beside, demand, matrix, plus, rational, read_list, scalar, times, transpose, up
 from ..polynomials import Poly, var
 from ..programs import Exactly, known, single
 from ..reading import Claim
+from ..regions import RATE, STATE, TURN, Radii
 from ..rules import Definite, Exceeds, Obligation
 from ..sentences import Statement, below
 
@@ -42,7 +43,7 @@ def within_radii(claim: Claim, near: Near) -> Generator[tuple[str, Obligation], 
         "motion's turn": TURN,
     }
     widths = [rational(x) for x in read_list(claim.evidence["deviations"], len(parts))]
-    wide, turned = map(rational, read_list(claim.evidence["swayed"], 2))
+    wide, turned = (rational(x) for x in read_list(claim.evidence["swayed"], 2))
     radii = numbers["noise.attitude"], numbers["noise.rate"], wide, turned
     # The last sample before those of the list is like their last.
     for k, ((before, after), step) in enumerate(zip(pairwise([shapes[-1], *shapes]), steps, strict=True)):

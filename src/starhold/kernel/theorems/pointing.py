@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from ..held import AT_REST, RATE, TURN, Held, widened
+from ..held import Held
 from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
+from ..regions import AT_REST, RATE, TURN, widened
 from ..rules import Definite, Exceeds
 from ..sentences import Statement, above, below, enumerated
 from .attitude import Proof, contents
@@ -27,9 +28,9 @@ def points(claim: Claim) -> Proof:
     loop = AttitudeLoop(claim)
     yield from loop.sound()
     held, numbers, samples = Held(loop), claim.numbers, 0
-    noise, swayed = (
-        (yield from within_radii(claim, held.near)) if SHARE in numbers else (Statement("", ()), (Fraction(0),) * 2)
-    )
+    noise, swayed = Statement("", ()), AT_REST
+    if SHARE in numbers:
+        noise, swayed = yield from within_radii(claim, held.near)
     c, h = numbers["level"], held.h
     start = yield from contents(loop, loop.lyapunov)
     region = held.region(c)
@@ -59,7 +60,7 @@ def points(claim: Claim) -> Proof:
         pushed = held.linear(region, swayed)
         for corner, A in enumerate(held.corners()):
             after = image(X, shares, A, pushed)
-            yield f"ellipsoid {k}, momentum {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
+            yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
         yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(region.X, swayed), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
