@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         design,
         export_aem,
         export_c,
+        export_requirements,
         failures,
         invariant,
         linearise,
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
         simulate,
         sweep,
         to_pandas,
+        verify,
     )
     from starhold.api import make_scenario as scenario
     from starhold.errors import InputError
@@ -62,6 +64,7 @@ __all__ = [
     "design",
     "export_aem",
     "export_c",
+    "export_requirements",
     "failures",
     "invariant",
     "linearise",
@@ -76,6 +79,7 @@ __all__ = [
     "simulate",
     "sweep",
     "to_pandas",
+    "verify",
 ]
 
 

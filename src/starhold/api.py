@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
     from starhold.studies.linear import LinearLoop
     from starhold.studies.modal_roots import Study
+    from starhold.studies.verification import RequirementVerdict
 
 
 @shortly
@@ -267,6 +268,24 @@ def export_aem(
 
 
 @shortly
+def export_requirements(
+    scenario: reading.Scenario | str | Path, file: str | Path, original: str | Path | None = None
+) -> Path:
+    """Write the requirements of a scenario, with their attributes, to a CSV or ReqIF file, by its suffix, and return the
+    path. original: a ReqIF file whose content is kept but for what differs in the requirements. A scenario reads such files
+    where a [[requirement]] names one as its `file`. InputError for another suffix and for what cannot be written."""
+    from starhold.scenario.requirement_files import write_requirement_file
+
+    into = Path(file)
+    try:
+        tables = reading.open_scenario(scenario).table.requirement
+        write_requirement_file(tables, into, None if original is None else Path(original))
+    except OSError as error:
+        raise InputError(str(error.filename or into), "", f"{error.strerror}", "files that can be used") from None
+    return into
+
+
+@shortly
 def read_aem(file: str | Path) -> Aem:
     """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
     the reference frame to the body's axes), and what it is about. InputError where it is none."""
@@ -305,6 +324,14 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> B
     Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
     a DataFrame with every axis. InputError where nothing disturbs the loop, windows do not fit, or a motion is lost."""
     return studied("budget", scenario, law)
+
+
+@shortly
+def verify(scenario: reading.Scenario | str | Path, law: str | None = None) -> tuple[RequirementVerdict, ...]:
+    """Tell which requirements of a scenario a law keeps, the first law if not given: a verdict for each [[requirement]], in
+    the order of the file, with its number, limit and margin (SI), and what it rests on. Each method is used once, and only
+    those that are asked for. InputError for any mistake in a requirement, before anything is flown."""
+    return studied("verify", scenario, law)
 
 
 @shortly

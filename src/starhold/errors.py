@@ -1,7 +1,8 @@
 """Errors that a user can cause are one line; the command line ends with exit code 2 on it."""
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from functools import wraps
 from typing import Any, TypeVar, cast
 
@@ -33,6 +34,15 @@ class InputError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return InputError, (self.where, self.key, self.given, self.allowed)
+
+
+@contextmanager
+def input_at(where: str, key: str, given: str = "") -> Generator[None]:
+    """Refuse as the user's input there what raises a ValueError."""
+    try:
+        yield
+    except ValueError as error:
+        raise InputError(where, key, given, str(error)) from None
 
 
 def shortly(function: _Function) -> _Function:

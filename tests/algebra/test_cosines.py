@@ -11,7 +11,7 @@ from starhold.algebra import vector
 from starhold.algebra.cosines import from_angles, from_quaternion, to_angles, to_quaternion
 from starhold.algebra.quaternion import multiply, nearer, normalise, to_body
 from starhold.algebra.vector import apply, combine, determinant, transpose
-from tests.algebra.readers import angles, close, from_axis_angle, quaternions, rotation, small_vectors, symbols, zero
+from tests.algebra.readers import angles, close, from_axis_angle, quaternions, symbols, zero
 
 P, Q, R = symbols("p0:4"), symbols("q0:4"), symbols("r1:4")
 N2 = sum(c * c for c in Q)
@@ -31,13 +31,6 @@ def test_homomorphism_and_action_are_exact():
     assert zero(combine(1, from_quaternion(multiply(P, Q)), -1, vector.multiply(from_quaternion(Q), from_quaternion(P))))
     difference = vector.subtract(apply(from_quaternion(Q), R), to_body(Q, R))
     assert zero(vector.subtract(difference, vector.scale(N2 - 1, R)))
-
-
-@given(quaternions, small_vectors)
-def test_from_quaternion_agrees_with_scipy(q, r):
-    a = from_quaternion(q)
-    assert close(a, tuple(map(tuple, rotation(q).inv().as_matrix())), 2e-15)
-    assert close(apply(a, r), to_body(q, r), 3e-15)
 
 
 def distance(p, q):
@@ -79,13 +72,6 @@ def test_angles_round_trip(q):
     assert -math.pi <= roll <= math.pi
     near_gimbal_lock = math.cos(pitch) < 1e-3
     assert distance(from_angles(yaw, pitch, roll), q) < (3e-7 if near_gimbal_lock else 1e-12)
-
-
-@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
-def test_angles_agree_with_scipy_away_from_gimbal_lock(yaw, pitch, roll):
-    found = to_angles(from_angles(yaw, pitch, roll))
-    assert close(found, (yaw, pitch, roll), 1e-12)
-    assert close(found, tuple(rotation(from_angles(yaw, pitch, roll)).as_euler("ZYX")), 1e-12)
 
 
 @given(angles, angles, st.sampled_from((-1.0, 1.0)), st.sampled_from((0.0, 1e-16, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)))

@@ -130,21 +130,6 @@ def test_a_ball_encloses_the_value_at_each_of_its_points(x, y, dx, dy, u, v):
     assert less(wide_x, wide_y) in (None, less(at_x, at_y))
 
 
-def test_symbols():
-    x, y = sympy.symbols("x y", real=True)
-    for a, b in itertools.product((-2, 0, 3), (-1, 0, 3)):
-        here = {x: a, y: b}
-        assert float(absolute(x).subs(here)) == abs(a)
-        assert float(minimum(x, y).subs(here)) == min(a, b)
-        assert float(maximum(x, y).subs(here)) == max(a, b)
-        assert float(sign(x).subs(here)) == np.sign(a)
-        assert float(side(x).subs(here)) == (-1 if a < 0 else 1)
-        assert float(where(both(less(x, y), less(y, 2)), x, y).subs(here)) == (a if a < b < 2 else b)
-        assert float(where(either(less(x, y), less(y, 0.0)), x, y).subs(here)) == (a if a < b or b < 0 else b)
-        assert float(where(opposite(less(x, y)), x, y).subs(here)) == (b if a < b else a)
-    assert sqrt(x**2) == sympy.Abs(x)
-
-
 def test_numpy_scalars_are_plain_numbers():
     x = np.float64(2.0)
     assert clip(x, 1.0) == 1.0

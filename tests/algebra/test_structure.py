@@ -4,14 +4,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.structure import buffers, flatten, move, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.loop.kernels import numbers_of, state_of
-from starhold.trace.calling import Compiled
 from tests.algebra.readers import bits, leaves, numbers, same
 
 
@@ -83,11 +81,6 @@ def test_move(which):
     check()
 
 
-def test_move_symbols():
-    x, h, r = sympy.symbols("x h r")
-    assert move((x, (x, 2 * x)), h, (r, None)) == (x + h * r, (x, 2 * x))
-
-
 def test_move_refuses_a_rate_of_another_shape():
     for rate in ((1.0,), (1.0, 2.0, 3.0)):
         with pytest.raises(ValueError, match="zip"):
@@ -122,12 +115,3 @@ def test_buffers_change_in_place():
     assert [copied.plan[0], copied.plan[1]] == [8.0, 9.0]
     copied.plan[0] = 0.0
     assert memory.plan[0] == 2.0
-
-
-@pytest.mark.parametrize("lanes", [1, 8, 9])
-def test_every_lane_moves_as_one_state_does(lanes):
-    columns = np.random.default_rng(lanes).normal(size=(SIZE, lanes))
-    rate = unflatten(np.random.default_rng(1).normal(size=SIZE), LIKE)._replace(inner=None)
-    moved = Compiled(lambda state: move(state, 0.1, rate), LIKE).over(columns)
-    alone = np.array([flatten(move(unflatten(column, LIKE), 0.1, rate)) for column in columns.T]).T
-    np.testing.assert_array_equal(moved, alone)

@@ -11,8 +11,6 @@ from starhold.algebra.vector import (
     ZERO,
     add,
     apply,
-    clip_axes,
-    clip_norm,
     column,
     combine,
     cross,
@@ -32,7 +30,7 @@ from starhold.algebra.vector import (
     transpose,
     unit,
 )
-from tests.algebra.readers import agree, close, leaves, matrices, positives, same, symbols, vectors, zero
+from tests.algebra.readers import agree, leaves, matrices, positives, symbols, vectors, zero
 
 A, B, C, D = (symbols(f"{name}1:4") for name in "abcd")
 M = (symbols("m1:4"), symbols("m4:7"), symbols("m7:10"))
@@ -76,42 +74,6 @@ def test_swing_is_the_gyroscopic_torque():
     # It does no work and turns no momentum into length.
     assert zero((dot(A, gyroscopic_torque(SYMMETRIC, A)), dot(apply(SYMMETRIC, A), gyroscopic_torque(SYMMETRIC, A))))
     assert zero((dot(A, gyroscopic_torque(B, A)), dot(apply(B, A), gyroscopic_torque(B, A))))
-
-
-@pytest.mark.parametrize("axis", range(3))
-def test_swing_vanishes_exactly_along_a_principal_axis(axis):
-    moments = (2.1, 3.3, 4.7)
-    rate = tuple(0.7 * (i == axis) for i in range(3))
-    assert same(gyroscopic_torque, moments, rate) == ZERO
-    assert same(gyroscopic_torque, diagonal(moments), rate) == ZERO
-
-
-@given(vectors, positives)
-def test_limits(a, limit):
-    boxed = clip_axes(a, limit)
-    assert all(abs(x) <= limit for x in boxed)
-    assert clip_axes(boxed, limit) == boxed
-    assert all(x == y for x, y in zip(a, boxed, strict=True) if abs(x) <= limit)
-    short = clip_norm(a, limit)
-    assert norm(short) <= limit * (1.0 + 4e-16)
-    if norm(a) <= limit:
-        assert short == a
-    else:
-        assert math.isclose(norm(short), limit, rel_tol=4e-16)
-        assert close(cross(unit(a), unit(short)), ZERO, 4e-16)
-        assert dot(a, short) > 0.0
-
-
-def test_limits_at_their_ends():
-    assert same(clip_norm, ZERO, 1.0) == ZERO
-    assert same(clip_axes, ZERO, 1.0) == ZERO
-    for a in ((3.0, -4.0, 12.0), ZERO, (1e-300, 0.0, 0.0)):
-        assert same(clip_norm, a, math.inf) == a
-        assert same(clip_axes, a, math.inf) == a
-    assert same(clip_norm, (3.0, -4.0, 0.0), 5.0) == (3.0, -4.0, 0.0)
-    for x in same(clip_norm, (math.nan, 1.0, 0.0), 2.0):
-        assert math.isnan(x)
-    assert math.isnan(same(clip_axes, (math.nan, 1.0, 0.0), 2.0)[0])
 
 
 @given(vectors)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from starhold.algebra.scalar import side
 from starhold.analysis.departure import CHANGES, LOST, TURNED, departures, fed_back, shown_at, start_inside, value_of
 from starhold.certification.assumptions import ASSUMPTIONS, WITHOUT, assumption
-from starhold.certification.certificate import BESIDE, Certificate, Claim, Obligation, write
+from starhold.certification.certificate import BESIDE, Certificate, write
 from starhold.certification.certify import certify
 from starhold.certification.evidence.isotropic import Shape
 from starhold.certification.proofs import IN_THE_LOOP
@@ -26,7 +26,6 @@ from starhold.report.proved import section
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import Recording, fly, label
-from starhold.studies.certificates import certify_scenario
 from starhold.studies.compare import fly_law, prove
 from tests.making import built
 from tests.missions import BASE as MISSION
@@ -34,6 +33,7 @@ from tests.missions import DETUMBLE, POINT
 from tests.tiers import fewer
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
+ROTOR = "[[wheel]]\naxis = {}\ninertia = 1e-5\ntorque_limit = 1.0\nmomentum_limit = 5.0\nmomentum = {}\n"
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
 
 
@@ -149,6 +149,11 @@ def test_a_flight_that_is_driven_out_of_its_set_is_told_when():
     assert departures(certificate, loop, struck)["convergence"] == ()
 
 
+def test_noisy_sensors_do_not_keep_a_start_from_being_judged():
+    loop = built(parse(BASE + "\n[sensor]\nrate_noise = 1e-5\n" + LAW, "here"))
+    assert start_inside(certify(loop, "lyapunov"), loop)["torque-limit"] is False
+
+
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.tuples(*[st.floats(-0.06, 0.06)] * 3))
 @settings(max_examples=fewer(30))
 def test_the_limit_is_kept_by_every_flight_that_does_not_leave_the_claim(turn, rate):
@@ -178,9 +183,6 @@ def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
     assert list(left) == ["region"]
     assert left["region"][0].time == 0.0
     assert "not even the linear loop is stable" in left["region"][0].how
-
-
-ROTOR = "[[wheel]]\naxis = {}\ninertia = 1e-5\ntorque_limit = 1.0\nmomentum_limit = 5.0\nmomentum = {}\n"
 
 
 WHIRLING = """
@@ -386,15 +388,3 @@ def test_the_linear_loop_alone_proves_no_certificate(tmp_path):
     assert passed(check_file(path))
     path.write_text(path.read_text().replace('"outcome": "undecided"', '"outcome": "proved"', 1))
     assert "does not follow" in " ".join(finding.reason for finding in check_file(path) if finding.verdict == "fails")
-
-
-def test_noisy_sensors_do_not_keep_a_start_from_being_judged():
-    text = BASE + "\n[sensor]\nrate_noise = 1e-5\n" + LAW
-    (tried,) = certify_scenario(parse(text, "here"))
-    assert tried.start_inside["torque-limit"] is False
-
-
-def test_a_claim_that_is_not_proved_is_left_by_nothing():
-    loop, _, flight, _ = flown(BASE + LAW)
-    open_claim = Claim("convergence", {}, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "none"}),))
-    assert departures(Certificate("x", {}, (open_claim,)), loop, flight.recording) == {}

@@ -8,22 +8,6 @@ from scipy import stats
 from starhold.analysis import pointing
 from starhold.analysis.pointing import about_axes, figures, indices, level, root_sum_square
 
-LENGTH, APART = 20, 35
-
-
-def test_indices_of_a_sine_are_those_of_the_closed_forms():
-    """Of a sine sampled at no whole part of its period, every phase comes up."""
-    amplitude, turn = 3e-4, 0.0317
-    errors = np.zeros((1, 40_000, 3))
-    errors[0, :, 1] = amplitude * np.sin(turn * np.arange(40_000) + 0.4)
-    found = {name: np.abs(vectors[..., 1]).max() for name, vectors in indices(errors, LENGTH, APART).items()}
-    mean = np.sin(0.5 * LENGTH * turn) / (LENGTH * np.sin(0.5 * turn))
-    # At the edge of a window it is farthest from the mean; the mean is that of a sine in phase with the middle.
-    edge = abs(np.exp(0.5j * (LENGTH - 1) * turn) - mean)
-    expected = {"APE": 1.0, "MPE": mean, "RPE": edge, "PDE": 2.0 * mean * np.sin(0.5 * APART * turn)}
-    for name, share in expected.items():
-        assert found[name] == pytest.approx(amplitude * share, rel=1e-4), name
-
 
 @pytest.mark.parametrize(("length", "apart"), [(1, 1), (2, 5), (16, 3), (25, 25)])
 def test_indices_are_those_of_rolling_means(length, apart):

@@ -49,12 +49,6 @@ def test_the_tables_of_a_file_make_its_scenario(name):
     assert tomllib.loads(made.text) == tomllib.loads(loaded.text)
 
 
-def test_it_flies_as_the_file_of_its_text(tmp_path):
-    made = sh.scenario(BODY)
-    (tmp_path / "made.toml").write_text(made.text)
-    assert sh.simulate(made).identical(sh.simulate(tmp_path / "made.toml"))
-
-
 def test_arrays_tuples_paths_and_none_are_taken(tmp_path):
     (tmp_path / "h.csv").write_text("0,1,0,0,0\n10,1,0,0,0\n20,1,0,0,0\n30,1,0,0,0\n")
     given = BODY | {
@@ -154,20 +148,6 @@ def test_keys_of_tables_lists_and_laws_by_name_or_place():
     fault = [{"time": 3.0, "wheel": 1, "lost": True}]
     wheels = sh.load("wheels-orbital").with_({"fault": fault, "wheels.momentum": 0.01})
     assert wheels.with_({"fault[1].time": "5 s"}).table.fault[0].time == 5.0
-
-
-def test_station_keeping_is_made_and_changed_alike():
-    tables = {
-        "name": "made",
-        "libration": {},
-        "initial": {"position": [0, 0.5, 0.1]},
-        "simulation": {"duration": 1.0},
-        "law": [{"type": "l2-equilibrium", "form": "degree"}],
-    }
-    made = sh.scenario(tables).with_({"libration.point": "L1", "control.limit": 4.0})
-    assert made.laws[0].options.limit == 4.0
-    assert made.craft.from_smaller < 0.0
-    assert "linear-gravity" in sh.simulate(made).attrs["parts"]
 
 
 def test_gains_known_to_be_unstable_stay_allowed():

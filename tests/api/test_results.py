@@ -6,8 +6,9 @@ from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.scenario.reading import builtin_names, load
+from tests.tiers import leading
 
-STEPS = 40
+STEPS, FEW = 40, ("l2-circle", "landing", "wheels-orbital", "cubesat-nadir")
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def test_a_run_holds_the_angle_to_the_target(short):
     assert run["error_angle"].attrs == {"units": "rad", "long_name": "angle to the target"}
 
 
-@pytest.mark.parametrize("name", builtin_names())
+@pytest.mark.parametrize("name", leading(dict.fromkeys([*FEW, *builtin_names()]), len(FEW)))
 def test_every_number_of_a_flight_has_its_unit(name):
     whole = load(name)
     timing = whole.table.simulation

@@ -31,10 +31,10 @@ OVER = {
 }
 ASKED = [
     {"metric": "settling_time", "at_most": "30 s", "share": 0.9, "confidence": 0.9},
-    {"name": "pointing", "metric": "final_attitude_error", "at_most": "0.5 deg", "share": "90 %"},
-    {"name": "kept", "metric": "lost"},
+    {"id": "pointing", "metric": "final_attitude_error", "at_most": "0.5 deg", "share": "90 %"},
+    {"id": "kept", "metric": "lost"},
     {
-        "name": "sun",
+        "id": "sun",
         "metric": "exclusion-cone",
         "axis": [0, 0, 1],
         "direction": [0, 1, 0],

@@ -144,27 +144,8 @@ def test_other_bodies_fly_campaigns_too(tmp_path):
         own_flight(found, run, law)
 
 
-def test_planted_drivers_are_found(tmp_path):
-    # Only heavy craft with weak actuators are late, whatever else differs.
-    over = {
-        "spacecraft.torque_limit": uniform(0.02, 0.12),
-        "initial.rate[1]": uniform(0.0, 0.25),
-        "initial.rate[2]": uniform(-0.002, 0.002),
-        "sensor.rate_noise": uniform(1e-5, 2e-4),
-    }
-    scenario = small(initial__attitude=[1, 0, 0, 0], simulation__duration=30.0)
-    asked = [{"metric": "settling_time", "at_most": "15 s", "share": 0.9}]
-    found = fly(tmp_path / "c", scenario=scenario, runs=1500, over=over, requirement=asked, law="pd")
-    drivers = found.laws[0].drivers
-    assert 40 < drivers.failures < 1000
-    wanted = {"spacecraft.torque_limit", "initial.rate[1]"}
-    assert {driver.input for driver in drivers.inputs[:2]} == wanted
-    assert [set(driver.inputs) for driver in drivers.pairs if driver.significant] == [wanted]
-    assert not {driver.input for driver in drivers.inputs[2:] if driver.significant}
-
-
 def test_ends_once_all_is_decided(tmp_path):
-    asked = [{"name": "easy", "metric": "final_rate_error", "at_most": "60 deg/s", "share": 0.99}]
+    asked = [{"id": "easy", "metric": "final_rate_error", "at_most": "60 deg/s", "share": 0.99}]
     options = {"requirement": asked, "runs": 20_000, "law": "pd", "until_decided": True}
     scenario = small(simulation__duration=2.0)
     found = fly(tmp_path / "a", scenario=scenario, **options)
@@ -241,20 +222,3 @@ def test_lost_runs_have_a_time_and_no_metrics(tmp_path):
     assert (frame["failed"] == lost).all()
     run = int(np.flatnonzero(lost)[0])
     assert same(found.again(run).flight.lost, frame["diverged_at"][run])
-
-
-@pytest.mark.parametrize(("sampling", "runs"), [("morris", 40), ("saltelli", 64)])
-def test_designs_give_indices_in_place_of_tests(tmp_path, sampling, runs):
-    over = {
-        "law.pd.k_rate": uniform(1.0, 3.0),
-        "sensor.rate_noise": uniform(1e-6, 2e-6),
-        "initial.rate[3]": uniform(-0.05, 0.05),
-    }
-    asked = [{"metric": "settling_time", "at_most": "30 s", "share": 0.9}]
-    law = fly(tmp_path / "c", runs=runs, sampling=sampling, over=over, requirement=asked, law="pd").laws[0]
-    assert law.drivers is None
-    found = law.indices["settling_time"]
-    strength = found.mu_star if sampling == "morris" else found.total
-    assert found.names[int(np.argmax(strength))] in ("law.pd.k_rate", "initial.rate[3]")
-    assert strength[found.names.index("sensor.rate_noise")] < 0.1 * max(strength)
-    assert law.verdicts[0].lower is None

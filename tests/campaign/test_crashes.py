@@ -48,6 +48,14 @@ def group(leader):
     return living
 
 
+def wait_for_end(driver):
+    """Workers do not outlive their driver."""
+    end = time.monotonic() + 20.0
+    while group(driver.pid):
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
 def kill_worker_once(trail):
     """What to do after the first chunk: end the worker that flies a block at that moment."""
     killed = []
@@ -104,11 +112,13 @@ def test_a_killed_scheduler_ends_the_campaign_which_can_be_resumed(tmp_path, sto
 @pytest.mark.parametrize("engine", ["threads", "workers"])
 def test_a_killed_driver_leaves_what_can_be_resumed(tmp_path, expected, engine):
     folder = tmp_path / "campaign"
-    driver = start("tests.campaign.toy", str(folder), engine, "100", "16", "0.2", stdout=subprocess.PIPE)
+    told = {"stdout": subprocess.PIPE, "start_new_session": True}
+    driver = start("tests.campaign.toy", str(folder), engine, "100", "16", "0.2", **told)
     driver.stdout.readline()
     driver.stdout.readline()
     driver.kill()
     driver.communicate()
+    wait_for_end(driver)
     assert 2 <= len(chunks(folder)) < 14
     # What a write leaves that is cut off at the worst instant.
     half = folder / "runs" / "pd" / f"{files.UNFINISHED}half"
@@ -135,10 +145,7 @@ def test_an_interrupt_while_workers_start_ends_all_of_them_quietly(tmp_path):
     _, said = driver.communicate(timeout=60)
     assert said.count("Traceback") == 1
     assert said.endswith("\nKeyboardInterrupt\n")
-    end = time.monotonic() + 20.0
-    while group(driver.pid):
-        assert time.monotonic() < end
-        time.sleep(0.1)
+    wait_for_end(driver)
 
 
 def test_another_process_that_writes_there_is_refused(tmp_path):

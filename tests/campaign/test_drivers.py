@@ -1,7 +1,6 @@
 """Drivers against SciPy's statistics, planted causes, and chance."""
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -219,15 +218,3 @@ def test_corrected_chances_are_those_of_holm(rng):
     assert all(driver.p <= driver.corrected <= 1.0 for driver in every)
     ordered = sorted(every, key=lambda driver: driver.p)
     assert [driver.corrected for driver in ordered] == sorted(driver.corrected for driver in ordered)
-
-
-@pytest.mark.slow
-def test_many_runs_take_little_time(rng):
-    inputs = draws(rng, runs=100_000, count=19)
-    failed = (inputs["x1"] > 0.7) & (inputs["x2"] > 0.7) & (rng.uniform(size=100_000) < 0.2)
-    metrics = {f"m{number}": rng.normal(size=100_000) for number in range(6)}
-    started = time.perf_counter()
-    drivers = find_drivers(inputs, failed, metrics)
-    assert time.perf_counter() - started < 4.0
-    assert told_pairs(drivers) == [{"x1", "x2"}]
-    assert len(drivers.pairs) == 190

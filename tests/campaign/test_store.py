@@ -282,13 +282,6 @@ def test_a_folder_with_a_campaign_is_not_written_over(store):
     assert sorted(path.name for path in store.folder.iterdir()) == ["manifest.json", "mine.txt"]
 
 
-def test_totals_stand_beside_the_digest(store):
-    expected = fly(store)
-    content = json.loads(store.finish(expected, {"failed": {"pd": 3}, "quantile": np.inf}).read_text())
-    assert (content["digest"], content["runs"]) == (expected, {"pd": 100, "lyapunov": 100})
-    assert (content["failed"], content["quantile"]) == ({"pd": 3}, "inf")
-
-
 def test_unknown_names_are_told(flown):
     with pytest.raises(InputError, match='found column "x"; allowed: run, initial'):
         flown.columns(["x"], "pd")

@@ -1,6 +1,5 @@
 """What keys hold, and what numbers with units mean there."""
 
-import pickle
 import re
 import tomllib
 
@@ -11,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from starhold.campaign.dispersions import read_dispersions
-from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
-from starhold.scenario.reading import builtin_text, load, parse
+from starhold.scenario.reading import load, parse
 from starhold.scenario.values import _filled, accepted, locate, width_at
 from starhold.scenario.writing import template_text
 from tests.refusals import refused
@@ -97,19 +95,6 @@ def test_a_changed_value_is_read_back_exactly(key, value):
     assert value_at(scenario.with_({key: value}), key) == value
 
 
-def test_what_is_read_is_what_is_flown():
-    loop = build(NOISE, NOISE.laws[0])
-    assert loop.gains.k_rate == value_at(NOISE, "law.lyapunov.k_rate")
-    assert loop.craft.inertia == value_at(NOISE, "spacecraft.inertia")
-    assert loop.start.rate == value_at(NOISE, "initial.rate")
-
-
-def test_a_place_can_be_sent_to_another_process():
-    for key in ("law.mpc.horizon", "spacecraft.limit", "orbit.position"):
-        place = locate(NOISE, key)
-        assert pickle.loads(pickle.dumps(place)) == place
-
-
 REFUSED = {
     "spacecraf.inertia": "spacecraft?",
     "spacecraft.inertai": "inertia?",
@@ -153,26 +138,6 @@ def test_a_key_that_leads_nowhere_is_told_in_one_line(key):
 def test_a_number_that_the_key_refuses_is_told_in_one_line(key, raw, said):
     with refused(f'campaign.over."{key}".low: found ', said):
         number_at(NOISE, key, raw, "low")
-
-
-TABLE = """
-[campaign]
-runs = 852
-sampling = "latin-hypercube"
-[campaign.over]
-"initial.rate" = { distribution = "shell", high = "4 deg/s" }
-[[campaign.requirement]]
-metric = "settling_time"
-at_most = "2 min"
-share = "99.73 %"
-"""
-
-
-def test_every_body_takes_a_campaign():
-    for name in ("geostationary", "l2-circle"):
-        campaign = parse(f"{builtin_text(name)}{TABLE}", "my.toml").table.campaign
-        assert (campaign.runs, campaign.seed, campaign.requirement[0].share) == (852, 1, pytest.approx(0.9973, rel=1e-15))
-        assert campaign.over["initial.rate"].high == "4 deg/s"
 
 
 @pytest.mark.parametrize("body", ["rigid-body", "libration-point"])

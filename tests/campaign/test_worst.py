@@ -215,7 +215,7 @@ def random_mission(random):
     over = {key: drawn[key] for key in random.choice(possible, int(random.integers(1, 4)), replace=False)}
     metrics = ["peak_torque", "peak_torque_norm", some("final_attitude_error", "final_rate_error", "effort", "peak_rate")]
     asked = [{"metric": metric, some(*["at_most"] * 5, "at_least"): 1.0, "share": 0.5} for metric in metrics]
-    return tables | {"campaign": {"runs": 12, "over": over, "requirement": asked}}
+    return tables | {"campaign": {"runs": 12, "over": over}, "requirement": [one | {"method": "campaign"} for one in asked]}
 
 
 @pytest.mark.slow

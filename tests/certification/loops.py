@@ -93,13 +93,6 @@ def rotors(law, gains, target=None, layout=pyramid, **changes):
     return loop if target == ORBITAL else free(loop)
 
 
-def random_craft(random):
-    """A body of random masses, with a full tensor."""
-    points = random.normal(size=(6, 3)) * random.uniform(0.5, 2.0, size=3)
-    inertia = np.trace(points.T @ points) * np.eye(3) - points.T @ points
-    return make_craft(inertia, torque_limit=0.05)
-
-
 def is_pointing(claim):
     """Whether it is a claim that takes in what parts say."""
     return (claim.kind, claim.outcome) == ("pointing", "proved")

@@ -23,7 +23,7 @@ FOUND = (12, 15, 30, 58, 66, 90, 91, 98, 118, 2489, 3239, 22, 71, 111, 196, 2102
 """Seeds of scenarios that certifier, checker or flights once did not agree on, last those that take long."""
 
 
-@pytest.mark.parametrize("seed", leading(FOUND, 11))
+@pytest.mark.parametrize("seed", leading(FOUND, 6))
 def test_hunted_scenarios(seed, tmp_path):
     text = random_scenario(np.random.default_rng(seed), tmp_path)
     assert fault_in(text, tmp_path) == ""
@@ -66,8 +66,9 @@ def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_
     assert not any(f.verdict == "holds" for f in found if f.claim in undecided)
 
 
-@pytest.mark.parametrize("compensation", [0.0, 0.3, 1.0])
-@pytest.mark.parametrize("wheels", [False, True])
+@pytest.mark.parametrize(
+    ("compensation", "wheels"), leading([(0.3, True), (0.0, False), (0.3, False), (1.0, False), (0.0, True), (1.0, True)], 2)
+)
 def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tmp_path):
     gains = wheel.Gains(0.09, (0.0045, 0.0045, 0.0045), compensation)
     certificate = certify(rotors("wheel", gains), "wheel") if wheels else certify(loop_of("wheel", gains), "wheel")
@@ -104,9 +105,9 @@ THIN = ([1e-14, 1.0, 1.0], [1e-20, 1.0, 1.0], [1e-14, 1e-14, 1e-14], [1e3, 1e3, 
 @pytest.mark.parametrize(
     ("law", "number", "moments"),
     [
-        # The first gains of each law on one of the bodies; what is left is slow.
-        pytest.param(law, number, moments, marks=pytest.mark.slow if number or place != turn % len(THIN) else ())
-        for turn, law in enumerate(("pd", "lyapunov", "lqr", "sliding", "modal", "wheel"))
+        # Each body with the first gains of one law; what is left is slow.
+        pytest.param(law, number, moments, marks=pytest.mark.slow if number or place != turn else ())
+        for turn, law in enumerate(("lqr", "modal", "wheel", "sliding", "pd", "lyapunov"))
         for number in range(1 if law == "modal" else len(catalogue()[law].examples()))
         for place, moments in enumerate(THIN)
     ],
@@ -142,12 +143,3 @@ def test_states_are_drawn_from_the_set_however_small_it_is():
             assert values.max() >= level * (1.0 - 1e-6)
             states[4:7] = 0.0
             assert height(states).max() >= 0.9 * level
-
-
-@pytest.mark.parametrize(
-    ("rate", "attitude"), leading([(1e25, 1e26), (1e-30, 1e30), (1e30, 1e30), (1e-25, 1e-20), (1e30, 1e-30)], 2)
-)
-def test_gains_that_floats_cannot_fly_are_certified_all_the_same(rate, attitude, tmp_path):
-    text = 'name = "far"\n[spacecraft]\ninertia = [2, 3, 4]\n[simulation]\nduration = 10\n'
-    for law in ("lyapunov", "pd"):
-        assert fault_in(f'{text}[[law]]\ntype = "{law}"\nk_rate = {rate}\nk_attitude = {attitude}\n', tmp_path) == ""

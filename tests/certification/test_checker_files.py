@@ -28,11 +28,6 @@ def test_unknown_keys_fail_everywhere(made):
         assert not passed(check(changed)), path
 
 
-@pytest.mark.parametrize("content", [None, [], {}, 3, {"format": "starhold certificate 3"}])
-def test_what_is_no_certificate_fails(content):
-    assert not passed(check(content))
-
-
 def test_a_file_that_cannot_be_read_is_the_users_error(tmp_path):
     with refused():
         check_file(tmp_path / "none.json")

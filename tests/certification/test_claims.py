@@ -5,29 +5,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from starhold.algebra.vector import ZERO
-from starhold.analysis.trial import draw, fly_claims
+from starhold.analysis.trial import fly_claims
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
 from starhold.certification.comparison import differences
 from starhold.certification.matrices import number
 from starhold.certification.subject import make_subject
 from starhold.checker import check, check_file, passed
-from starhold.laws import lqr, matrix_pd, pd, sliding
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
-from starhold.simulation.lanes import simulate_many
-from tests.certification.loops import FULL, certified, energy, free, loop_of, random_craft, tensor, textbook
-from tests.equations import two_body_gravity_gradient
+from tests.certification.loops import FULL, certified, loop_of, tensor, textbook
 from tests.making import ORBITAL, aimed
 from tests.tiers import leading
 
 LOOPS = textbook()
 FULL_OF_PRODUCTS = [[2.0, 0.1, 0.0], [0.1, 3.0, -0.25], [0.0, -0.25, 4.0]]
-FIRST = [("pd-0", "shortest"), ("pd-0", "hysteresis"), ("lqr-I", "shortest"), ("lyapunov-0", "hysteresis")]
+FIRST = [("pd-0", "shortest"), ("lyapunov-0", "hysteresis")]
+EACH = ("pd-0", "lyapunov-0", "lqr-I", "lqr-III", "matrix-pd-diagonal", "sliding-0", "sliding-1", "wheel-0")
+"""Every law and kind of function once, and its inertia with and without products."""
 CONVERGENT = sorted(name for name in LOOPS if not name.startswith(("sliding", "wheel")))
 SIGNED = dict.fromkeys([*FIRST, *((name, policy) for name in CONVERGENT for policy in ("shortest", "hysteresis"))])
 
@@ -44,7 +42,7 @@ def accepted(content):
         assert bool(held) == (claim["outcome"] == "proved"), claim["kind"]
 
 
-@pytest.mark.parametrize("name", sorted(LOOPS))
+@pytest.mark.parametrize("name", leading(dict.fromkeys([*EACH, *sorted(LOOPS)]), len(EACH)))
 def test_every_law_is_certified_under_its_textbook_assumptions(made, name):
     certificate = certified(name)
     undecided = {c.kind for c in certificate.claims if c.outcome != "proved"}
@@ -73,7 +71,7 @@ TARGETS = [(ORBITAL, "axis"), (ORBITAL, "norm"), (aimed((1.0, 0.0, 0.0, 0.0)), "
 
 @pytest.mark.parametrize(
     ("target", "limit", "sign_policy"),
-    leading([(*given, policy) for policy in ("as_published", "hysteresis", "shortest") for given in TARGETS], 2),
+    leading([(*given, policy) for policy in ("as_published", "hysteresis", "shortest") for given in TARGETS]),
 )
 def test_moving_targets_and_limits_of_the_norm(tmp_path, sign_policy, target, limit):
     # One clipped, one with a gyroscopic torque, one that slides: each other law has one of these terms or none.
@@ -136,44 +134,8 @@ def test_the_bounds_over_the_orbit_hold_on_it():
 # --- against numbers computed otherwise ----------------------------------------------------------------------------------
 
 
-def test_limit_by_design_holds_everywhere():
-    loop = loop_of("pd", pd.Gains(0.09, 0.009, 1), FULL, limit="axis")
-    claim = certify(loop).claim("torque-limit")
-    assert claim.outcome == "proved"
-    assert claim.numbers["everything"]
-    random = np.random.default_rng(4)
-    for _ in range(2000):
-        q = random.normal(size=4)
-        w = tuple(random.normal(size=3) * 10.0 ** random.uniform(-3, 3))
-        measurement = Measurement(tuple(q / np.linalg.norm(q)), w, w, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.1)
-        u, _ = pd.torque(measurement, loop.gains, loop.craft, NoMemory())
-        assert max(map(abs, u)) <= 0.05
-
-
 def test_pd_alone_is_never_within_its_limit_everywhere():
     assert not certified("pd-0").claim("torque-limit").numbers["everything"]
-
-
-def test_modelled_torque_is_bounded_over_the_whole_orbit():
-    """Against the torque itself along the orbit, at random attitudes; the bound is met where the orbit is lowest."""
-    loop = LOOPS["pd-0"]
-    subject = make_subject(loop)
-
-    def motion(t, y):
-        return [*y[3:], *(-loop.craft.gravity * y[:3] / np.linalg.norm(y[:3]) ** 3)]
-
-    path = solve_ivp(motion, (0.0, 7000.0), [*loop.start.position, *loop.start.velocity], rtol=1e-9, max_step=50.0).y[:3].T
-    random = np.random.default_rng(5)
-    most = np.zeros(3)
-    largest = 0.0
-    for place in path[:: max(1, len(path) // 60)]:
-        for q in random.normal(size=(200, 4)):
-            torque = np.array(two_body_gravity_gradient(tuple(place), tuple(q / np.linalg.norm(q)), loop.craft)[1])
-            most, largest = np.maximum(most, np.abs(torque)), max(largest, float(np.linalg.norm(torque)))
-    bounds = np.array([number(m) for m in subject.modelled])
-    assert (most <= bounds).all()
-    assert (most >= 0.9 * bounds).all()
-    assert 0.9 * number(subject.modelled_norm) <= largest <= number(subject.modelled_norm)
 
 
 def by_differences(loop, turned):
@@ -187,7 +149,7 @@ def by_differences(loop, turned):
     return np.array([torque(-axis) - torque(axis) for axis in 1e-5 * np.eye(3)]).T / 2e-5
 
 
-@pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-III", "matrix-pd-inertial", "sliding-1"])
+@pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-III", "matrix-pd-diagonal", "sliding-1"])
 def test_longest_period_is_where_the_sampled_loop_loses_stability(name):
     loop = LOOPS[name]
     claim = certified(name).claim("sampling")
@@ -211,51 +173,8 @@ def test_longest_period_is_where_the_sampled_loop_loses_stability(name):
     assert np.abs([complex(*z) for z in n["eigenvalues"]]).max() == pytest.approx(least, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["lqr-I", "lqr-II", "lqr-III", "lqr-numeric", "matrix-pd-inertial"])
-def test_other_inertias_of_the_box_converge(name):
-    """The law for one body flown on other bodies of the certified box."""
-    loop = free(replace(LOOPS[name], limit="none", period=0.05))
-    tolerance = certified(name).claim("inertia").numbers["tolerance"]
-    assert tolerance is None or tolerance >= 0.2
-    random = np.random.default_rng(7)
-    J = tensor(loop.craft.inertia)
-    reach = min(tolerance or 1.0, 0.9) * np.sqrt(np.outer(np.diagonal(J), np.diagonal(J)))
-    tried = 0
-    while tried < 5:
-        share = np.triu(random.uniform(-1.0, 1.0, size=(3, 3)))
-        try:
-            body = make_craft(J + reach * (share + np.triu(share, 1).T))
-        except ValueError:
-            continue
-        tried += 1
-        # The plant's inertia only; these laws use theirs for the gains, and form I for the gyroscopic torque too.
-        flown = replace(loop, craft=body)
-        states = draw(64, energy(J, 0.04), 0.08, random)
-        ends = simulate_many(flown, states, 12_000).states
-        assert np.abs(ends[1:4]).max() < 0.02
-        assert np.abs(ends[4:7]).max() < 0.02
-
-
 def test_flights_try_every_kind_of_set():
-    for name in ("pd-0", "pd-2", "lqr-numeric", "sliding-0", "sliding-1"):
+    for name in ("pd-0", "lqr-III", "sliding-0", "sliding-1"):
         trial = fly_claims(LOOPS[name], certified(name), flights=512)
         assert trial.flights == 512
         assert trial.highest_share <= 1.0 + 1e-6
-
-
-@pytest.mark.parametrize("seed", leading(range(6)))
-def test_random_bodies_and_weights_are_certified(seed):
-    random = np.random.default_rng(seed)
-    craft = random_craft(random)
-    weights = tuple(10.0 ** random.uniform(-1, 1, size=6)), tuple(10.0 ** random.uniform(2, 3, size=3))
-    gains = [
-        ("lqr", lqr.design(craft, lqr.FormI(*random.uniform(0.005, 0.05, size=2), 1.0))),
-        ("lqr", lqr.design(craft, lqr.FormIII(*weights, 1))),
-        ("matrix-pd", matrix_pd.design(craft, matrix_pd.Inertial(*random.uniform(0.1, 10.0, size=2), 0.05))),
-        ("sliding", sliding.Gains((0.05, 0.06, 0.07), (5e-3,) * 3, 1e-3)),
-    ]
-    for law, chosen in gains:
-        certificate = certify(loop_of(law, chosen, craft, period=1e-3))
-        assert {c.kind: c.outcome for c in certificate.claims if c.kind in ("convergence", "sliding")}.popitem()[
-            1
-        ] == "proved"

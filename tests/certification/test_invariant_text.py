@@ -104,10 +104,6 @@ def test_conditions_may_be_joined():
         assert found == {fmpq(wanted)}
 
 
-def test_numbers_are_taken_as_written():
-    assert read("0.1", NAMES).value == fmpq(1, 10)
-
-
 @pytest.mark.parametrize(
     ("text", "found", "allowed"),
     [

@@ -5,9 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from starhold.algebra.polynomial import exact
-from starhold.certification.invariant import InvariantProblem, System, WantedSet, certify, parse, write
-from starhold.certification.invariant.search import Candidate, closed_cells
+from starhold.certification.invariant import certify, parse, write
+from starhold.certification.invariant.search import Candidate
 from starhold.checker import check_file, passed
 from tests.certification.invariants import ORIGIN as AT_ORIGIN
 from tests.certification.invariants import SQUARE, claim, expression, file, fractions, system
@@ -55,7 +54,7 @@ def test_a_function_that_is_another_on_a_surface_is_not_continuous(on, surface, 
         assert "V jumps at a state" in said[0].obligation
 
 
-@pytest.mark.parametrize("on", leading(reversed(ON), 2))
+@pytest.mark.parametrize("on", leading(reversed(ON)))
 def test_rates_that_are_others_on_a_surface_count(on, tmp_path):
     """(0, y) stays on x = 0 and grows there."""
     y = f"-y + 5*y*{on.format('x')}"
@@ -71,14 +70,11 @@ def test_rates_that_are_others_on_a_surface_count(on, tmp_path):
         ("-x - x*(1 - abs(sign(x)))", "-y", ROUND),
         ("-x", "-y - 3*(1 - abs(sign(x)))*y", ROUND),
         ("-x - sign(x)/4", "-y", ROUND),
+        ("-x*sign(x)**2", "-y", f"{ROUND} + x*(1 - abs(sign(x)))"),
     ],
 )
 def test_what_is_no_worse_on_a_surface_is_proved(x, y, V, tmp_path):
-    assert written(tmp_path, x, y, V)[0].outcome == "proved"
-
-
-def test_v_that_is_the_same_on_a_surface(tmp_path):
-    found, said = written(tmp_path, x="-x*sign(x)**2", V=f"{ROUND} + x*(1 - abs(sign(x)))")
+    found, said = written(tmp_path, x, y, V)
     assert found.outcome == "proved"
     assert passed(said)
 
@@ -102,17 +98,8 @@ def test_every_state_is_in_a_cell_that_is_what_the_text_says():
     for state in [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1)]:
         x, y = (Fraction(n) for n in state)
         sign = lambda n: (n > 0) - (n < 0)  # noqa: E731
-        wanted = exact(eval(V, {"sign": sign, "x": x, "y": y}))
-        cells = closed_cells(what, [exact(n) for n in state])
-        assert wanted in [cell.V(*map(exact, state)) for cell in cells]
-
-
-def test_a_python_function_may_have_them_too():
-    from starhold.algebra.scalar import sign
-
-    jumping = System.of(("x", "y"), lambda x, y: (-1.0 * x, -1.0 * y + 5.0 * (1.0 - sign(x) * sign(x)) * y))
-    wanted = WantedSet("region", jumping.function(lambda x, y: x * x + y * y), SQUARE, ORIGIN)
-    assert certify(InvariantProblem("thin", jumping, (wanted,))).outcome != "proved"
+        wanted = Fraction(eval(V, {"sign": sign, "x": x, "y": y}))
+        assert wanted in [what.at(cell.function, (x, y)) for cell in what.near((x, y))]
 
 
 # --- random systems against motions -------------------------------------------------------------------------------------
@@ -162,7 +149,7 @@ def on_lines(random):
     return [*found, (Fraction(3, 5), Fraction(4, 5)), (Fraction(5, 13), Fraction(-12, 13)), (Fraction(-1), Fraction(0))]
 
 
-@pytest.mark.parametrize("seed", leading([1, 2, 4, 6, 0, 3, 5, *range(7, 60)], 4))
+@pytest.mark.parametrize("seed", leading([1, 2, 4, 6, 0, 3, 5, *range(7, 60)], 2))
 def test_what_is_proved_holds_on_surfaces_too(seed, tmp_path):
     """By exact values of the texts, and by motions that keep to a line while the rates there point along it."""
     random = np.random.default_rng(seed)

@@ -1,12 +1,9 @@
 """A filter that gives no numbers is told of, whether a law uses what it gives or not."""
 
-import json
-
 from typer.testing import CliRunner
 
 from starhold.cli.main import app
 from starhold.scenario.reading import builtin_text
-from tests.missions import BASE
 
 BLANK = """
 from typing import Annotated, NamedTuple
@@ -70,13 +67,3 @@ def test_a_filter_without_numbers_is_told_where_no_mode_fails_by_it(tmp_path):
     assert done.exit_code == 0
     assert said in " ".join(done.stdout.split())
     assert said in (tmp_path / "out" / "report.html").read_text()
-
-
-def test_a_flight_that_is_lost_by_a_filter_without_numbers_has_a_summary(tmp_path):
-    (tmp_path / "blank.py").write_text(BLANK)
-    path = tmp_path / "mission.toml"
-    path.write_text(BASE.replace("[[law]]", PARTS + "[[law]]").replace('"modes"', '"pd"\nk_rate = 0.02\nk_attitude = 1e-3'))
-    done = CliRunner().invoke(app, ["run", str(path), "-o", str(tmp_path / "out"), "--no-certify"])
-    assert "diverged" in done.stdout
-    found = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert found["laws"]["mission"]["peak_torque"] is None

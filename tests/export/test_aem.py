@@ -1,13 +1,9 @@
 """Attitude ephemeris messages: written for a library of others, read from it, flown to."""
 
-from dataclasses import fields
-
 import erfa
 import numpy as np
 import pytest
-from ccsds_ndm import kvn_builder
 from ccsds_ndm.mapping import NDMFileFormats
-from ccsds_ndm.models.ndmxml4.ndmxml_4_0_0_common_4_0 import QuaternionType
 from ccsds_ndm.ndm_io import NdmIo
 from scipy.spatial.transform import Rotation
 
@@ -63,23 +59,6 @@ def test_a_library_of_others_reads_what_is_written(tmp_path):
     assert (about.ref_frame_a, about.ref_frame_b, about.attitude_dir.value) == ("EME2000", "SC_BODY_1", "A2B")
     assert [state.epoch for state in states][1:3] == ["2026-12-31T23:59:59.6", "2027-01-01T00:00:02"]
     found = [[float(getattr(state.quaternion, name)) for name in ("qc", "q1", "q2", "q3")] for state in states]
-    np.testing.assert_allclose(found, ATTITUDES, rtol=0, atol=1e-15)
-
-
-def test_a_library_of_others_reads_version_2_once_two_words_of_version_1_are_put_right(tmp_path, monkeypatch):
-    """ccsds-ndm 3.1 looks in messages of version 2.0 for a field by its name in version 1.0 and expects the scalar first,
-    which the schema of 2.0 that comes with it has last."""
-    path = written(tmp_path, "2.0")
-    with pytest.raises(KeyError, match="quaternion_state"):
-        NdmIo().from_path(path)
-    monkeypatch.setitem(kvn_builder._AEM_FIELD_MAP, "QUATERNION", "quaternion_ephemeris")
-    columns = [item.metadata["name"] for item in fields(QuaternionType)]
-    assert columns == ["Q1", "Q2", "Q3", "QC"]
-    monkeypatch.setattr(kvn_builder, "_att_column_template", lambda _: ["EPOCH", *columns])
-    (segment,) = NdmIo().from_path(path).body.segment
-    assert (segment.metadata.ref_frame_a, segment.metadata.ref_frame_b) == ("EME2000", "SC_BODY_1")
-    states = [state.quaternion_ephemeris.quaternion for state in segment.data.attitude_state]
-    found = [[float(getattr(state, name)) for name in ("qc", "q1", "q2", "q3")] for state in states]
     np.testing.assert_allclose(found, ATTITUDES, rtol=0, atol=1e-15)
 
 

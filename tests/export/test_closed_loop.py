@@ -11,7 +11,7 @@ from starhold.loop.kernels import make_step, numbers_of
 from starhold.loop.step import make_equations
 from starhold.simulation.lane import fly
 from tests.export.flown import code_of, compiled, loop_of, read, same
-from tests.tiers import fewer
+from tests.tiers import fewer, leading
 
 STEPS, COSTLY = 200, 12
 
@@ -61,12 +61,11 @@ def _nothing(measurement: Any, gains: Any, craft: Any, memory: Any) -> Any:
     return (0.0, 0.0, 0.0), memory
 
 
-LOOPS = ["lyapunov", "sliding", "wheel", "modal", "pd", "l2", "mpc", "estimator", "estimator on [sensor]",
-         "hysteresis, axis", "orbital target", "target from a table", "pid, example 0, noise",
-         "lqr, example 1, noise"]  # fmt: skip
+LOOPS = ["sliding", "wheel", "l2", "mpc", "estimator", "hysteresis, axis", "target from a table", "pid, example 0, noise",
+         "lyapunov", "modal", "pd", "estimator on [sensor]", "orbital target", "lqr, example 1, noise"]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", leading(LOOPS, 8))
 def test_equals_the_simulation(name):
     steps = fewer(COSTLY if name == "mpc" else STEPS, 3)
     found, expected = flown_with(name, steps), fly(loop_of(name), steps)[1]

@@ -15,6 +15,7 @@ from starhold.export.law import numbers
 from starhold.export.vectors import Stepper, fresh, random_columns, with_numbers
 from starhold.trace.calling import Compiled
 from tests.export.flown import LAWS, STRICT, build_in, code_of, compiled, need, read, same
+from tests.tiers import WHOLE, leading
 
 FEW, MANY, BLOCK = 20_000, 1_000_000, 50_000
 BUILDS = [("gcc", "-O3"), ("clang", "-O0")]
@@ -67,7 +68,7 @@ def check(name: str, count: int, *builds: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("name", [*STATELESS, *MADE])
 def test_random_and_special_states(name):
-    check(name, FEW, *BUILDS)
+    check(name, FEW, *BUILDS[: len(BUILDS) if WHOLE or name in ("wheel", "estimator") else 1])
 
 
 @pytest.mark.slow
@@ -137,9 +138,15 @@ int main(void)
 """
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize(
-    ("name", "count"), [("wheel", 100_000), ("estimator", 100_000), pytest.param("mpc", 50, marks=pytest.mark.slow)]
+    ("name", "count", "compiler"),
+    leading(
+        [
+            (name, count, one)
+            for one in ("clang", "gcc")
+            for name, count in (("estimator", 100_000), ("wheel", 100_000), ("mpc", 50))
+        ]
+    ),
 )
 def test_sanitizers_find_nothing(name, count, compiler, tmp_path):
     """Neither in the self-test nor for doubles of any bits."""

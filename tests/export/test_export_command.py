@@ -80,19 +80,6 @@ def test_bad_input_is_one_line(arguments, said, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_unwritable_folder(tmp_path):
-    (tmp_path / "file").write_text("")
-    complains(export(tmp_path / "file"), "cannot write there")
-
-
-def test_results_are_not_overwritten_unless_forced(tmp_path):
-    assert export(tmp_path / "out", "--no-certify", "--name", "first").returncode == 0
-    assert export(tmp_path / "out", "--no-certify").returncode == 2
-    assert export(tmp_path / "out", "--no-certify", "--force", "--name", "second").returncode == 0
-    assert not (tmp_path / "out" / "first.c").exists()
-    assert (tmp_path / "out" / "second.c").exists()
-
-
 def test_part_without_a_form_in_c(tmp_path):
     from starhold.parts.part import Fitted, Part
     from tests.export.flown import loop_of

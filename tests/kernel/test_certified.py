@@ -9,12 +9,8 @@ import pytest
 import starhold as sh
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
-from starhold.certification.comparison import differences
 from starhold.checker import check, passed
-from starhold.checker.check import BY_THE_KERNEL
-from starhold.kernel.check import check as prove
 from starhold.scenario.building import build
-from tests.tiers import leading
 
 LAWS = [
     ("three-laws", "lyapunov"), ("three-laws", "sliding"), ("cubesat-slew", "pd"), ("cubesat-slew", "sliding"),
@@ -40,23 +36,6 @@ def written(tmp_path):
         return json.loads((tmp_path / "certificate.json").read_text())
 
     return content
-
-
-@pytest.mark.parametrize(("scenario", "law"), leading(LAWS, 2))
-def test_claims_carry_proofs_that_the_kernel_checks_and_the_loop_is_that_of_the_scenario(scenario, law, written):
-    certificate = certified(scenario, law)
-    content = written(certificate)
-    kinds = {claim.kind for claim in certificate.claims if claim.proof is not None}
-    assert kinds >= ({"sliding"} if law == "sliding" else {"convergence", "inertia", "sampling"})
-    assert kinds & {"torque-limit", "wheels", "sliding"}
-    findings = check(content)
-    assert passed(findings)
-    assert {finding.claim for finding in findings if finding.reason == BY_THE_KERNEL} == kinds
-    assert len(prove(json.dumps(content))) == len(kinds)
-    for claim in certificate.claims:
-        if claim.proof is not None:
-            assert differences(claim.proof.claim, loop_of(scenario, law)) == []
-            assert differences(claim.proof.claim, loop_of("flexible-slew", "pd"))
 
 
 def test_proofs_of_several_laws_stand_in_one_file(written):

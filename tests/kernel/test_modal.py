@@ -51,7 +51,7 @@ def shown(loop):
     return copy.deepcopy(certificate(found.programs, [claim])), claim, found
 
 
-@pytest.mark.parametrize(("a", "b", "sign_policy", "level"), leading(OF_BOXES, 3))
+@pytest.mark.parametrize(("a", "b", "sign_policy", "level"), leading(OF_BOXES))
 def test_sets_are_no_smaller_than_those_shown_by_boxes(a, b, sign_policy, level):
     content, claim, _ = shown(loop_of(a, b, sign_policy))
     numbers = {name: number(x) for name, x in claim["numbers"].items()}

@@ -197,6 +197,7 @@ def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis, change):
     assert not Oracle(content, claim).holds()
 
 
+@pytest.mark.slow
 def test_the_claim_that_was_changed_holds():
     content = contents("flying", "noisy")
     assert Oracle(content, content["claims"][0]).holds()

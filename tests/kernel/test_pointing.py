@@ -24,7 +24,7 @@ from tests.kernel.flights import Fleet, along, feedback, moved, turn
 from tests.kernel.oracle import Oracle, number
 from tests.tiers import leading
 
-PROVED = {"body": 0.13, "cubesat": 0.10, "moving": 0.13, "skew": 0.10, "calm": 0.10, "noisy": 0.40}
+PROVED = {"cubesat": 0.10, "moving": 0.13, "skew": 0.10, "body": 0.13, "calm": 0.10, "noisy": 0.40}
 """Within how many degrees motions are to end."""
 
 
@@ -32,7 +32,7 @@ def numbers(content):
     return {name: number(x) for name, x in content["claims"][0]["numbers"].items()}
 
 
-@pytest.mark.parametrize("name", PROVED)
+@pytest.mark.parametrize("name", leading(PROVED, 3))
 def test_the_loop_is_proved_to_point(name):
     content = contents("flying", name)
     begun = time.process_time()
@@ -75,8 +75,9 @@ def after_a_period(fleet, q, w, unit, per_rate=0.0):
     return q, w
 
 
-@pytest.mark.parametrize("name", ["moving", "skew"])
-@pytest.mark.parametrize("power", [0.5, 1, 3])
+@pytest.mark.parametrize(
+    ("name", "power"), leading([("moving", 1), ("skew", 3), ("moving", 0.5), ("moving", 3), ("skew", 0.5), ("skew", 1)], 2)
+)
 def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     oracle = Oracle(contents("flying", name), contents("flying", name)["claims"][0])
     level = oracle.numbers["level"] / 30.0**power
@@ -218,13 +219,13 @@ def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis):
     assert not all(Oracle(content, claim, seed).holds() for seed in range(3))
 
 
-@pytest.mark.parametrize("name", ["cubesat", "calm"])
+@pytest.mark.parametrize("name", leading(["cubesat", "calm"]))
 def test_the_claims_that_were_changed_hold(name):
     content = contents("flying", name)
     assert Oracle(content, content["claims"][0]).holds()
 
 
-@pytest.mark.parametrize(("name", "reached"), leading([("cubesat", 0.8), ("body", 0.8), ("skew", 0.8)], 2))
+@pytest.mark.parametrize(("name", "reached"), leading([("cubesat", 0.8), ("body", 0.8), ("skew", 0.8)]))
 def test_no_flight_leaves_what_is_proved_and_some_come_near(name, reached):
     told, n = POINTING[name][1], numbers(contents("flying", name))
     fleet = fleet_of(name, *told[:2])

@@ -8,7 +8,6 @@ import pytest
 
 from starhold.kernel.check import check
 from starhold.kernel.numbers import (
-    Account,
     RefusedError,
     cosine_below,
     definite,
@@ -25,11 +24,6 @@ from tests.kernel.certificates import contents, rekeyed, text
 
 x, y = var("x"), var("y")
 ONE = Fraction(1)
-
-
-@pytest.fixture(autouse=True)
-def account():
-    Account.open()
 
 
 def refuses(rule, evidence):

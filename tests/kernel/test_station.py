@@ -11,8 +11,8 @@ from starhold.kernel.check import check
 from starhold.kernel.numbers import RefusedError
 from tests.kernel.certificates import rekeyed, text
 from tests.kernel.mutations import refusals
-from tests.kernel.stations import BEST, PLANT, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
-from tests.tiers import WHOLE
+from tests.kernel.stations import BEST, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
+from tests.tiers import WHOLE, leading
 
 ROUND = {"level": 0.49999952, "outer": 1.4142133, "velocity": 0.9999995}
 WITHIN = {
@@ -25,7 +25,7 @@ CIRCLES = [
     ("l2-deficit", "deficit 5"),
     ("l2-nonlinear", "full model"),
 ]
-PEAK, STEEP = 3.4295901709068626, 1.0 + 2.0 * PLANT.stiffness
+PEAK = 3.4295901709068626
 RELAY = SOFT._replace(boundary_layer=0.0)
 MADE = {
     "circle": lambda: flown("l2-circle", "smooth"),
@@ -70,7 +70,7 @@ def test_proofs_hold_and_take_no_time(name):
     assert all(StationOracle(content, content["claims"][0], seed).holds() for seed in range(3))
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", leading(MADE, 6))
 def test_nothing_false_is_accepted(name):
     def true(content, claim):
         return StationOracle(content, claim).holds()

@@ -152,17 +152,10 @@ def test_what_is_wrong_with_a_law_table_is_one_line(table, said, folder):
 
 
 BROKEN = rows("""
-def torque(measurement, | def torque(measurement | my_law.py, line
-CARD = Card( | CARD = Cards( | my_law.py, line 10: NameError
 def torque | def torques | a law needs control or torque
-Annotated[float, Gain("N m s", above=0.0, text="damping")] | float | k declares no unit
 gains.k, measurement.rate | gains.k, measurement.rates | law my-law: my_law.py, line 19: AttributeError
 , memory↵↵ | ↵↵ | torque must return three numbers and the memory
 , memory↵↵ | , (1.0,)↵↵ | the memory that torque returns must be formed as it was given
-CARD = Card( | raise SystemExit(3)↵CARD = Card( | my_law.py, line 10: SystemExit: 3
-CARD = Card( | raise type('Own', (BaseException,), {})↵CARD = Card( | line 10: Own
-return scale( | raise SystemExit(0)↵    return scale( | line 19: SystemExit
-CARD = Card( | CARD = dict( | CARD is not a Card
 """)
 
 

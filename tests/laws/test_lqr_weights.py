@@ -5,10 +5,8 @@ import pytest
 
 from starhold.errors import InputError
 from starhold.laws import lqr
-from starhold.parts.craft import make_craft
 from starhold.scenario.reading import builtin_text, parse
-from tests.refusals import complains, refused
-from tests.running import starhold
+from tests.refusals import refused
 
 HEAD = builtin_text("three-laws").split("[[law]]")[0]
 FULL = HEAD.replace("[2.0, 3.0, 4.0]", "[[2.0, 0.1, 0], [0.1, 3.0, 0], [0, 0, 4.0]]")
@@ -136,28 +134,3 @@ def test_numbers_at_the_end_of_the_range_are_one_line_or_gains():
                         assert np.diagonal(lqr.tensor(gains.k_attitude)).min() > 0.0
     assert any("between 1e-30 and 1e+30 in size" in message for message in said)
     assert not any("\n" in message for message in said)
-
-
-SPECS = [
-    (lqr.FormI(-1.0, 1.0), "a must be"),
-    (lqr.FormI(1.0, 0.0), "b above 0"),
-    (lqr.FormI(float("nan"), 1.0), "a must be"),
-    (lqr.FormII((1.0,) * 5, (1.0,) * 3), "q must be 6 numbers"),
-    (lqr.FormIII((1.0,) * 6, (1.0, 1.0, -1.0)), "r must be 3 numbers"),
-    (lqr.Numeric(np.eye(3), np.eye(3)), "q must be a 6x6"),
-    (lqr.Numeric(np.eye(6), np.full((3, 3), np.nan)), "r must be a 3x3"),
-]
-
-
-@pytest.mark.parametrize(("spec", "said"), SPECS)
-def test_weights_from_python_are_checked_too(spec, said):
-    with pytest.raises(ValueError, match=said):
-        lqr.design(make_craft([2.0, 3.0, 4.0]), spec)
-
-
-@pytest.mark.parametrize("command", ["design", "run"])
-def test_the_command_line_says_one_line(tmp_path, command):
-    (tmp_path / "wide.toml").write_text(HEAD + law(form='"II"', q="[1, 1e13, 1, 1, 1, 1]", r=1))
-    done = starhold(command, "wide.toml", cwd=tmp_path)
-    complains(done, "wide.toml: law[1]: q: the weights of the rate differ by a factor of 1e+13")
-    assert done.stdout == ""

@@ -3,11 +3,9 @@
 from typing import Any
 
 import clarabel
-import daqp
 import numpy as np
 import piqp
 import scipy.sparse as sp
-from scipy.optimize import minimize
 
 from starhold.laws.predictive.problem import Problem
 from starhold.laws.predictive.single import Solution, pose, solve
@@ -74,19 +72,6 @@ def by_piqp(program: Program) -> Any:
     return solver.result.x
 
 
-def by_daqp(program: Program) -> Any:
-    # Scaled: its tolerances are absolute.
-    size = program.bound
-    hessian = program.hessian / np.abs(program.hessian).max()
-    linear = program.linear / np.abs(program.hessian).max() / size
-    none = np.zeros((0, 3 * program.horizon))
-    high, low = program.high / size, program.low / size
-    settings = {"primal_tol": 1e-10, "dual_tol": 1e-14}
-    moves, _, flag, _ = daqp.solve(hessian, linear, none, high, low, np.zeros(high.size, dtype=np.int32), **settings)
-    assert flag == 1
-    return moves * size
-
-
 def by_clarabel(program: Program) -> Any:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
@@ -99,26 +84,3 @@ def by_clarabel(program: Program) -> Any:
     cones = [clarabel.SecondOrderConeT(4)] * n
     hessian = sp.csc_matrix(np.triu(program.hessian))
     return np.array(clarabel.DefaultSolver(hessian, program.linear, sp.csc_matrix(rows), right, cones, settings).solve().x)
-
-
-def by_slsqp(program: Program) -> Any:
-    size = abs(program.cost(np.zeros(3 * program.horizon)))
-    room = {
-        "type": "ineq",
-        "fun": lambda v: 1.0 - (((v.reshape(-1, 3) - program.centre) / program.bound) ** 2).sum(axis=1),
-        "jac": lambda v: np.vstack(
-            [
-                np.kron(unit, -2.0 * (move - program.centre) / program.bound**2)
-                for unit, move in zip(np.eye(program.horizon), v.reshape(-1, 3), strict=True)
-            ]
-        ),
-    }
-    start = np.tile(program.centre, program.horizon)
-    return minimize(
-        lambda v: program.cost(v) / size,
-        start,
-        jac=lambda v: (program.hessian @ v + program.linear) / size,
-        constraints=[room],
-        method="SLSQP",
-        options={"ftol": 1e-14, "maxiter": 1000},
-    ).x

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from tests.mpc.programs import SEEDS, Program, by_clarabel, by_daqp, by_piqp, by_slsqp
+from tests.mpc.programs import SEEDS, Program, by_clarabel, by_piqp
 
 
 @pytest.mark.parametrize("ball", [False, True])
 def test_against_library_solvers(ball: bool):
-    pressing, slsqp = [], []
+    pressing, by_library = [], by_clarabel if ball else by_piqp
     for seed in SEEDS:
         program = Program(seed)
         plan, cost, _, solved = program.solve(ball=ball)
@@ -18,14 +18,7 @@ def test_against_library_solvers(ball: bool):
         assert away.max() <= program.bound + 1e-9
         assert cost == pytest.approx(program.cost(plan), rel=1e-9)
         pressing.append(float(np.mean(away > program.bound * (1.0 - 1e-9))))
-        for reference in (by_clarabel,) if ball else (by_piqp, by_daqp):
-            assert abs(program.cost(plan) - program.cost(reference(program))) <= 1e-6 * abs(cost), f"seed {seed}"
-        if ball and program.horizon <= 6:
-            # SLSQP is a local method of moderate accuracy: it may fall short, but must never find anything better.
-            other = program.cost(by_slsqp(program))
-            assert program.cost(plan) <= other + 1e-6 * abs(cost), f"seed {seed}"
-            slsqp.append(other <= program.cost(plan) + 1e-6 * abs(cost))
-    assert not ball or np.mean(slsqp) > 0.7
+        assert abs(program.cost(plan) - program.cost(by_library(program))) <= 1e-6 * abs(cost), f"seed {seed}"
     assert np.mean(pressing) > 0.4
     assert np.mean(np.array(pressing) > 0.0) > 0.8
 

@@ -61,8 +61,6 @@ COMPOSED = {
     "no type": (part("noise = 1\n"), "part[1].type: found nothing", "or a file"),
     "what another table gives": (part('type = "wheels"\n'), '"wheels"', "the [wheels] table, which gives it"),
     "single brackets": ('[part]\ntype = "gyro"\n', "part: found", "[[part]] tables, with double brackets"),
-    "an unknown key": (part('type = "gyro"\nnoice = 1\n'), "part[1].noice: found an unknown key", "noise"),
-    "a missing key": (part('type = "lag"\n'), "part[1].lag: found nothing", "this key is required"),
     "another unit": (part('type = "gyro"\nnoise = "1 N m"\n'), 'part[1].noise: found "1 N m"', "rad"),
     "below the bound": (part('type = "gyro"\nnoise = -1\n'), "part[1].noise: found -1", "at least 0"),
     "two numbers of three": (part('type = "gyro"\nbias = [0, 1]\n'), "part[1].bias", "3 numbers"),
@@ -79,7 +77,6 @@ COMPOSED = {
     ),
     "too fast a lag": (part('type = "lag"\nlag = 0.001\n'), "simulation.substeps", "at least 200 substeps"),
     "file and type": (part(MINE + 'type = "gyro"\n'), "part[1].file", "either a type or a file, not both"),
-    "a file's name that is a number": (part("file = 3\n"), "part[1].file: found 3", "the name of a Python file"),
     "rows of other lengths": (
         part('type = "torque-table"\ntable = [[0, 0, 0, 1e-4], [1, 0, 0]]\n'),
         "allowed: rows of time, x, y, z, or the name of a CSV file",

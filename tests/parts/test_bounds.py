@@ -17,6 +17,7 @@ from starhold.parts.environments import constant_torque, drag, residual_dipole, 
 from starhold.parts.orbit import BODIES, Elements, from_elements, highest_speed, lowest
 from starhold.parts.plates import BOX, largest_torque
 from starhold.parts.sensors import magnetometer
+from tests.tiers import leading
 
 GRAVITY, CRAFT = BODIES["Earth"].gravity, make_craft([0.05, 0.065, 0.025])
 COUNT = 200
@@ -95,7 +96,7 @@ def plates_of_a_kind(random, kind, count):
 
 
 @pytest.mark.parametrize("kind", ["any", "box", "plane", "sheet"])
-@pytest.mark.parametrize("count", [1, 2, 6, 9])
+@pytest.mark.parametrize("count", leading([6, 1, 2, 9]))
 @pytest.mark.parametrize("light", [False, True])
 def test_no_side_is_pushed_more_than_the_largest_torque(kind, count, light):
     """From 10^5 sides, of which an own formula tells the torque."""
@@ -151,7 +152,7 @@ def shown_of(stored, field):
     return Shown
 
 
-@pytest.mark.parametrize("limited", [0, 1])
+@pytest.mark.parametrize("limited", leading([1, 0]))
 @pytest.mark.parametrize(
     ("gain", "field_error", "momentum", "reached"),
     [
@@ -172,7 +173,7 @@ def test_unloading_keeps_what_it_says(gain, field_error, momentum, reached, limi
 @pytest.mark.parametrize(
     "axes", [three_orthogonal(), pyramid(), [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0.2), (0.1, 0, 1)]]
 )
-@pytest.mark.parametrize("friction", [{"viscous": 2e-7}, {"coulomb": 3e-5}, {"viscous": 2e-7, "coulomb": 3e-5}])
+@pytest.mark.parametrize("friction", leading([{"viscous": 2e-7, "coulomb": 3e-5}, {"viscous": 2e-7}, {"coulomb": 3e-5}]))
 def test_friction_is_an_error_of_the_command(axes, friction):
     """Rotors within their limits, as bad as can be: all at full speed, in all senses."""
     params = wheels.make_wheels(axes, 2.2e-5, 2e-3, 15e-3, **friction)

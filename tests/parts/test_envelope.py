@@ -118,20 +118,3 @@ def test_many_wheels_share_out_with_the_least_peak(count):
 def test_wheels_without_facets_say_so():
     with pytest.raises(TypeError, match="with_facets"):
         allocate_peak((1.0, 0.0, 0.0), wheels_of(pyramid()))
-
-
-@pytest.mark.parametrize(
-    ("layout", "lost", "told"),
-    [
-        ("orthogonal", None, (1.0, 1.0, 1.0, 1.0)),
-        ("pyramid", None, (0.770, 1.155, 1.333, 1.633)),
-        ("pyramid", 2, (0.577, 0.577, 0.816, 0.816)),
-        ("nasa", None, (0.857, 1.0, 1.155, 1.414)),
-        ("nasa", 0, (0.5, 0.5, 0.577, 0.577)),
-    ],
-)
-def test_the_table_of_the_documentation(layout, lost, told):
-    wheels = wheels_of(LAYOUTS[layout], 1.0)
-    left = wheels if lost is None else lose(wheels, lost)
-    found = [authority(left, kind, peak=peak) for kind in ("axis", "norm") for peak in (False, True)]
-    assert found == pytest.approx(told, abs=6e-4)

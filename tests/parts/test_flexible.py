@@ -1,11 +1,7 @@
-"""Flexible appendages against Lagrange's equations of hub and panels, written by SymPy and integrated by SciPy, and against
-Basilisk."""
-
-from functools import cache
+"""Flexible appendages: hinged panels against Basilisk, modes against their coupled equations, integrated by SciPy."""
 
 import numpy as np
 import pytest
-import sympy
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -62,64 +58,6 @@ def bodies(rows):
     hub = mass, inertia - mass * dyad(moment / mass), moment / mass
     assert np.linalg.eigvalsh(hub[1])[0] > 0.0
     return hub, found
-
-
-@cache
-def lagrangian(rows):
-    """The slope of the energy of motion in the angles of the hinges, and its Hessian in velocity and angular velocity of the
-    hub (in axes of its own, in which the energy does not depend on its attitude) and the rates of the hinges."""
-    hub, others = bodies(rows)
-    angles, v = sympy.symbols(f"x:{len(others)}"), sympy.symbols(f"v:{6 + len(others)}")
-    push, w = sympy.Matrix(v[:3]), sympy.Matrix(v[3:6])
-    energy = _energy(hub[0], hub[1], push + w.cross(sympy.Matrix(hub[2])), w)
-    for angle, rate, (mass, own, hinge, axis, centre) in zip(angles, v[6:], others, strict=True):
-        a = sympy.Matrix(axis)
-        skew = sympy.Matrix([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-        swing = sympy.eye(3) + sympy.sin(angle) * skew + (1 - sympy.cos(angle)) * skew * skew
-        out = swing * sympy.Matrix(centre)
-        speed = push + w.cross(sympy.Matrix(hinge) + out) + (rate * a).cross(out)
-        energy += _energy(mass, own, speed, swing.T * (w + rate * a))
-    slopes = [energy.diff(x) for x in angles]
-    pushes = [energy.diff(x) for x in v]
-    hessian = [[pushes[max(i, j)].diff(v[min(i, j)]) for j in range(len(v))] for i in range(len(v))]
-    return sympy.lambdify([angles, v], [slopes, hessian], cse=True)
-
-
-def _energy(mass, inertia, speed, rate):
-    return mass * speed.dot(speed) / 2 + rate.dot(sympy.Matrix(inertia) * rate) / 2
-
-
-def integrated(rows, times):
-    """Body rates, angles and rates of the hinges by SciPy from Lagrange's equations of the hinges and, for the hub, those of
-    Poincare: the momentum p of its rotation changes by -w x p, that of the whole is none."""
-    count, call = len(rows), lagrangian(rows)
-    stiffness, damping, begun = np.array(rows)[:, 13:].T
-
-    def moved(y):
-        mass = np.array(call(y[:count], np.zeros(6 + count))[1])
-        return np.linalg.solve(mass, [0.0, 0.0, 0.0, *y[count:]])
-
-    def slope(_, y):
-        x, v = y[:count], moved(y)
-        spring = stiffness * x + damping * v[6:]
-        return [*v[6:], *-np.cross(v[3:6], y[count : count + 3]), *(np.array(call(x, v)[0]) - spring)]
-
-    mass = np.array(call(begun, np.zeros(6 + count))[1])
-    push = -np.linalg.solve(mass[:3, :3], mass[:3, 3:6] @ RATE)
-    start = [*begun, *(mass @ [*push, *RATE, *np.zeros(count)])[3:]]
-    exact = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-14).y
-    rates = np.array([moved(y) for y in exact.T])
-    return rates[:, 3:6], exact[:count].T, rates[:, 6:]
-
-
-def test_panels_swing_as_lagrange_s_equations_say():
-    rows = panels(0.02, 2)
-    run = flown(free(fit("effector", "hinged-panels", MASS, rows)), 60)
-    rate, angle, speed = integrated(rows, run["time"])
-    assert np.ptp(run["panel_angle"], axis=0).min() > 0.02
-    assert np.abs(run["rate"] - rate).max() < 1e-9
-    assert np.abs(run["panel_angle"] - angle).max() < 1e-9
-    assert np.abs(run["panel_rate"] - speed).max() < 1e-9
 
 
 def test_panels_swing_as_in_basilisk():

@@ -8,11 +8,11 @@ import numpy as np
 
 from starhold.campaign.drivers import find_drivers
 from starhold.campaign.envelopes import Envelope
-from starhold.campaign.requirements import Requirement
 from starhold.campaign.results import Again, Bracket, CampaignResult, LawResult, Spread
 from starhold.campaign.sensitivity import Morris, Refused, Sobol
 from starhold.campaign.summary import spreads_of
 from starhold.campaign.verdicts import judge
+from starhold.studies.requirements import Requirement
 
 UNITS = {
     "settling_time": "s",

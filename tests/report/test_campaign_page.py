@@ -17,7 +17,7 @@ from tests.report.campaign_made import ASKED, indices, law, result, spread
 from tests.report.reader import Reader
 
 SECTIONS = (
-    *("Verdicts", "Runs", "Metrics", "Distributions", "Envelopes over time", "Runs worth flying again"),
+    *("Verdicts in words", "Runs", "Distributions", "Envelopes over time", "Metrics", "Runs worth flying again"),
     *("Worst cases: flown ≤ true ≤ proved", "What drives failures and metrics", "Sensitivity indices", "Dispersions flown"),
     *("Results", "How to read this page"),
 )

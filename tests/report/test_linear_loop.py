@@ -34,8 +34,8 @@ def cells(page):
 
 def test_the_table_tells_the_margins(page):
     rows = cells(page)
-    assert [row[0] for row in rows] == ["pd"] * 3 + ["sliding"] * 3 + ["mpc"]
-    assert rows[-1][1] == "no linear form: the law mpc iterates, and has no derivative"
+    assert [row[0] for row in rows] == ["pd"] * 3 + ["sliding"] * 3
+    assert "mpc has no linear form: the law mpc iterates, and has no derivative." in page
     for row, found in zip(rows, [*sh.margins("cubesat-slew", "pd"), *sh.margins("cubesat-slew", "sliding")], strict=False):
         assert row[1] == found.axis
         numbers = [20.0 * math.log10(found.gain), math.degrees(found.phase), found.delay, found.crossover, found.sensitivity]

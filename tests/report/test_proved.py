@@ -104,7 +104,7 @@ def test_a_law_without_claims_says_so() -> None:
 
 def test_flights_without_certificates_have_no_section() -> None:
     assert section(flown.flights()) == ""
-    assert "What is proved" not in render(flown.scenario(), flown.flights())
+    assert "<h2>Proofs</h2>" not in render(flown.scenario(), flown.flights())
 
 
 def test_what_certificates_hold_is_no_markup() -> None:

@@ -1,13 +1,9 @@
 """One kind of scenario with different bodies: how a file's body is known, what is refused, and names that have changed."""
 
-import sys
-
 import pytest
 
 from starhold.errors import InputError
-from starhold.scenario import bodies as package
 from starhold.scenario.bodies import bodies
-from starhold.scenario.building import build
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.reading import builtin_text, load, make_scenario, open_scenario, parse
 from starhold.scenario.schema import LawTable, ScenarioTable, Timing
@@ -124,69 +120,3 @@ def test_the_old_name_of_a_law_and_of_a_scenario():
         load("l2-rest")
     with pytest.raises(InputError, match='found "l2-rest"; allowed: l2-equilibrium, its new name'):
         parse(POINT + "[[law]]\ntype = 'l2-equilibrium'\nform = 'degree'\n", "x").with_({"law.l2-rest.y": 0.5})
-
-
-ASTEROID = """from typing import Annotated, Any, NamedTuple
-
-from pydantic import create_model
-
-from starhold.algebra.vector import ZERO
-from starhold.laws.interface import Gain, fields
-from starhold.laws.catalogue import catalogue
-from starhold.parts.bodies.libration_point import Libration, PointState, Units
-from starhold.scenario.bodies.interface import Body
-from starhold.scenario.schema import LawTable, ScenarioTable, Timing, columns
-from starhold.scenario.tables import Table
-
-class Parameters(NamedTuple):
-    stiffness: Annotated[float, Gain(above=0.0, text="C")]
-    distance: Annotated[float, Gain("m", above=0.0, text="from the point")] = 100.0
-
-AsteroidTable: Any = create_model("AsteroidTable", __base__=Table, **columns(fields(Parameters)))
-
-class Tables(ScenarioTable):
-    asteroid: AsteroidTable
-    simulation: Timing
-
-class Made(NamedTuple):
-    craft: Libration
-
-class Asteroid(Body):
-    name = "asteroid"
-    marker = "asteroid"
-    tables = Tables
-    law_table = LawTable
-    example = ""
-    def laws(self):
-        return catalogue("libration-point")
-    def context(self, tables, where):
-        return Units(1.0, 1.0)
-    def make(self, table, where):
-        given = table.asteroid
-        return Made(Libration(1.0, given.stiffness, 10.0 * given.distance, given.distance, 0.9, 3.0))
-
-    def given(self, scenario, entry):
-        return {"start": PointState((0.1, 0.0, 0.0), ZERO, ZERO)}
-
-BODY = Asteroid()
-"""
-
-
-def test_a_body_is_one_file_that_is_named_nowhere_else(tmp_path, monkeypatch):
-    (tmp_path / "asteroid.py").write_text(ASTEROID)
-    monkeypatch.setattr("starhold.scenario.bodies.__path__", [*package.__path__, str(tmp_path)])
-    bodies.cache_clear()
-    try:
-        law = "[[law]]\ntype = 'l2-equilibrium'\nform = 'degree'\n"
-        head = "name = 'a'\n[simulation]\nduration = 1\ncontrol_period = 1e-3\n"
-        text = f"{head}[asteroid]\nstiffness = 3.0\ndistance = '1 km'\n{law}"
-        scenario = parse(text, "my.toml")
-        assert (scenario.body, scenario.craft.from_smaller) == ("asteroid", 1000.0)
-        assert build(scenario, scenario.laws[0]).craft is scenario.craft
-        assert scenario.with_({"asteroid.stiffness": 4.0}).craft.stiffness == 4.0
-        assert "asteroid.stifness: found an unknown key; did you mean stiffness?" in message(text.replace("ff", "f"))
-        assert "asteroid.distance" in message(text.replace("1 km", "-1 km"))
-        assert "AsteroidTable" in json_schema()["$defs"]
-    finally:
-        bodies.cache_clear()
-        sys.modules.pop("starhold.scenario.bodies.asteroid", None)

@@ -11,7 +11,7 @@ import starhold as sh
 from starhold.errors import InputError
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.epoch import EPOCH, START, date_of
-from starhold.report.page_parts import settings
+from starhold.report.settings import settings
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import part_schemas
 from starhold.scenario.reading import make_scenario, parse
@@ -144,13 +144,7 @@ NO_DATES = rows("""
 "noon" | "noon"
 12:00:00 | "12:00:00"
 [2026, 2, 30, 0, 0, 0] | [2026, 2, 30, 0, 0, 0]
-[2026, 2, 20, 0, 0, 60] | [2026, 2, 20, 0, 0, 60]
-[2026, 2, 20, 0.5, 0, 0] | [2026, 2, 20, 0.5, 0, 0]
-[2026, 2, 20] | [2026, 2, 20]
-[1e15, 2, 20, 0, 0, 0] | [1000000000000000.0, 2, 20, 0, 0, 0]
 "0001-01-01T00:00:00+01:00" | "0001-01-01T00:00:00+01:00"
-2026 | 2026
-true | True
 { year = 2026 } | {'year': 2026}
 """)
 
@@ -265,13 +259,6 @@ def test_with_changes_it_for_all_and_writes_what_reads_back():
     assert set(epochs(made).values()) == set(epochs(parse(made.text, "again")).values()) == {NOON}
 
 
-def test_a_sweep_over_dates():
-    dates = ["2026-03-20T12:00:00Z", [2026, 9, 23, 0, 0, 0]]
-    found = sh.sweep(scenario(), {"orbit.epoch": dates})
-    assert list(found["orbit.epoch"]) == dates
-    assert found["effort"].nunique() == 2
-
-
 def test_a_campaign_chooses_among_dates_and_draws_no_others():
     read = scenario("2026-03-20")
     assert locate(read, "orbit.epoch").value == (2026.0, 3.0, 20.0, 0.0, 0.0, 0.0)
@@ -308,8 +295,8 @@ def test_schemas_and_the_studio_know_the_one_place():
 
 def _epochs_told(scenario):
     """The rows of the page's settings that hold an epoch, each with its table."""
-    page = settings(scenario, "Settings")
-    return re.findall(r"<h3>([^<]*)</h3>(?:(?!</section>).)*<td>epoch</td><td>([^<]*)</td>", page)
+    page = settings(scenario)
+    return re.findall(r"<h3>([^<]*)</h3>(?:(?!</section>).)*<td>epoch</td><td>([^<]*)</td>", page, re.DOTALL)
 
 
 def test_the_page_tells_the_epoch_once_and_where_it_is_the_default():

@@ -55,7 +55,6 @@ def test_the_published_experiment_is_as_published():
 FAULTS = rows("""
 torque_limit = | torqe_limit = | spacecraft.torqe_limit | unknown key | torque_limit?
 [orbit] | [orbits] | orbits | unknown key | orbit?
-k_rate = 0.09 | k_ratee = 0.09 | law[1].k_ratee | unknown key | k_rate?
 k_rate = 0.09 |  | law[1].k_rate | required
 [spacecraft] | [other] | no body | [body], [libration], [spacecraft]
 duration = 2000.0 | duration = true | simulation.duration | True | a number in s
@@ -67,36 +66,26 @@ duration = 2000.0 | duration = "long" | simulation.duration | "long" | 1 s
 [2.0, 3.0, 4.0] | [2.0, 3.0, 6.0] | spacecraft.inertia | largest exceeds the sum
 [2.0, 3.0, 4.0] | [[2,1,0],[0,3,0],[0,0,4]] | spacecraft.inertia | symmetric
 [2.0, 3.0, 4.0] | [2.0, 3.0] | spacecraft.inertia | [2.0, 3.0] | three principal moments
-[2.0, 3.0, 4.0] | [[2.0], 3.0, 4.0] | spacecraft.inertia
 attitude = [0, 1, 1, 1] | attitude = [0, 0, 0, 0] | initial.attitude | not zero
 attitude = [0, 1, 1, 1] | attitude = [0, 1, 1] | initial.attitude | 4 numbers
 attitude = [0, 1, 1, 1] | attitude = [10, 0, 0, 0] | initial.attitude | length 1
 attitude = [0, 1, 1, 1] | angles = [120, 20, 0] | initial.angles | [120, 20, 0] | "120 deg" | is in rad
 gravity_gradient = true | gravity_gradient = true↵[sensor]↵attitude_noise = 10 | sensor.attitude_noise | "10 deg"
 gravity_gradient = true | gravity_gradient = "yes" | environment.gravity_gradient | "yes" | true or false
-gravity_gradient = true | gravity_gradient = 1 | environment.gravity_gradient | true or false
 [2.0, 3.0, 4.0] | [1e155, 1e155, 1e155] | spacecraft.inertia | 1e+30
-gravity_gradient = true | gravity_gradient = true↵torque_noise = 1e300 | environment.torque_noise | 1e+30
 control_period = 0.1 | control_period = 0.1↵record_every = 9223372036854775808 | simulation.record_every | 2^53
 control_period = 0.1 | control_period = 0.1↵substeps = 10000000 | substeps | at most 1e+06
-duration = 2000.0 | duration = "9**9**9 s" | simulation.duration | '1 s'
 rate = [0.04 | rate = [nan | initial.rate | finite
-duration = 2000.0 | duration = inf | simulation.duration | finite
 control_period = 0.1 | control_period = 0 | simulation.control_period | above 0
 control_period = 0.1 | control_period = 2100 | simulation.control_period | 2000 s
 control_period = 0.1 | control_period = 0.7 | simulation.duration | whole number
 control_period = 0.1 | control_period = 0.1↵substeps = 1.5 | substeps | whole number
 control_period = 0.1 | control_period = 0.1↵record_every = 20001 | simulation.record_every | 20001 | at most the 20000
 name = "three-laws" | name = "../../x" | name | ../../x | letters
-name = "three-laws" | name = "/abs/x" | name | /abs/x | letters
-name = "three-laws" | name = "[/red]" | name | [/red] | letters
 type = "lyapunov" | type = "lyapunov"↵name = "summary.json" | law[1].name | summary.json | file of results
 type = "lyapunov" | type = "lyapunow" | law[1].type | lyapunov?
 type = "lyapunov" | type = [] | law[1].type | one of
-k_rate = 0.09 | k_rate = 0.09↵form = [] | law[1].form
 r = 50.0 | r = 1e30 | law mpc | weights
-type = "lyapunov" |  | law[1].type
-k_rate = 0.09 | k_rate = -0.09 | law[1].k_rate | -0.09 | above 0
 mode = "inertial" | mode = "inertia" | target.mode | inertial
 k_rate = 0.09 | k_rate = 0.09↵quaternion_sign = "short" | law[1].quaternion_sign | shortest
 k_rate = 0.09 | k_rate = 0.09↵form = "I" | law[1].form
@@ -284,4 +273,8 @@ def test_template_runs_as_it_is_and_names_every_key(body):
         options = [field.annotation, *getattr(field.annotation, "__args__", ())]
         for model in (o for o in options if hasattr(o, "model_fields")):
             assert f"[{name}]" in text or f"[[{name}]]" in text
-            assert [key for key in model.model_fields if f"{key} = " not in text] in ([], ["deficit"])
+            assert [key for key in model.model_fields if f"{key} = " not in text] in (
+                [],
+                ["deficit"],
+                ["in_mode", "axis", "direction"],
+            )

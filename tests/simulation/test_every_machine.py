@@ -38,7 +38,7 @@ def steps_of(name: str) -> int:
 SCENARIOS = {name.partition(":")[0]: name for name in reversed(LOOPS)}
 FIRST = set(SCENARIOS.values()) | {"three-laws-noise: mpc"}
 SIBLINGS = {name for name in LOOPS if name not in FIRST or name.endswith("example 0, noise") or name.startswith("mpc")}
-"""Of the same parts or the same law as another loop: printed by `make test-all`, which flies those that are costly."""
+"""Of the same parts or the same law as another loop: for `make test-all`."""
 
 
 class Leg(NamedTuple):
@@ -74,7 +74,7 @@ def same(found: Any, expected: Any) -> None:
     assert np.array_equal(np.asarray(found).view(np.uint64), np.asarray(expected).view(np.uint64))
 
 
-FLOWN = [pytest.param(name, marks=SLOW if is_costly(name) and name in SIBLINGS else ()) for name in LOOPS]
+FLOWN = [pytest.param(name, marks=SLOW if name in SIBLINGS else ()) for name in LOOPS]
 
 
 @pytest.mark.parametrize("name", FLOWN)

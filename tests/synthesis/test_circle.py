@@ -21,13 +21,6 @@ CLEAR = Station(PAIR, "L2", 2.0e7)
 rates = st.floats(0.0, 4.0)
 
 
-def test_the_best_rate_and_the_peak_demand_by_formula():
-    for plant in (PLANT, PUBLISHED):
-        assert best_rate(plant) == pytest.approx(math.sqrt(plant.stiffness - 2.0))
-        assert demand(best_rate(plant), plant) == pytest.approx(2.0 * math.sqrt(plant.stiffness - 1.0))
-    assert round(PLANT.stiffness, 2) == 3.94
-
-
 @pytest.mark.parametrize("radius", [0.5, 1.0, 3.0])
 def test_the_best_rate_and_the_peak_demand_by_optimisation(radius):
     """Over the phase of the circle and its rate, with nothing but the equations of motion."""

@@ -26,7 +26,6 @@ from starhold.synthesis.sail import (
     outline,
     push,
     reach,
-    room,
     set_for,
     steer,
     steered,
@@ -131,14 +130,6 @@ def test_the_set_of_forces_is_convex(reflected):
     assert turns.min() > -1e-13
 
 
-def test_the_ball_of_a_mirror():
-    found = ball(1.0, 0.0)
-    assert found == (MIRROR_CENTRE, MIRROR_RADIUS)
-    assert found.radius == pytest.approx(2.0 * 0.3849, abs=1e-4)
-    assert room(MIRROR_CENTRE, 1.0, 0.0) == pytest.approx(MIRROR_RADIUS, rel=1e-14)
-    assert ball(1.0 - 1e-12, 0.0).radius == pytest.approx(MIRROR_RADIUS, rel=1e-10)
-
-
 @settings(max_examples=30)
 @given(optics)
 @example((0.83, 0.05))
@@ -181,19 +172,3 @@ def test_the_light_of_discs_by_counting_points(body, part):
     sun = x * x + y * y < 1.0
     seen = sun & ((x - separation) ** 2 + y * y > body * body)
     assert lit_discs(separation, 1.0, body) == pytest.approx(seen.sum() / sun.sum(), abs=4e-3)
-
-
-@pytest.mark.parametrize(
-    ("numbers", "said"),
-    [
-        ((0.0, 1.0, 1.0), "pressure must be positive"),
-        ((1.0, -1.0, 1.0), "area must be positive"),
-        ((1.0, 1.0, math.nan), "mass must be positive"),
-        ((1.0, 1.0, 1.0, 1.5), "specular reflectivity must be between"),
-        ((1.0, 1.0, 1.0, 0.7, 0.4), "add up to more than 0 and at most 1"),
-        ((1.0, 1.0, 1.0, 0.0, 0.0), "add up to more than 0 and at most 1"),
-    ],
-)
-def test_what_is_no_sail_is_refused(numbers, said):
-    with pytest.raises(ValueError, match=said):
-        make_sail(*numbers)

@@ -194,12 +194,6 @@ def test_every_machine_leaves_the_bits_of_plain_python(machine: str) -> None:
     agree(machine, *((subject, filled(subject, s), given) for subject, given in SUBJECTS.values() for s in (False, True)))
 
 
-def test_lanes_go_through_loops_of_different_lengths() -> None:
-    subject, given = SUBJECTS["roots"]
-    turns = subject.plain({"cells": filled(subject, False)["cells"][:, 0], "table": np.zeros(12)}, given)["cells"][5:12:2]
-    assert len({*turns}) > 2
-
-
 C_TEXT = """\
 /* A law.
    Second line. */

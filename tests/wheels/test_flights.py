@@ -59,18 +59,6 @@ def test_locked_rotors_fall_through_gravity_like_one_body():
     assert apart < 1e-3 * np.ptp(without["rate"], axis=0).max()
 
 
-def test_a_saturated_wheel_gives_no_more_torque_outwards():
-    text = BUILTIN.replace('momentum_limit = "0.4 N m s"', 'momentum_limit = "0.1 N m s"')
-    text = text.replace('# momentum = "0.1 N m s"', 'momentum = "0.07 N m s"')
-    _, loop, run = flight(text, steps=3000)
-    h, turn = run["wheel_momentum"], run["wheel_torque"]
-    limit = loop.wheels.momentum_limit[0]
-    assert np.abs(h).max() > 0.99 * limit
-    assert np.abs(h).max() <= limit * (1.0 + 1e-9)
-    outward = turn * np.sign(h)
-    assert outward[np.abs(h) > 0.999999 * limit].max(initial=0.0) <= 1e-6
-
-
 def test_a_pyramid_that_loses_a_wheel_goes_on():
     _, _, whole = flight(BUILTIN)
     settled = {}
@@ -106,13 +94,8 @@ ORTHOGONAL = BUILTIN.replace('"pyramid"', '"orthogonal"')
     [
         (BUILTIN.replace('layout = "pyramid"', 'layout = "ring"', 1), "wheels.layout"),
         (BUILTIN.replace('layout = "pyramid"', "", 1), "wheels.layout"),
-        (BUILTIN.replace('"20 mN m"', "-1", 1), "wheels.torque_limit: found -1; allowed: above 0"),
         (BUILTIN.replace("inertia = 1.0e-3", "", 1), "wheel 1 has no inertia: give it, or a unit"),
         (BUILTIN.replace("inertia = 1.0e-3", 'unit = "RW-7"', 1), "no wheel unit 'RW-7'"),
-        (BUILTIN.replace("inertia = 1.0e-3", "inertia = 9.0", 1), "more inertia than the craft"),
-        (axes([1, 0, 0], [0, 1, 0], [1, 1, 0]), "no torque about the body direction (0, 0, 1)"),
-        (axes([0, 0, 0], [0, 1, 0], [1, 1, 0]), "the axis of wheel 1"),
-        (axes([1, 0, 0], [0, 1, 0], [1, 1, 1e-5]), "condition number"),
         (axes([1, 0], [0, 1, 0], [1, 1, 1]), "wheel[1].axis"),
         (fault("wheel = 7\nlost = true"), "fault[1].wheel: found 7; allowed: 1 to 4"),
         (fault("wheel = 0\nlost = true"), "fault[1].wheel: found 0"),

@@ -101,19 +101,6 @@ class Polynomial:
             total = total + c
         return total
 
-    def given(self, values: Mapping[str, Any]) -> Polynomial:
-        """Return the polynomial in the other variables, with these values inserted."""
-        total = Polynomial({})
-        for monomial, c in self.terms.items():
-            for name in monomial:
-                c = c * values[name] if name in values else c
-            total = total + Polynomial({tuple(name for name in monomial if name not in values): c})
-        return total
-
-    def only(self, keep: Callable[[Monomial], bool]) -> Polynomial:
-        """Return the terms whose monomials are kept."""
-        return Polynomial({m: c for m, c in self.terms.items() if keep(m)})
-
     def __add__(self, other: Any) -> Any:
         if isinstance(other, Cases):
             return NotImplemented

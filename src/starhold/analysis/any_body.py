@@ -1,10 +1,8 @@
 """Metrics of a body of which only the recording is known, in the units of the recording."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +12,7 @@ from starhold.algebra.structure import flatten, leaves, places
 from starhold.algebra.vector import most
 from starhold.analysis.meter import Meter, Metric, Window, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
-
-if TYPE_CHECKING:
-    from starhold.simulation.lane import Recording
+from starhold.simulation.lane import Recording
 
 COMMAND = "command"
 """The recorded quantity that a law asks for."""

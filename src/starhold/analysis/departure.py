@@ -1,11 +1,9 @@
 """A flight leaves what is claimed of its law where it meets an assumption no longer; claims are about motions from a set."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +14,17 @@ from starhold.algebra.vector import ZERO, add, apply, subtract
 from starhold.analysis.meter import ALMOST, on_limit
 from starhold.analysis.rigid_body import error_angle
 from starhold.certification.assumptions import LINEAR, assumption
+from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import kinetic_energy
 from starhold.parts.craft import tensor
 from starhold.parts.quaternion_sign import SIGN_POLICIES
+from starhold.simulation.lane import Recording
 from starhold.trace.straight_line import evaluated
-
-if TYPE_CHECKING:
-    from starhold.certification.certificate import Certificate, Claim
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.simulation.lane import Recording
 
 Array: TypeAlias = NDArray[np.float64]
 CHANGES = "what flies, or what the law knows of it, changes"

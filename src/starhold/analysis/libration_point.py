@@ -1,10 +1,9 @@
 """Metrics of a craft that holds a place or a circle near a libration point, all in SI units."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,7 @@ from starhold.algebra.vector import ZERO, Vector, dot, subtract
 from starhold.analysis.meter import INSTANT, LAST, Meter, Metric, Window, is_on_limit, middle, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.parts.bodies.libration_point import Units
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from starhold.simulation.lane import Recording
+from starhold.simulation.lane import Recording
 
 DAY, YEAR = 86_400.0, 365.25 * 86_400.0
 """Seconds."""
@@ -124,10 +119,17 @@ def make_meter(
         "x": Window(rows.window_x, lambda x: x * length, "distance from the plane of the circle or rest", "m"),
         "control": Window(rows.window_control, lambda x: np.sqrt(x) * push, "norm of the control", "m/s^2"),
     }
+    of_place = {"final_distance": Metric("m", "root", (rows.window_away,), (length,), since="tail", final=True)}
+    of_circle = {
+        "deviation": Metric("m", "number", (rows.window_off,), (length,), since="half", final=True),
+        "deviation_overall": Metric("m", "number", (rows.window_off,), (length,), since="start", final=True),
+        "radius_least": Metric("m", "number", (rows.radius_least,), (length,), final=True),
+        "radius_most": Metric("m", "number", (rows.radius_most,), (length,), final=True),
+    }
     table = {
         # A quarter, for these motions go to and fro slowly.
         "settling_time": Metric("s", INSTANT, (rows.outside,), (period * units.time,), kept=LAST),
-        **(_of_circle(rows, length) if circle else _of_place(rows, length)),
+        **(of_circle if circle else of_place),
         "largest_x": Metric("m", "number", (rows.window_x,), (length,), since="half", final=True),
         "limit_share": Metric("1", "number", (rows.limited,), over=("samples", 1.0)),
         "peak_control": Metric("m/s^2", "root", (rows.window_control,), (push,), since="start"),
@@ -140,19 +142,6 @@ def make_meter(
     marks = (half,) if circle else (half, tail)
     early, late = (_note(limit, circle, since) for since in (False, True))
     return Meter(first, given, (early, late), table, windows, steps, period * units.time, marks)
-
-
-def _of_circle(rows: Any, length: float) -> dict[str, Metric]:
-    return {
-        "deviation": Metric("m", "number", (rows.window_off,), (length,), since="half", final=True),
-        "deviation_overall": Metric("m", "number", (rows.window_off,), (length,), since="start", final=True),
-        "radius_least": Metric("m", "number", (rows.radius_least,), (length,), final=True),
-        "radius_most": Metric("m", "number", (rows.radius_most,), (length,), final=True),
-    }
-
-
-def _of_place(rows: Any, length: float) -> dict[str, Metric]:
-    return {"final_distance": Metric("m", "root", (rows.window_away,), (length,), since="tail", final=True)}
 
 
 def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float) -> dict[str, Any]:

@@ -118,7 +118,8 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
         raise LinearityError("the body has no attitude")
     for one in (loop.law, *(f.part for f in loop.used("effector") if f.part.flag("ACTS"))):
         if one.reads:
-            raise LinearityError(f"{one.name} takes the {_listed(one.reads)} too, not attitude and rate alone")
+            readings = " and the ".join(name.replace("_", " ") for name in one.reads)
+            raise LinearityError(f"{one.name} takes the {readings} too, not attitude and rate alone")
     left_out: list[str] = []
     still = _at_rest(loop, left_out)
     try:
@@ -134,10 +135,6 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
     else:
         continuous = law._replace(period=0.0)
     return Linear(plant, continuous, sampled(plant, loop.period, delay), law, delay, tuple(left_out))
-
-
-def _listed(readings: tuple[str, ...]) -> str:
-    return " and the ".join(name.replace("_", " ") for name in readings)
 
 
 def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:

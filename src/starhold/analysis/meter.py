@@ -4,14 +4,12 @@ The same notes are taken inside a kernel, of many flights at once without keepin
 are the instants. A row of a table says how a metric is made of the notes; the report's page reads that table too.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +21,8 @@ from starhold.algebra.vector import dot, most
 from starhold.algebra.words import number_of
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step, over_samples
+from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
-
-if TYPE_CHECKING:
-    from starhold.simulation.lane import Recording
-
 
 LAST = 0.25
 """Share of the run over which chatter and the final error are measured."""
@@ -213,7 +208,9 @@ class Meter:
 
     def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
         """Return the notes of a recording, (numbers, 1), and of its windows, (windows, quantities, 1)."""
-        sampled = {name: values for name, values in run.arrays.items() if name != "time" and _is_sampled(values, run)}
+        # Numbers of each sample, for users may add anything to a Dataset.
+        numbers = {name: values for name, values in run.arrays.items() if values.dtype.kind in "fiu" and name != "time"}
+        sampled = {name: x for name, x in numbers.items() if x.ndim in (1, 2) and len(x) == len(run["time"])}
         columns = tuple((name, values.shape[1:]) for name, values in sampled.items())
         kernels = [_replay(note, self.first, (self.numbers, limit), columns) for note in self.notes]
         shared = Arguments(self.numbers, limit).shared
@@ -231,11 +228,6 @@ class Meter:
             by_window[window] = noted[rows]
             noted[rows] = 0.0
         return noted, by_window
-
-
-def _is_sampled(values: Any, run: Recording) -> bool:
-    """Tell whether values are numbers of each sample: users may add anything to a Dataset."""
-    return values.dtype.kind in "fiu" and values.ndim in (1, 2) and len(values) == len(run["time"])
 
 
 _KERNELS: dict[Any, Kernel] = {}

@@ -1,13 +1,11 @@
 """Metrics of a body that turns, all in SI units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +17,17 @@ from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
-
-if TYPE_CHECKING:
-    from starhold.simulation.lane import Recording
+from starhold.simulation.lane import Recording
 
 DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""
-EXTRAS = ("overshoot", "iterations")
-"""Metrics that cost more than others in a kernel, and are noted there where they are asked for."""
-OF_CAMPAIGNS = ("peak_rate", "drift", "peak_wheel_momentum")
-"""Metrics that a recorded run is not given: its page draws them."""
+PEAKS = {"peak_attitude_error": "angle", "peak_rate_error": "root"}
+"""Largest errors of a whole flight, or of the part of it that a requirement is about, with the kinds of metrics."""
+EXTRAS = ("overshoot", "iterations", *PEAKS)
+"""Metrics that are measured in campaigns and for requirements where they are asked for; the first two cost more in a
+kernel."""
+OF_CAMPAIGNS = ("peak_rate", "drift", "peak_wheel_momentum", *PEAKS)
+"""Metrics that a recorded run is given for requirements alone: its page draws them."""
 WHEEL = ("wheel_momentum", "wheel_command", "wheel_available")
 
 MEASURES: dict[str, Measure] = {
@@ -152,6 +151,8 @@ def make_meter(
     table = _table(rows, period, every, wheels) | {
         name: Metric("rad", "apart", (row,)) for name, row in zip(cones, rows.cones, strict=True)
     }
+    for name, row, unit in zip(PEAKS, (rows.window_angle, rows.window_rate), ("rad", "rad/s"), strict=True):
+        table |= {name: Metric(unit, PEAKS[name], (row,), since="start")} if name in extras else {}
     return Meter(first, bounds, (early, late), table, windows, steps, period, (tail,))
 
 
@@ -184,22 +185,34 @@ def _table(rows: Any, period: float, every: int, wheels: bool) -> dict[str, Metr
 
 
 def recorded_meter(
-    steps: int, period: float, every: int, limit: str, attitude_tolerance: float, rate_tolerance: float
+    steps: int,
+    period: float,
+    every: int,
+    limit: str,
+    attitude_tolerance: float,
+    rate_tolerance: float,
+    cones: Mapping[str, Cone] | None = None,
+    wheels: bool = False,
 ) -> Meter:
-    """The meter of a recording of so many samples but one, at intervals of `every` control periods (s)."""
-    meter = make_meter(steps, period * every, limit, (attitude_tolerance, rate_tolerance), EXTRAS, every=every)
-    table = {name: metric for name, metric in meter.table.items() if name not in OF_CAMPAIGNS}
+    """The meter of a recording of so many samples but one, at intervals of `every` control periods (s); with cones, even
+    if none, that of requirements."""
+    tolerances = attitude_tolerance, rate_tolerance
+    meter = make_meter(steps, period * every, limit, tolerances, EXTRAS, cones or {}, every=every, wheels=wheels)
+    table = {name: metric for name, metric in meter.table.items() if cones is not None or name not in OF_CAMPAIGNS}
     # What is noted in the last quarter alone is not looked at before: one kernel does for all samples.
     return replace(meter, table=table, notes=(meter.notes[1],) * 2)
 
 
-def measure(run: Recording, attitude_tolerance: float, rate_tolerance: float) -> dict[str, Any]:
+def measure(
+    run: Recording, attitude_tolerance: float, rate_tolerance: float, cones: Mapping[str, Cone] | None = None
+) -> dict[str, Any]:
     """Metrics of a run as `label` gives it. Times that are never reached are None, as are all final values and times of
     a run that diverged; `diverged_at` (s) is None for one that did not. So are times within the last tenth of the run, whose
-    names `cut_off` lists."""
+    names `cut_off` lists. cones: those that requirements ask for, whose metrics are given too; None: no requirement asks."""
     attrs = run.attrs
     given = attrs["control_period"], int(attrs["record_every"]), attrs["limit"]
-    meter = recorded_meter(len(run["time"]) - 1, *given, attitude_tolerance, rate_tolerance)
+    more = cones, "wheel_momentum" in run.arrays
+    meter = recorded_meter(len(run["time"]) - 1, *given, attitude_tolerance, rate_tolerance, *more)
     return meter.of_recording(run, float(attrs["torque_limit"]))
 
 

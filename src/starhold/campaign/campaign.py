@@ -51,12 +51,18 @@ class Options:
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with other entries of its [campaign] table, or with such a table; None leaves an entry as it is.
+    """The scenario with other entries of its [campaign] table, or with such a table, and with other [[requirement]] tables,
+    whose method is "campaign" if they tell none; None leaves an entry as it is.
     InputError where there is no such table and the entries lack distributions or the number of runs."""
     given = {key: value for key, value in changes.items() if value is not None}
     if scenario.table.campaign is None and not given.keys() & {"runs", "over"}:
         raise InputError(scenario.where, "campaign", "no [campaign] table", NO_TABLE)
-    return scenario.with_({f"campaign.{key}": value for key, value in given.items()}) if given else scenario
+    required = given.pop("requirement", None)
+    change = {f"campaign.{key}": value for key, value in given.items()}
+    if isinstance(required, list):
+        required = [{"method": "campaign", **one} if isinstance(one, Mapping) else one for one in required]
+    change |= {} if required is None else {"requirement": required}
+    return scenario.with_(change) if change else scenario
 
 
 def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
@@ -135,7 +141,7 @@ def fly_campaign(
             runs = table.runs
     seconds = time.perf_counter() - begun
     results = summarise(store, job, laws, options.until_decided)
-    if options.search and job.dispersions and table.requirement:
+    if options.search and job.dispersions and job.required:
         threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
         taken = set[str]()
         results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken)) for result in results)
@@ -171,8 +177,8 @@ def _fly_until_decided(store: Store, job: Job, take: Callable[[Sequence[Block]],
 
 def _check_decidable(job: Job) -> None:
     where = job.source.where
-    if not job.table.requirement:
-        raise InputError(where, "campaign.requirement", "none", "at least one, to fly until it is decided")
+    if not job.required:
+        raise InputError(where, "requirement", "none of a campaign", "at least one, to fly until it is decided")
     if job.table.sampling != "random":
         given = show(job.table.sampling)
         raise InputError(

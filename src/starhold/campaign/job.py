@@ -17,17 +17,18 @@ from starhold.campaign import envelopes
 from starhold.campaign.chunk import LEAST, MOST, Chunk
 from starhold.campaign.dispersions import Dispersion, read_dispersions
 from starhold.campaign.lanes import Lanes, Lot
-from starhold.campaign.requirements import Requirement, cones_of, extras_of, read_requirements
 from starhold.campaign.sampling import Plan
-from starhold.errors import InputError
+from starhold.errors import input_at
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
+from starhold.scenario.requirement import RequirementTable
 from starhold.simulation.batched import begin_metered
 from starhold.simulation.lane import Progress
 from starhold.simulation.lanes import ThreadPool
 from starhold.studies.body import study_of
+from starhold.studies.requirements import Requirement, cones_of, extras_of, read_requirements, tables_of
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,11 @@ class Job:
         return Plan(dispersions, table.sampling, table.seed, table.runs, self.source.where)
 
     @cached_property
+    def required(self) -> Mapping[str, RequirementTable]:
+        """The tables of what runs must keep, by how errors call them."""
+        return tables_of(self.scenario, "campaign")
+
+    @cached_property
     def dispersions(self) -> tuple[Dispersion, ...]:
         """The keys that runs differ in."""
         return read_dispersions(self.scenario, self.table.over)
@@ -95,17 +101,15 @@ class Job:
 
     def _meter_of(self, loop: ClosedLoop, gains: Any) -> Meter:
         """The meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
-        required = self.table.requirement
+        required = self.required.values()
         extras, cones = extras_of(required, self.table.metrics), cones_of(required)
-        try:
+        key = "requirement" if cones else "campaign.metrics"
+        with input_at(self.source.where, key):
             return study_of(self.scenario.body).meter(self.scenario, loop, gains, extras, cones)
-        except ValueError as error:
-            key = "campaign.requirement" if cones else "campaign.metrics"
-            raise InputError(self.source.where, key, "", str(error)) from None
 
     def requirements(self, law: str) -> tuple[Requirement, ...]:
         """The requirements that runs of a law must keep."""
-        return read_requirements(self.table.requirement, self.meter(law).units, self.source.where)
+        return read_requirements(self.required, self.meter(law).units, self.source.where)
 
     def __call__(self, law: str, first: int, count: int, pool: ThreadPool) -> Callable[[], Chunk]:
         """Begin to fly runs first .. first+count-1 of a law; the function returned waits for their results."""
@@ -211,6 +215,7 @@ def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scen
     """The scenario of one run as a file of its own: the drawn values, in columns (1,), in place of the distributions, the
     number of the run, and no campaign."""
     change = {**job.plan.change({name: values[0] for name, values in columns.items()}), "campaign": None}
+    change |= {"requirement": None}
     if hasattr(job.scenario.table.simulation, "run"):
         change["simulation.run"] = run
     return job.scenario.with_(change)

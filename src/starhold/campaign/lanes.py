@@ -4,32 +4,28 @@ scenario, else run by run.
 No list says which numbers of a loop a value moves: scenarios with other values are built, and compared.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
+from starhold.campaign.dispersions import Dispersion
+from starhold.campaign.sampling import Plan
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Numbers, numbers_of
 from starhold.scenario.building import build
 from starhold.scenario.making import variants
+from starhold.scenario.reading import Scenario
 from starhold.simulation.lanes import carry_columns, stacked
 from starhold.studies.flat import Flat, named, named_numbers, shown_name
 from starhold.trace.calling import Compiled
 from starhold.trace.handles import Handle
-
-if TYPE_CHECKING:
-    from starhold.campaign.dispersions import Dispersion
-    from starhold.campaign.sampling import Plan
-    from starhold.scenario.reading import Scenario
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
@@ -62,7 +58,7 @@ class Lanes:
     def __init__(self, scenario: Scenario, law: str, plan: Plan) -> None:
         self.scenario, self.law, self.plan = scenario, law, plan
         # Of one run nothing else is read.
-        self._bare = scenario.with_({"campaign": None})
+        self._bare = scenario.with_({"campaign": None, "requirement": None})
         self.steps = scenario.table.simulation.steps
         self.first = plan.columns(0, 1)
         self.base = self.exact(self.first)

@@ -41,7 +41,8 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
         # Through Arrow, so that DuckDB itself needs no access to files, not even to these, which it could write as well.
         for number, law in enumerate(flown):
             connection.register(f"chunks {number}", dataset.dataset(files[law], format="parquet"))
-        parts = [f'SELECT {_quoted(law)} AS law, * FROM "chunks {number}"' for number, law in enumerate(flown)]
+        quoted = [law.replace("'", "''") for law in flown]
+        parts = [f"SELECT '{law}' AS law, * FROM \"chunks {number}\"" for number, law in enumerate(quoted)]
         connection.execute(f"CREATE VIEW runs AS {' UNION ALL BY NAME '.join(parts)}")
         connection.execute("SET lock_configuration = true")
         try:
@@ -49,10 +50,6 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
             return connection.execute(sql).df()
         except duckdb.Error as error:
             raise InputError("query", "", "", _short(str(error))) from None
-
-
-def _quoted(law: str) -> str:
-    return "'" + law.replace("'", "''") + "'"
 
 
 def _check(connection: Any, sql: str, duckdb: Any) -> None:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from starhold.campaign.again import FlownAgain
     from starhold.campaign.drivers import Drivers
     from starhold.campaign.envelopes import Envelope
-    from starhold.campaign.requirements import Requirement
     from starhold.campaign.sensitivity import Morris, Refused, Sobol
     from starhold.campaign.verdicts import Verdict
+    from starhold.studies.requirements import Requirement
 
 Array: TypeAlias = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from starhold.campaign.chunk import LEAST, MOST
 from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.drivers import Drivers, find_drivers
 from starhold.campaign.job import Job
-from starhold.campaign.requirements import Requirement
 from starhold.campaign.results import QUANTILES, Again, LawResult, Spread
 from starhold.campaign.store import Store
 from starhold.campaign.verdicts import Verdict, judge
+from starhold.studies.requirements import Requirement
 
 BARS, WIDE = 60, 100.0
 """A histogram has at most so many bars; a metric whose largest value is so many times its least is shown on a logarithmic

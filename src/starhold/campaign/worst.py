@@ -1,24 +1,19 @@
 """The worst of a metric over the box of the dispersions: looked for by flights side by side, from many starts."""
 
-from __future__ import annotations
-
 import math
 import re
 from itertools import count
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.campaign.job import scenario_of
-from starhold.campaign.requirements import LOST, Requirement
+from starhold.campaign.job import Job, scenario_of
 from starhold.campaign.results import Bracket, LawResult
+from starhold.campaign.store import Store
 from starhold.files import atomic_write
 from starhold.simulation.lanes import ThreadPool
-
-if TYPE_CHECKING:
-    from starhold.campaign.job import Job
-    from starhold.campaign.store import Store
+from starhold.studies.requirements import LOST, Requirement
 
 Array = NDArray[np.float64]
 TAIL = 0.00135

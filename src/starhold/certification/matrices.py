@@ -1,7 +1,4 @@
-"""Definite matrices without rounding: floats only guess, rationals and balls decide.
-
-A matrix is a list of rows of rationals (`fmpq`) or balls (`arb`).
-"""
+"""Definite matrices without rounding: floats only guess, rationals decide. A matrix is a list of rows of these (`fmpq`)."""
 
 from collections.abc import Sequence
 from typing import Any, TypeAlias
@@ -21,7 +18,7 @@ def rows(array: Any) -> Rows:
 
 
 def floats(matrix: Sequence[Sequence[Any]]) -> NDArray[np.float64]:
-    """The nearest array of floats (of balls, their middles)."""
+    """The nearest array of floats."""
     return np.array([[number(x) for x in row] for row in matrix], dtype=float)
 
 
@@ -32,12 +29,9 @@ def number(x: Any) -> float:
     return float(x.mid()) if isinstance(x, arb) else float(x)
 
 
-def identity(size: int, c: Any = 1) -> Rows:
+def identity(size: int, c: Any) -> Rows:
     """c times the unit matrix."""
-    return [
-        [exact(c) if i == j and not isinstance(c, arb) else c if i == j else fmpq(0) for j in range(size)]
-        for i in range(size)
-    ]
+    return [[c if i == j else fmpq(0) for j in range(size)] for i in range(size)]
 
 
 def plus(a: Rows, b: Rows, c: Any = 1) -> Rows:
@@ -57,8 +51,7 @@ def inverse(a: Rows) -> Rows:
 
 
 def definite(a: Rows) -> bool:
-    """Whether a symmetric matrix is positive definite for certain, by its pivots: exact for rationals; for balls, whether
-    every matrix in them is (False: it was not decided so)."""
+    """Whether a symmetric matrix is positive definite, by its pivots."""
     rest = [list(row) for row in a]
     for k in range(len(rest)):
         pivot = rest[k][k]
@@ -98,9 +91,7 @@ def _just_below(guess: float, size: float, a: Rows) -> Any:
     raise ArithmeticError("no bound of an eigenvalue was found")
 
 
-def matrix_of(polynomial: Polynomial, first: Sequence[str], second: Sequence[str]) -> Rows:
-    """The coefficients of first_i second_j; of a quadratic form (first is second) the symmetric matrix."""
-    if tuple(first) == tuple(second):
-        form = [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
-        return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(form)]
-    return [[polynomial.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in second] for a in first]
+def matrix_of(form: Polynomial, names: Sequence[str]) -> Rows:
+    """The symmetric matrix of a quadratic form in these variables."""
+    found = [[form.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in names] for a in names]
+    return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(found)]

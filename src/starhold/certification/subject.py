@@ -239,8 +239,7 @@ def _with_rotors(loop: ClosedLoop) -> Rows:
 
 def _largest_form(quadratic: Polynomial) -> Any:
     """A bound of |quadratic form| over the unit sphere."""
-    names = ("p1", "p2", "p3")
-    form = matrix_of(quadratic, names, names)
+    form = matrix_of(quadratic, ("p1", "p2", "p3"))
     return max(greatest(form), greatest(times(-1, form)), fmpq(0))
 
 

@@ -73,6 +73,12 @@ def ranked(certificate: Certificate) -> list[Claim]:
     return sorted(certificate.claims, key=lambda claim: len(left_out(claim)))
 
 
+def strongest(claims: Sequence[Claim]) -> list[Claim]:
+    """The claims, those about the motion before those about its linear form; of these the proved first, then those that
+    leave out the fewest parts of the loop."""
+    return sorted(claims, key=lambda claim: (claim.kind == "sampling", claim.outcome != "proved", len(left_out(claim))))
+
+
 def grouped(certificate: Certificate) -> dict[str, list[Claim]]:
     """The claims as they are ranked, those that leave out the same parts under a text that says which."""
     groups: dict[str, list[Claim]] = {}

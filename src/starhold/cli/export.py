@@ -12,7 +12,7 @@ from starhold.cli.arguments import Certified, ExportOutput, Force, ScenarioFile,
 if TYPE_CHECKING:
     from starhold.export.folder import Exported
 
-app = typer.Typer(help="Write a law as flight code, or for another simulator.", no_args_is_help=True, rich_markup_mode=None)
+app = typer.Typer(help="Write a law as flight code, a run, or requirements.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @app.command()
@@ -68,6 +68,25 @@ def aem(
         raise InputError(str(output), "", "a file already there", "another one with -o, or --force")
     words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
     console.print(f"{export_aem(run, output, version=version, **words)}", soft_wrap=True)  # type: ignore
+
+
+@app.command()
+def requirements(
+    file: ScenarioFile,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="a .csv or .reqif file to write")],
+    original: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="a .reqif file whose content is kept, but for what differs")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Write the requirements of a scenario for other tools: CSV or ReqIF."""
+    from starhold.api import export_requirements
+    from starhold.cli.console import console
+    from starhold.errors import InputError
+
+    if output.exists() and not force:
+        raise InputError(str(output), "", "a file already there", "another one with -o, or --force")
+    console.print(f"{export_requirements(file, output, original)}", soft_wrap=True)
 
 
 def print_exported(exported: Exported, folder: Path) -> None:

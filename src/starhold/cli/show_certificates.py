@@ -20,6 +20,7 @@ from starhold.certification.wording import (
     methods,
     ranked,
     statement,
+    strongest,
     unclaimed,
 )
 from starhold.cli.console import console
@@ -101,7 +102,7 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
     if not claims:
         yield name, _coloured("undecided"), "no claim"
         return
-    first, *others = sorted(claims, key=lambda claim: (claim.kind == "sampling", claim.outcome != "proved"))
+    first, *others = strongest(claims)
     covered = coverage(first, certificate.subject)
     yield name, _coloured(first.outcome), statement(first, certificate.subject) + (f" ({covered})" if covered else "")
     named: dict[str, list[str]] = {}

@@ -6,7 +6,8 @@ import math
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar, less, where
+from starhold.algebra.scalar import Scalar, less
+from starhold.algebra.structure import chosen
 from starhold.algebra.vector import Vector, add, apply, clip_axes, dot, scale, subtract
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, tracking_torque
 from starhold.parts.craft import Craft
@@ -44,12 +45,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
     """Return the control torque (N m, body)."""
     damping = scale(gains.k_rate, measurement.rate)
     within = clip_axes(damping, craft.torque_limit - gains.k_attitude)
-    clipped = less(0.5, gains.limit)
-    damping = (
-        where(clipped, within[0], damping[0]),
-        where(clipped, within[1], damping[1]),
-        where(clipped, within[2], damping[2]),
-    )
+    damping = chosen(less(0.5, gains.limit), within, damping)
     feedback = add(damping, scale(gains.k_attitude, vector_part(measurement.attitude)))
     return subtract(tracking_torque(measurement, craft), feedback), memory
 

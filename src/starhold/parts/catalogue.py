@@ -152,7 +152,10 @@ def as_part(module: ModuleType, path: Path | None = None) -> Part:
     if either and not any(hasattr(module, name) for name in either):
         raise ValueError(f"{module.__file__}: this {role} needs {' or '.join(either)}")
     if hasattr(module, "Params") and not part.table:
-        _declared(part.fields, module)
+        try:
+            part.fields()
+        except (AttributeError, NameError, TypeError) as error:
+            raise ValueError(f"{module.__file__}: {error}") from None
     return part
 
 
@@ -164,13 +167,6 @@ def make(kind: type[AnyPart], module: ModuleType, path: Path | None, demanded: t
     if not isinstance(module.CARD, Card):
         raise ValueError(f"{module.__file__}: CARD is not a Card of starhold.parts.contract")
     return kind((module.__name__.rpartition(".")[2] if path is None else path.stem).replace("_", "-"), module, path)
-
-
-def _declared(read: Callable[[], object], module: ModuleType) -> None:
-    try:
-        read()
-    except (AttributeError, NameError, TypeError) as error:
-        raise ValueError(f"{module.__file__}: {error}") from None
 
 
 _READ: dict[tuple[Path, str], ModuleType] = {}

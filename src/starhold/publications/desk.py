@@ -1,30 +1,22 @@
 """Measures get scenarios, flights, figures and proofs here; each is made once for a publication."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from starhold.campaign.results import CampaignResult
+from starhold.certification.certificate import Claim
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.publications.paper import scenario_files
-from starhold.scenario.reading import builtin_text, parse
+from starhold.scenario.reading import Scenario, builtin_text, parse
+from starhold.simulation.lane import Recording
 from starhold.studies import compare as studies
-from starhold.studies.body import study_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from starhold.campaign.results import CampaignResult
-    from starhold.certification.certificate import Claim
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.scenario.reading import Scenario
-    from starhold.simulation.lane import Recording
-    from starhold.studies.body import Issued
-    from starhold.studies.flight import Flight
+from starhold.studies.body import Issued, study_of
+from starhold.studies.flight import Flight
 
 
 class Desk:

@@ -14,35 +14,27 @@ from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.paper import FigureItem, Paper, Section
 from starhold.publications.reproduction import Judged, Reproduction, reproduce
 from starhold.publications.verdicts import PLAIN, VERDICTS
+from starhold.report.commands import Column, Table
 from starhold.report.figures import DPI, plain
-from starhold.report.page_parts import plain_document
+from starhold.report.page_parts import fold, plain_document
 from starhold.report.plots import colour
 from starhold.report.results import INDEX, SUMMARY
+from starhold.report.tables import Markup, pill, table_html
 from starhold.report.text import number_text
 from starhold.version import __version__
-
-MOODS: dict[str, str] = {
-    "agrees": "good",
-    "holds": "good",
-    "close": "open",
-    "depends": "open",
-    "differs": "bad",
-    "fails": "bad",
-}
 
 
 def paper_page(made: Reproduction, pictures: Mapping[str, bytes]) -> str:
     """The page of a publication, with its pictures (PNG) by the names of their figures."""
     paper = made.paper
     body = [
-        f"<h1>{escape(paper.letter)}. {escape(paper.title)}</h1>",
+        f'<header class="top"><h1>{escape(paper.letter)}. {escape(paper.title)}</h1>{tally(made.rows.values())}</header>',
         f'<p class="lead">{escape(paper.source)}</p>',
-        f"<p>{escape(paper.about)}</p>",
-        f"<p>{tally(made.rows.values())}</p>",
         _changes(made.changed),
+        f"<p>{escape(paper.about)}</p>",
         *(_section(section, made, pictures) for section in paper.section),
-        _files(made),
-        _reading(),
+        fold("What was flown", _files(made)),
+        fold("How to read the verdicts", _reading()),
         _footer(made),
     ]
     return plain_document(f"{paper.letter}. {paper.title}", body)
@@ -50,21 +42,27 @@ def paper_page(made: Reproduction, pictures: Mapping[str, bytes]) -> str:
 
 def index_page(made: Sequence[Reproduction]) -> str:
     """The page that leads to those of the publications, with all errata."""
-    rows = "".join(
-        f'<tr><th scope="row"><a href="{one.paper.letter}.html">{one.paper.letter}. {escape(one.paper.title)}</a>'
-        f"<small>{escape(one.paper.source)}</small></th><td>{len(one.figures)}</td><td>{len(one.rows)}</td>"
-        f"<td>{tally(one.rows.values())}</td></tr>"
+    rows = [
+        [
+            Markup(
+                f'<a href="{one.paper.letter}.html">{one.paper.letter}. {escape(one.paper.title)}</a>'
+                f"<small>{escape(one.paper.source)}</small>"
+            ),
+            *(len(one.figures), len(one.rows)),
+            Markup(tally(one.rows.values())),
+        ]
         for one in made
-    )
+    ]
+    columns = [Column("publication"), Column("figures", "", "d"), Column("rows", "", "d"), Column("verdicts")]
     errata = [(judged, one.paper) for one in made for judged in one.rows.values() if judged.row.erratum is not None]
     body = [
         "<h1>Published and reproduced</h1>",
         '<p class="lead">Every figure, table and numerical statement of the publications that starhold implements, made '
         "again and laid beside what is printed.</p>",
         _changes([judged for one in made for judged in one.changed]),
-        _grid(("publication", "figures", "rows", "verdicts"), rows, "wide titled"),
-        _errata(errata),
-        _reading(),
+        table_html(Table(columns, rows), "told titled"),
+        fold("Errata", _errata(errata)),
+        fold("How to read the verdicts", _reading()),
         f"<footer>starhold {__version__}</footer>",
     ]
     return plain_document("Published and reproduced", body)
@@ -74,12 +72,7 @@ def tally(rows: Any) -> str:
     """The count of each verdict."""
     counted = Counter(judged.verdict for judged in rows)
     given = [verdict for verdict in VERDICTS if counted[verdict]]
-    return " ".join(f'<span class="count">{badge(verdict)} {counted[verdict]}</span>' for verdict in given)
-
-
-def badge(verdict: str) -> str:
-    """The word in its colour."""
-    return f'<span class="verdict {MOODS[verdict]}">{verdict}</span>'
+    return " ".join(f'<span class="count">{pill(verdict)} {counted[verdict]}</span>' for verdict in given)
 
 
 def value_words(judged: Judged) -> str:
@@ -134,33 +127,30 @@ def _figure(item: FigureItem, picture: bytes) -> str:
 def _table(rows: Sequence[Judged]) -> str:
     if not rows:
         return ""
-    if any(judged.row.published for judged in rows):
-        heads = ("what is printed", "published", "ours", "difference", "verdict")
-        return _grid(heads, "".join(_row(judged, True) for judged in rows), "wide rows")
-    return _grid(("what is printed", "ours", "verdict"), "".join(_row(judged, False) for judged in rows), "wide rows plain")
+    numbers = any(judged.row.published for judged in rows)
+    heads = ("what is printed", *("published",) * numbers, "ours", *("difference",) * numbers, "verdict")
+    ids = {i: f'id="{escape(judged.row.name)}"' for i, judged in enumerate(rows)}
+    table = Table([*map(Column, heads)], [_row(judged, numbers) for judged in rows])
+    return table_html(table, "rows" if numbers else "rows plain", rows=ids)
 
 
-def _grid(heads: Sequence[str], rows: str, kind: str = "wide") -> str:
-    head = "".join(f'<th scope="col">{word}</th>' for word in heads)
-    return f'<div class="{kind}"><table class="text"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-
-
-def _row(judged: Judged, numbers: bool) -> str:
-    """A row of a table, and one more where something is to be explained; with the columns of printed numbers or without."""
+def _row(judged: Judged, numbers: bool) -> list[Any]:
+    """A row of a table, with what is to be explained; with the columns of printed numbers or without."""
     row = judged.row
     mark = f"Erratum {row.erratum}. " if row.erratum is not None else ""
     printed = ", ".join(row.published) + (f" {row.unit}" if row.unit and row.published else "")
-    note = f"<small>{escape(judged.finding.note)}</small>" if judged.finding.note else ""
-    changed = f"<small>recorded: {escape(row.verdict)}</small>" if judged.changed else ""
-    cells = [
-        f"<td>{escape(mark + row.says)}<small>{escape(row.where)}</small></td>",
-        f'<td data-head="published">{escape(printed)}</td>' * numbers,
-        f'<td data-head="ours">{escape(value_words(judged))}{note}</td>',
-        f'<td data-head="difference">{escape(difference(judged))}</td>' * numbers,
-        f"<td>{badge(judged.verdict)}{changed}</td>",
+    changed = f"recorded: {row.verdict}" if judged.changed else ""
+    return [
+        Markup(escape(mark + row.says) + _small(row.where) + _small(row.why)),
+        *(printed,) * numbers,
+        Markup(escape(value_words(judged)) + _small(judged.finding.note)),
+        *(difference(judged),) * numbers,
+        Markup(pill(judged.verdict) + _small(changed)),
     ]
-    why = f'<tr class="reason"><td colspan="{5 if numbers else 3}">{escape(row.why)}</td></tr>' if row.why else ""
-    return f'<tr id="{escape(row.name)}">{"".join(cells)}</tr>{why}'
+
+
+def _small(text: str) -> str:
+    return f"<small>{escape(text)}</small>" if text else ""
 
 
 def _changes(changed: Sequence[Judged]) -> str:
@@ -174,13 +164,18 @@ def _errata(errata: Sequence[tuple[Judged, Paper]]) -> str:
     if not errata:
         return ""
     numbered = sorted(errata, key=lambda pair: pair[0].row.erratum or 0)
-    rows = "".join(
-        f'<tr><td>{judged.row.erratum}</td><td><a href="{paper.letter}.html#{escape(judged.row.name)}">'
-        f"{paper.letter}, {escape(judged.row.where)}</a></td>"
-        f"<td>{escape(judged.row.says)}</td><td>{escape(judged.row.why or judged.finding.note)}</td></tr>"
+    rows = [
+        [
+            judged.row.erratum,
+            Markup(
+                f'<a href="{paper.letter}.html#{escape(judged.row.name)}">{paper.letter}, {escape(judged.row.where)}</a>'
+            ),
+            judged.row.says,
+            judged.row.why or judged.finding.note,
+        ]
         for judged, paper in numbered
-    )
-    return f"<h2>Errata</h2>\n{_grid(('no.', 'where', 'printed', 'what is found instead'), rows)}"
+    ]
+    return table_html(Table([*map(Column, ("no.", "where", "printed", "what is found instead"))], rows))
 
 
 def _files(made: Reproduction) -> str:
@@ -192,14 +187,14 @@ def _files(made: Reproduction) -> str:
         for name, text in made.files.items()
     )
     return (
-        f"<h2>What was flown</h2>\n<p>The files lie in the folder {letter}, beside this page; "
+        f"<p>The files lie in the folder {letter}, beside this page; "
         f"<code>starhold compare {letter}/FILE.toml</code> flies each of them.</p>{parts}"
     )
 
 
 def _reading() -> str:
-    items = "".join(f"<dt>{badge(word)}</dt><dd>{escape(meaning)}</dd>" for word, meaning in VERDICTS.items())
-    return f"<h2>How to read the verdicts</h2>\n<dl>{items}</dl>"
+    items = "".join(f"<dt>{pill(word)}</dt><dd>{escape(meaning)}</dd>" for word, meaning in VERDICTS.items())
+    return f"<dl>{items}</dl>"
 
 
 def _footer(made: Reproduction) -> str:
@@ -301,19 +296,18 @@ def write_index(made: Sequence[Reproduction], folder: Path) -> Path:
     summary = {
         "starhold_version": __version__,
         "changed": [f"{one.paper.letter}/{judged.row.name}" for one in made for judged in one.changed],
-        "papers": {one.paper.letter: _summary(one) for one in made},
+        "papers": {
+            one.paper.letter: {
+                "title": one.paper.title,
+                "figures": [item.model_dump(include={"name", "number", "caption"}) for item in one.paper.figures],
+                "rows": [judged.summary() for judged in one.rows.values()],
+            }
+            for one in made
+        },
     }
     _write(folder / INDEX, index_page(made))
     _write(folder / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=True) + "\n")
     return folder / INDEX
-
-
-def _summary(made: Reproduction) -> dict[str, Any]:
-    return {
-        "title": made.paper.title,
-        "figures": [{"name": item.name, "number": item.number, "caption": item.caption} for item in made.paper.figures],
-        "rows": [judged.summary() for judged in made.rows.values()],
-    }
 
 
 def _write(path: Path, text: str) -> None:

@@ -86,19 +86,19 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
         Plot("scalar", "scalar part of the error quaternion", [scalar]),
         Plot("attitude", "vector part of the error quaternion", vector),
         Plot("rate", "angular velocity relative to the target", [sound(one, flights) for one in rates]),
-        Plot("torque", "torque applied", torques, dashed, True),
+        Plot("torque", "torque applied", torques, dashed, True, topic="Actuators"),
         _angle(flights, factor, scenario),
         _roll_pitch_yaw(flights, factor),
         (
             *_transient(flights, factor, scenario),
             *_wheels(flights, factor, scenario),
-            *recorded_plots(flights, factor, KNOWN),
+            *recorded_plots(flights, factor, KNOWN, readers_of(scenario)),
         ),
-        tuple(mark for mark in (*map(Mark, fault_times(scenario)), *_begun(flights)) if mark.time <= end),
+        tuple(mark for mark in (*map(Mark, fault_times(scenario)), *begun(flights)) if mark.time <= end),
     )
 
 
-def _begun(flights: Sequence[Flight]) -> list[Mark]:
+def begun(flights: Sequence[Flight]) -> list[Mark]:
     """When modes begin; of laws that switch to and fro the first of them."""
     of = {flight.name: flight.modes for flight in flights if flight.modes}
     return [
@@ -106,6 +106,12 @@ def _begun(flights: Sequence[Flight]) -> list[Mark]:
         for name, modes in of.items()
         for one in modes[:MOST_MARKS]
     ]
+
+
+def readers_of(scenario: Scenario) -> tuple[str, ...]:
+    """How the names of what sensors and estimators tell begin."""
+    readers = [fitted.called for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator")]
+    return tuple(f"{name.replace('-', '_')}_" for name in readers)
 
 
 def steps_within(flight: Flight, kind: str) -> list[int | None]:
@@ -215,8 +221,21 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple
         if limits is not None and not any(panel.levels for panel in panels):
             least = min(limits)
             dashed = f"limit of {'each' if max(limits) == least else 'the weakest'}, {least:g} {unit}, off the scale"
-        plots.append(Plot(name.replace("_", "-"), title, panels, dashed))
+        plots.append(Plot(name.replace("_", "-"), title, panels, dashed, topic="Actuators"))
     return tuple(plots)
+
+
+def closest_limit(flight: Flight, scenario: Scenario) -> tuple[float, str]:
+    """The limit of torque or wheels that a flight comes closest to: its largest value as a share of that, and what it is
+    of; (0, "") where there is no limit."""
+    run, wheels = flight.recording, wheels_of(scenario)
+    torque, attrs = run["torque"], run.attrs
+    limited = [("torque", np.linalg.norm(torque, axis=1) if attrs["limit"] == "norm" else torque, attrs["torque_limit"])]
+    if wheels is not None and "wheel_momentum" in run.arrays:
+        limited.append(("wheels' momentum", run["wheel_momentum"], np.array(wheels.momentum_limit)))
+        limited.append(("motors' torque", run["wheel_torque"], np.array(wheels.torque_limit)))
+    shares = [(float(np.abs(values / limit).max(initial=0.0)), name) for name, values, limit in limited]
+    return max(shares) if max(shares)[0] > 0.0 else (0.0, "")
 
 
 def _peak(flights: Sequence[Flight], name: str) -> float:

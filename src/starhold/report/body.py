@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from starhold.studies.body import body_module
@@ -22,20 +22,18 @@ class Sampling(NamedTuple):
 
 
 class PageParts(NamedTuple):
-    """The parts of a page that belong to the body: the data of its scripts (each plot in "plots" has a box), HTML, and the
-    names of scripts among the assets."""
+    """The parts of a page that belong to the body: the data of its scripts (each plot in "plots" has a box, the first on the
+    first screen), HTML, and the names of scripts among the assets."""
 
     data: dict[str, Any]
-    views: Sequence[str] = ()
-    """Sections above the plots over time."""
+    views: str = ""
+    """A box beside the first plot."""
     measured: str = ""
     """A section below the ranking."""
+    folds: Mapping[str, str] = {}
+    """What else stands in the folds of these names."""
     transient: float | None = None
     """The length of the transient (s) that the page can show by itself, None for none."""
-    settings: str = "Settings"
-    """The heading of the settings."""
-    units: str = ""
-    """A section above the settings."""
     scripts: Sequence[str] = ()
     footer: str = ""
     sampling: Sampling | None = None

@@ -18,11 +18,10 @@ from starhold.files import atomic_write
 from starhold.report import campaign_tables as tables
 from starhold.report.campaign_tables import Section, drivers, indices, picture
 from starhold.report.campaign_units import Wording, count_text, flown_text, headings_of, headline, outcome_of, plain_measure
-from starhold.report.page_parts import document, plot_box, rounded, versions
+from starhold.report.page_parts import beside, document, fold, plot_box, rounded, versions
 from starhold.report.plots import colour
-from starhold.report.proved import swatch
 from starhold.report.results import PAGE, write_run
-from starhold.report.tables import code, note, pill, table_html
+from starhold.report.tables import code, note, pill, swatch, table_html
 
 if TYPE_CHECKING:
     from starhold.campaign.envelopes import Envelope
@@ -82,6 +81,7 @@ def _histogram(name: str, metric: str, spreads: dict[int, Spread], result: Campa
     )
     return {
         "name": name,
+        "metric": metric,
         "title": measure.heading,
         "notes": [f"required: {words.asks(item.name)}" for item in required]
         + ([f"runs without a value: {missing}"] if missing else []),
@@ -197,22 +197,25 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     words = Wording.of(scenario.body, result)
     spreads, over_time = histograms(result, words), envelopes(result, words)
     required = tables.verdicts(result, words)
+    bound = {item.column for item in words.requirements.values()}
+    leads = [*over_time[:1], *sorted(spreads, key=lambda plot: plot["metric"] not in bound)[:1]]
     sections = [
-        note(flown_text(result)),
+        table_html(required.table, "told tight") if required else note("Nothing is required, so there are no verdicts."),
+        _switches(result),
+        beside(*(plot_box(plot, 2) for plot in leads)),
         *_headlines(result, words),
-        _shown(required) or f"<h2>Verdicts</h2>{note('The campaign requires nothing, so there are no verdicts.')}",
-        _in_words(result) if required else "",
-        _shown(tables.runs(result), fit=True),
-        _shown(tables.metrics(result, words)),
-        _distributions(spreads, result),
-        _over_time(over_time, result),
-        _shown(tables.again(result, MOST_AGAIN)),
-        _shown(tables.brackets(result, words)),
-        *_drivers(result, words),
-        *_indices(result, words),
-        _shown(tables.dispersions(result)),
-        _store(result, words),
-        _reading(),
+        fold("Verdicts in words", note(required.note) + _in_words(result) if required else ""),
+        fold("Runs", _shown(tables.runs(result)._replace(heading=""), fit=True)),
+        fold("Distributions", _distributions([plot for plot in spreads if plot not in leads])),
+        fold("Envelopes over time", _over_time([plot for plot in over_time if plot not in leads])),
+        _folded(tables.metrics(result, words)),
+        _folded(tables.again(result, MOST_AGAIN)),
+        _folded(tables.brackets(result, words)),
+        fold("What drives failures and metrics", "".join(_drivers(result, words))),
+        fold("Sensitivity indices", "".join(_shown(section, fit=True) for section in indices(result, words))),
+        _folded(tables.dispersions(result)),
+        fold("Results", _store(result, words)),
+        fold("How to read this page", _reading()),
     ]
     data = {
         "laws": [{"name": law.law, "colour": colour(number)} for number, law in enumerate(result.laws)],
@@ -221,14 +224,20 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
         "histograms": [_for_script(plot) for plot in spreads],
         "envelopes": [_for_script(plot) for plot in over_time],
     }
-    return document(scenario, sections, data, ["campaign.js"], f"{versions()}.")
+    outcomes = "".join(
+        f"<span>{swatch(number)}{escape(law.law)} {pill(outcome_of(law))}</span>" for number, law in enumerate(result.laws)
+    )
+    return document(scenario, sections, data, ["campaign.js"], f"{versions()}.", flown_text(result), outcomes)
 
 
-def _shown(section: Section | None, level: int = 2, fit: bool = False) -> str:
-    """A section as HTML; nothing where there is none."""
-    if section is None:
-        return ""
-    head = f"<h{level}>{escape(section.heading)}</h{level}>\n" if section.heading else ""
+def _folded(section: Section | None) -> str:
+    """A section that is there when asked for."""
+    return "" if section is None else fold(section.heading, _shown(section._replace(heading="")))
+
+
+def _shown(section: Section, fit: bool = False) -> str:
+    """A section as HTML."""
+    head = f"<h3>{escape(section.heading)}</h3>\n" if section.heading else ""
     return f"{head}{table_html(section.table, fit=fit) if section.table.rows else ''}\n{note(section.note)}"
 
 
@@ -245,7 +254,7 @@ def _in_words(result: CampaignResult) -> str:
         for number, law in enumerate(result.laws)
         for verdict in law.verdicts
     )
-    return f'<details><summary>The verdicts in words</summary><ul class="note">{items}</ul></details>'
+    return f'<ul class="note">{items}</ul>'
 
 
 def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
@@ -254,7 +263,6 @@ def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
 
     looked = [(number, law) for number, law in enumerate(result.laws) if law.drivers is not None]
     if looked:
-        yield "<h2>What drives failures and metrics</h2>"
         yield note(
             "Shown is what stands out from chance: all tests of a law are corrected together, so that with "
             f"{percent(1.0 - RISK)} confidence nothing is shown by chance, if inputs were drawn independently. Numbers of "
@@ -266,28 +274,21 @@ def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
         yield _shown(drivers(law.drivers, words, MOST_DRIVERS))
 
 
-def _indices(result: CampaignResult, words: Wording) -> Iterator[str]:
-    sections = indices(result, words)
-    yield "<h2>Sensitivity indices</h2>" if sections else ""
-    yield from (_shown(section, 3, fit=True) for section in sections)
-
-
 def _for_script(plot: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in plot.items() if key not in {"title", "notes"}}
+    return {key: value for key, value in plot.items() if key not in {"title", "notes", "metric"}}
 
 
-def _switches(result: CampaignResult, more: str = "") -> str:
-    """Buttons that show and hide laws in all pictures."""
+def _switches(result: CampaignResult) -> str:
+    """Buttons that show and hide laws in all pictures; empty for one law."""
     pressed = 'type="button" aria-pressed="true"'
     buttons = "".join(
         f'<button class="law-switch" data-law="{number}" {pressed}>{swatch(number)}{escape(law.law)}</button>'
         for number, law in enumerate(result.laws)
     )
-    shown = buttons if len(result.laws) > 1 else ""
-    return f'<p class="switch">{shown}{more}</p>' if shown or more else ""
+    return f'<p class="switch">{buttons}</p>' if len(result.laws) > 1 else ""
 
 
-def _distributions(plots: list[dict[str, Any]], result: CampaignResult) -> str:
+def _distributions(plots: list[dict[str, Any]]) -> str:
     if not plots:
         return ""
     rare = '<button id="rare" type="button" aria-pressed="false">Logarithmic counts: show rare runs</button>'
@@ -296,17 +297,17 @@ def _distributions(plots: list[dict[str, Any]], result: CampaignResult) -> str:
         "so that areas compare.</p>"
     )
     grid = f'<div class="grid">{"".join(map(plot_box, plots))}</div>'
-    return f"<h2>Distributions</h2>\n{note}\n{_switches(result, rare)}\n{grid}"
+    return f'{note}\n<p class="switch">{rare}</p>\n{grid}'
 
 
-def _over_time(plots: list[dict[str, Any]], result: CampaignResult) -> str:
+def _over_time(plots: list[dict[str, Any]]) -> str:
     if not plots:
         return ""
     note = (
         '<p class="note">Of the runs that were not lost, the largest value in each window of time: median (line), 5 to 95 % '
         "(band), least and largest of all runs (thin lines). Drag to zoom, double-click to zoom out.</p>"
     )
-    return f"<h2>Envelopes over time</h2>\n{note}\n{_switches(result)}\n{''.join(map(plot_box, plots))}"
+    return f"{note}\n{''.join(map(plot_box, plots))}"
 
 
 def _store(result: CampaignResult, words: Wording) -> str:
@@ -317,7 +318,6 @@ def _store(result: CampaignResult, words: Wording) -> str:
         questions.append(f"select law, run, {column} from runs where failed order by {column} desc limit 10")
     examples = "".join(f"<p>{code(f'starhold query {folder} {shlex.quote(question)}')}</p>" for question in questions)
     return (
-        "<h2>Results</h2>\n"
         f'<p>Digest (SHA-256 of the sorted results): <code class="copy">{escape(result.digest)}</code></p>\n'
         '<p class="note">The same scenario gives the same digest, whatever flies it. Every run is a row of the table '
         f"<code>runs</code>, with its inputs, metrics and margins:</p>\n{examples}"
@@ -326,7 +326,7 @@ def _store(result: CampaignResult, words: Wording) -> str:
 
 def _reading() -> str:
     items = "".join(f"<dt>{escape(what)}</dt><dd>{escape(meaning)}</dd>" for what, meaning in READING.items())
-    return f'<h2>How to read this page</h2>\n<dl class="reading">{items}</dl>'
+    return f'<dl class="reading">{items}</dl>'
 
 
 RECORDED = "recorded"

@@ -14,9 +14,9 @@ from starhold.certification.wording import listed
 from starhold.studies.body import body_module
 
 if TYPE_CHECKING:
-    from starhold.campaign.requirements import Requirement
     from starhold.campaign.results import Bracket, CampaignResult, LawResult
     from starhold.campaign.verdicts import Verdict
+    from starhold.studies.requirements import Requirement
 
 
 DASH = "—"

@@ -10,8 +10,9 @@ import numpy as np
 from starhold.analysis.linear import AXES, Linear
 from starhold.analysis.margins import Margins, Response, margins, response
 from starhold.errors import InputError
+from starhold.report.commands import Cell, Column, Table
 from starhold.report.plots import colour
-from starhold.report.proved import swatch
+from starhold.report.tables import note, table_html
 from starhold.report.text import number_text
 from starhold.scenario.reading import Scenario
 from starhold.studies.flight import Flight
@@ -47,22 +48,15 @@ def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
     known = [_know(scenario, number, flight.name) for number, flight in enumerate(flights)]
     if not any(one.linear for one in known):
         return ""
-    rows = "".join(_rows(one) for one in known)
-    heads = (
-        "law",
-        "axis",
-        "gain margin, dB",
-        "phase margin, deg",
-        "delay margin, s",
-        "crossover, rad/s",
-        "peak of |1/(1 + L)|",
-    )
-    head = "".join(f'<th scope="col">{text}</th>' for text in heads)
+    rows = [row for one in known for row in _rows(one)]
+    heads = ("gain margin|dB", "phase margin|deg", "delay margin|s", "crossover|rad/s", "peak of |1/(1 + L)||")
+    named = [Column(name, unit, ">") for name, _, unit in (head.rpartition("|") for head in heads)]
+    table = table_html(Table([Column("law"), Column("axis"), *named], rows))
+    without = "".join(note(f"{one.name} has no linear form: {one.why}.") for one in known if one.linear is None)
     left = sorted({text for one in known if one.linear for text in one.linear.left_out})
     apart = f" Left out: {escape(', '.join(left))}." if left else ""
     return (
-        f'<h2>Linear loop near the target</h2>\n<p class="note">{NOTE}{apart}</p>\n'
-        f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>\n'
+        f'<p class="note">{NOTE}{apart}</p>\n{table}\n{without}'
         f'<div class="plot"><h3>Bode and Nichols plots of the loop, cut about each axis</h3>{_plots(known)}</div>'
         '<p class="note">Solid: about x, dashed: y, dotted: z. The cross in the Nichols plot is the point −1.</p>'
     )
@@ -77,21 +71,15 @@ def _know(scenario: Scenario, number: int, name: str) -> _Known:
     return _Known(number, name, linear, shown, margins(linear, shown))
 
 
-def _rows(one: _Known) -> str:
-    name = f"{swatch(one.number)}{escape(one.name)}"
-    if one.linear is None:
-        return f'<tr><th scope="row">{name}</th><td colspan="6">no linear form: {escape(one.why)}</td></tr>'
-    unstable = "" if one.linear.is_stable else '<td colspan="3">not stable</td>'
-    rows: list[str] = []
+def _rows(one: _Known) -> list[list[Any]]:
+    rows: list[list[Any]] = []
     for about in one.margins:
-        values = [_decibels(about), number_text(math.degrees(about.phase), DIGITS), number_text(about.delay, DIGITS)]
-        cells = unstable or "".join(f"<td>{value}</td>" for value in values)
-        rest = [
-            number_text(value, DIGITS) if math.isfinite(value) else "—" for value in (about.crossover, about.sensitivity)
-        ]
-        cells += "".join(f"<td>{value}</td>" for value in rest)
-        rows.append(f'<tr><th scope="row">{name}</th><td>{about.axis}</td>{cells}</tr>')
-    return "".join(rows)
+        numbers = (math.degrees(about.phase), about.delay, about.crossover, about.sensitivity)
+        gain, *rest = _decibels(about), *(number_text(x, DIGITS) if math.isfinite(x) else "—" for x in numbers)
+        if one.linear is not None and not one.linear.is_stable:
+            gain, rest[:2] = "not stable", ["—", "—"]
+        rows.append([Cell(one.name, "name", one.number), about.axis, gain, *rest])
+    return rows
 
 
 def _decibels(about: Margins) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,22 +14,22 @@ from starhold.algebra.structure import flatten
 from starhold.analysis.rigid_body import recorded_meter
 from starhold.certification.assumptions import standing
 from starhold.laws.interface import Gain
+from starhold.report.answer import columns_list, facts, key_metrics, lost_alarm, proofs, ranking, verdicts
 from starhold.report.body import report_of
 from starhold.report.page_parts import (
-    columns_list,
+    beside,
     document,
+    fold,
     law_data,
     laws_table,
-    lost_alarm,
-    over_time_heading,
     plot_box,
-    ranking,
-    settings,
+    transient_switch,
     versions,
-    with_units,
 )
 from starhold.report.plots import colour
 from starhold.report.proved import section as proved
+from starhold.report.settings import settings, with_units
+from starhold.report.tables import note
 from starhold.scenario.checking import read_toml
 from starhold.scenario.quantity import LEAST, MOST, declared
 from starhold.scenario.reading import Scenario
@@ -51,6 +50,17 @@ LABELS = {
     "initial.attitude": "attitude",
     "initial.rate": "rate",
 }
+
+
+FOLDS = {
+    "Motion": "attitude, rates, positions",
+    "Actuators": "torque, wheels, limits",
+    "Sensors and estimate": "what the law is told",
+    "Proofs": "every claim, its assumptions, and how it was shown",
+    "Linear loop": "margins, Bode and Nichols plots",
+    "Numbers and settings": "gains, the spacecraft, what the key numbers mean",
+}
+"""What stands below the first screen, and a word on each."""
 
 
 def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | str:
@@ -177,8 +187,8 @@ def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict
 def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
     """The measures that the page ranks laws by, and the metrics that the table began with."""
     metric_set = flights[0].metric_set
-    metrics = metric_set.columns({flight.name: flight.metrics for flight in flights})
-    shown = [{"name": name, "scale": metric_set.measures[name].scale} for name in metrics]
+    metrics = key_metrics(metric_set, {flight.name: flight.metrics for flight in flights})
+    shown = [{"name": name} | asdict(metric_set.measures[name]) for name in metrics]
     rows = [
         {
             "name": flight.name,
@@ -207,24 +217,24 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """The report as HTML text. Whatever comes from files is escaped."""
     parts = report_of(scenario.body).page(flights, scenario)
     living = "the page of this body has none" if parts.sampling is None else living_data(scenario, flights, parts.sampling)
-    grounded = (
-        f'<p class="note">Nothing here can be flown again with sliders: {escape(living)}.</p>'
-        if isinstance(living, str)
-        else ""
-    )
+    (lead, *plots), (required, counts) = parts.data["plots"], verdicts(scenario, flights)
+    folds = dict.fromkeys(FOLDS, "") | {"Proofs": proved(flights)}
+    for plot in plots:
+        folds[plot["topic"]] += plot_box(plot)
+    for name, content in parts.folds.items():
+        folds[name] += content
+    folds["Numbers and settings"] += laws_table(flights) + settings(scenario) + columns_list(flights)
+    if isinstance(living, str):
+        folds["Try it"] = note(f"Nothing here can be flown again with sliders: {living}.")
     sections = [
         lost_alarm(flights),
+        required,
         ranking(flights),
         parts.measured,
-        *parts.views,
-        over_time_heading(parts.transient),
-        grounded,
-        *(plot_box(plot) for plot in parts.data["plots"] if "planes" not in plot),
-        proved(flights),
-        laws_table(flights),
-        parts.units,
-        settings(scenario, parts.settings),
-        columns_list(flights),
+        beside(plot_box(lead, 2, transient_switch(parts.transient)), parts.views),
+        proofs(flights),
+        *(fold(name, content, FOLDS.get(name, "")) for name, content in folds.items()),
     ]
     data, moved = {"laws": law_data(flights), **parts.data}, None if isinstance(living, str) else living
-    return document(scenario, sections, data, parts.scripts, f"{versions()}{parts.footer}.", moved)
+    footer = f"{versions()}{parts.footer}."
+    return document(scenario, sections, data, parts.scripts, footer, facts(scenario, flights), counts, moved)

@@ -218,7 +218,7 @@ def _control(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int
     panels.append(Panel("norm, µm/s²", sizes, False, near(tuple(limits), sizes) if limits and kind == "norm" else ()))
     limits_text = ", ".join(f"{limit:.4g}" for limit in limits)
     dashed = f"limit of {'each axis' if kind == 'axis' else 'the norm'}, {limits_text} µm/s²" if limits else "no limit"
-    return Plot("control", "control acceleration", panels, dashed, True, clock)
+    return Plot("control", "control acceleration", panels, dashed, True, clock, "Actuators")
 
 
 def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot:

@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from starhold.report.figures import headed, plain, width_of
-from starhold.report.page_parts import plot_box, rounded
+from starhold.report.page_parts import rounded
 from starhold.report.plots import Curve, colour
 from starhold.studies.flight import Flight
 
@@ -117,11 +116,6 @@ def _guide(axis: Any, guide: Guide) -> None:
         axis.plot(guide.x, guide.y, color=guide.colour or GREY, linewidth=1.0, dashes=(5, 3), zorder=3)
 
 
-def plane_box(plot: dict[str, Any]) -> str:
-    """The place of plots in a plane, which a script fills."""
-    return plot_box(plot) + f'<p class="note">{escape(plot["note"])}</p>'
-
-
 def plane_data(plot: PlanePlot) -> dict[str, Any]:
     """Plots in a plane for the script that draws them."""
     planes = [
@@ -135,7 +129,8 @@ def plane_data(plot: PlanePlot) -> dict[str, Any]:
         }
         for plane in plot.planes
     ]
-    return {"name": plot.name, "title": plot.title, "dashed": plot.dashed, "note": plot.note, "planes": planes}
+    data = {"name": plot.name, "title": plot.title, "dashed": plot.dashed, "note": plot.note, "topic": "Motion"}
+    return data | {"planes": planes}
 
 
 def _guide_data(guide: Guide) -> dict[str, Any]:

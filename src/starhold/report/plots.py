@@ -33,6 +33,8 @@ Curve: TypeAlias = NDArray[np.float64]
 
 OFF_SCALE = 5.0
 """Limits so many times above all curves are not drawn."""
+ACTING = ("N", "N m", "N m s", "A m^2")
+"""Units of what acts on a body."""
 FLAG = "_is_new"
 """How quantities end that tell at which control instants a reading is a new one; nothing is seen of them over a flight."""
 
@@ -75,6 +77,14 @@ class Plot:
     """Whether curves may jump from sample to sample; their lines are thin, and the wildest behind."""
     clock: str = "s"
     """The unit of the times."""
+    topic: str = "Motion"
+    """The part of the page that it stands in."""
+
+
+def first_alone(plot: Plot) -> list[Plot]:
+    """Make two plots of one: its first panel, and the others."""
+    rest = replace(plot, name=f"{plot.name}-further", title=f"{plot.title}, further", panels=plot.panels[1:])
+    return [replace(plot, panels=plot.panels[:1]), *([rest] if rest.panels else [])]
 
 
 class Mark(NamedTuple):
@@ -150,9 +160,12 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
     return replace(panel, span=span)
 
 
-def recorded_plots(flights: Sequence[Flight], factor: int, known: Container[str] = ()) -> list[Plot]:
+def recorded_plots(
+    flights: Sequence[Flight], factor: int, known: Container[str] = (), readers: tuple[str, ...] = ()
+) -> list[Plot]:
     """A plot of each quantity that all flights record and that is not known otherwise, with the name, unit and meaning that
-    its part declares; a panel for each component. What only tells whether a reading is new is not drawn."""
+    its part declares; a panel for each component. What only tells whether a reading is new is not drawn. readers: how the
+    names of what sensors and estimators tell begin."""
     longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
     _, coordinates = longest.variables()
     plots: list[Plot] = []
@@ -171,5 +184,7 @@ def recorded_plots(flights: Sequence[Flight], factor: int, known: Container[str]
         ]
         shown = [sound(panel, flights) for panel in panels]
         title = f"{name.replace('_', ' ')}: {meaning}"
-        plots.append(Plot(name.replace("_", "-"), title, shown, chatters=name == "command", clock=longest.time_unit))
+        acts = unit in ACTING or name in ("command", "control")
+        topic = "Sensors and estimate" if name.startswith(readers) else "Actuators" if acts else "Motion"
+        plots.append(Plot(name.replace("_", "-"), title, shown, "", name == "command", longest.time_unit, topic))
     return plots

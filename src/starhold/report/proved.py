@@ -8,7 +8,7 @@ from starhold.certification.assumptions import texts
 from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, evidence, grouped, methods, recheck, statement, unclaimed
-from starhold.report.plots import colour
+from starhold.report.tables import Markup, listed, pill, swatch, table_html
 from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight
 
@@ -51,20 +51,13 @@ SYMBOLS = {
 """Numbers that make a proof and stand in no sentence: what each means, and its unit, which for V depends on the law."""
 
 
-def swatch(number: int) -> str:
-    """A law's colour as a little square."""
-    return f'<span class="swatch" style="background:{colour(number)}"></span>'
-
-
 def section(flights: Sequence[Flight]) -> str:
     """The section as HTML; nothing where no flight has a certificate."""
     blocks = [_law(flight, number, i) for number, flight in enumerate(flights) for i in range(len(flight.certificates))]
     if not blocks:
         return ""
     command = escape(recheck([certificate for flight in flights for certificate in flight.certificates]))
-    return (
-        f'<h2>What is proved</h2>\n<p class="note">{NOTE}{RECHECK % command}</p>\n<div class="laws">{"".join(blocks)}</div>'
-    )
+    return f'<p class="note">{NOTE}{RECHECK % command}</p>\n<div class="laws">{"".join(blocks)}</div>'
 
 
 def _law(flight: Flight, number: int, place: int) -> str:
@@ -99,27 +92,20 @@ def _claim(claim: Claim, subject: Mapping[str, Any], left: str, mark: str) -> st
     )
     if left:
         why += f'<span class="why left">This flight leaves the claim: <b>{escape(left)}.</b></span>'
-    rows = "".join(_obligation(o) for o in claim.obligations)
+    rows = [[Markup(pill(o.outcome)), _obligation(o), o.how] for o in claim.obligations]
     return (
-        f'<details class="claim" data-claim="{mark}"><summary>{_outcome(claim.outcome)}<span class="what">'
+        f'<details class="claim" data-claim="{mark}"><summary>{pill(claim.outcome)}<span class="what">'
         f"<b>{escape(_sentence_case(HEADINGS[claim.kind]))}</b> {escape(_sentence_case(text))}. "
         f"<small>By {escape(methods(claim))}.</small>{why}</span></summary>\n"
-        f'<div class="wide"><table class="text"><tbody>{rows}</tbody></table></div>{_numbers(claim)}'
+        f"{table_html(listed(rows), 'text')}{_numbers(claim)}"
         f"<p><b>Assuming</b> {escape('; '.join(texts(claim.assumptions)))}.</p></details>\n"
     )
 
 
-def _obligation(obligation: Obligation) -> str:
+def _obligation(obligation: Obligation) -> Markup:
     text = OBLIGATIONS.get(obligation.name, obligation.name)
     reason = f"<br><b>{escape(evidence(obligation))}</b>" if obligation.evidence else ""
-    return (
-        f"<tr><td>{_outcome(obligation.outcome)}</td><td>{escape(_sentence_case(text))}{reason}</td>"
-        f"<td>{escape(obligation.how)}</td></tr>"
-    )
-
-
-def _outcome(outcome: str) -> str:
-    return f'<span class="outcome {escape(outcome)}">{escape(outcome)}</span>'
+    return Markup(f"{escape(_sentence_case(text))}{reason}")
 
 
 def _numbers(claim: Claim) -> str:

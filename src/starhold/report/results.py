@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 SUMMARY, PAGE = "summary.json", "report.html"
 INDEX = "index.html"
 EXPORT = "export.json"
-STUDIED = tuple(f"{name}.{kind}" for name in commands.names() if commands.command(name).suffix for kind in ("csv", "png"))
+STUDIED = tuple(
+    f"{name}.{kind}" for name in commands.names() if commands.command(name).suffix for kind in ("csv", "png", "xml")
+)
 MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *STUDIED)
 """A folder with one of these holds results."""
 
@@ -158,6 +160,10 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
             result.certificate(hidden)
         if json.loads(written["Certificate"].read_text(encoding="utf-8"))["claims"]:
             _write_kernel(folder)
+    if result.xml is not None:
+        written["For CI"] = folder / f"{name}.xml"
+        with atomic_write(written["For CI"]) as hidden:
+            hidden.write_text(result.xml, encoding="utf-8")
     if result.figure is not None:
         written["Picture"] = write_part(result, "png", folder / f"{name}.png")
     return written

@@ -2,6 +2,7 @@
 
 import csv
 import math
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -9,32 +10,59 @@ from typing import Any
 import numpy as np
 
 from starhold.files import atomic_write
-from starhold.report.commands import Cell, Table
-from starhold.report.proved import swatch
+from starhold.report.commands import Cell, Column, Table
+from starhold.report.plots import colour
 
-PILLS = {"met": "proved", "missed": "refuted", "not decided": "undecided"}
-"""The style of each outcome."""
+PILLS = {
+    **dict.fromkeys(("met", "proved", "settled", "kept", "agrees", "holds"), "proved"),
+    **dict.fromkeys(("missed", "refuted", "diverged", "exceeded", "differs", "fails"), "refuted"),
+    **dict.fromkeys(("not decided", "undecided", "not settled", "close", "depends"), "undecided"),
+}
+"""The style of each outcome: good, bad or open."""
 
 
-def table_html(table: Table, kind: str = "", fit: bool = False) -> str:
-    """Make a table that scrolls where it is too wide; with `fit` it is no wider than its contents."""
-    sides = [' class="number"' if column.format else ' class="words"' for column in table.columns]
-    heads = "".join(
-        f'<th scope="col"{side}>{escape(column.name)}{f"<small>{escape(column.unit)}</small>" if column.unit else ""}</th>'
-        for column, side in zip(table.columns, sides, strict=True)
+class Markup(str):
+    """HTML that a cell shows as it stands; what comes from files is escaped in it."""
+
+
+def table_html(table: Table, kind: str = "", fit: bool = False, rows: Mapping[int, str] | None = None) -> str:
+    """Make a table that scrolls where it is too wide; with `fit` it is no wider than its contents. Without names of columns
+    it has no head. rows: attributes of rows by their number."""
+    headed = any(column.name for column in table.columns)
+    sides = [f' class="{"number" if column.format else "words"}"' if headed else "" for column in table.columns]
+    # On a narrow screen each cell of such a table is a line of its own.
+    named = [
+        f'{side} data-head="{escape(column.name)}"' if "rows" in kind else side
+        for side, column in zip(sides, table.columns, strict=True)
+    ]
+    body = "".join(
+        f"<tr{f' {rows[i]}' if rows and i in rows else ''}>{''.join(map(_cell, row, named))}</tr>\n"
+        for i, row in enumerate(table.rows)
     )
-    rows = "".join(f"<tr>{''.join(map(_cell, row, sides))}</tr>\n" for row in table.rows)
-    opened = f'<div class="wide{" fit" if fit else ""}"><table class="{kind or "told"}">'
-    return f"{opened}<thead><tr>{heads}</tr></thead>\n<tbody>{rows}</tbody></table></div>"
+    head = f"<thead><tr>{''.join(map(_head, table.columns, sides))}</tr></thead>\n" if headed else ""
+    return (
+        f'<div class="wide{" fit" if fit else ""}"><table class="{kind or "told"}">{head}<tbody>{body}</tbody></table></div>'
+    )
 
 
 def titled(title: str, table: Table) -> str:
-    """Make a section of a table of laws."""
-    return f"<h2>{title}</h2>\n{table_html(table, 'text')}"
+    """Make a section of a table below a heading."""
+    return f"<section><h3>{escape(title)}</h3>\n{table_html(table, 'text')}</section>"
+
+
+def listed(rows: Sequence[Sequence[Any]]) -> Table:
+    """Make a table of rows that need no head."""
+    return Table([Column("")] * max(map(len, rows), default=0), rows)
+
+
+def _head(column: Column, side: str) -> str:
+    below = f"<small>{escape(column.unit)}</small>" if column.unit else ""
+    meaning = f' title="{escape(column.meaning)}"' if column.meaning else ""
+    return f'<th scope="col"{side}{meaning}>{escape(column.name)}{below}</th>'
 
 
 def _cell(value: Any, side: str) -> str:
-    text = escape(f"{value}")
+    text = value if isinstance(value, Markup) else escape("" if value is None else f"{value}")
     if not isinstance(value, Cell):
         return f"<td{side}>{text}</td>"
     if value.kind == "shade":
@@ -43,16 +71,24 @@ def _cell(value: Any, side: str) -> str:
         width = 100.0 * min(max(value.number, 0.0), 1.0) if math.isfinite(value.number) else 0.0
         return f'<td class="words bar">{text}<i style="width:{width:.1f}%"></i></td>'
     if value.kind == "name":
-        return f'<th scope="row">{swatch(int(value.number))}{text}</th>'
+        below = f"<small>{escape(value.detail)}</small>" if value.detail else ""
+        return f'<th scope="row">{swatch(int(value.number))}{text}{below}</th>'
     if value.kind == "law":
         return f'<td class="words whose">{swatch(int(value.number))}{text}</td>'
+    if value.kind == "best":
+        return f'<td class="number best">{text}</td>'
     title = f' title="{escape(value.detail)}"' if value.detail else ""
     return f"<td{side}{title}>{code(value.text) if value.kind == 'typed' else pill(value.kind) or text}</td>"
 
 
-def pill(outcome: str) -> str:
-    """Show an outcome in its colour; nothing where there is none."""
-    return f'<span class="outcome {PILLS[outcome]}">{outcome}</span>' if outcome in PILLS else ""
+def pill(outcome: str, text: str = "") -> str:
+    """Show an outcome, or a text in its place, in its colour; nothing where there is none."""
+    return f'<span class="outcome {PILLS[outcome]}">{escape(text or outcome)}</span>' if outcome in PILLS else ""
+
+
+def swatch(number: int) -> str:
+    """A law's colour as a little square."""
+    return f'<span class="swatch" style="background:{colour(number)}"></span>'
 
 
 def code(text: str) -> str:

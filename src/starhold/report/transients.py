@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from starhold.report.commands import Cell, Column, Table
-from starhold.report.tables import titled
+from starhold.report.tables import table_html
 from starhold.studies.flight import Flight
 
 
@@ -18,9 +18,10 @@ def section(flights: Sequence[Flight]) -> str:
     """The section of the page; empty where no limits were given."""
     if not all("limits_kept" in flight.metrics for flight in flights):
         return ""
-    rows = [[Cell(flight.name, "name", number), *_cells(flight)] for number, flight in enumerate(flights)]
-    heads = ("law", "transient", "peak rate", "peak accelerations x, y, z", "limits")
-    return titled("The transient and its limits", Table([*map(Column, heads)], rows))
+    cells_of = [(number, flight, *_cells(flight)) for number, flight in enumerate(flights)]
+    rows = [[Cell(flight.name, "name", number), Cell("", fate), *cells] for number, flight, *cells, fate in cells_of]
+    heads = ("law", "limits", "transient", "peak rate", "peak accelerations x, y, z")
+    return table_html(Table([*map(Column, heads)], rows), "cells_of tight lines")
 
 
 def _cells(flight: Flight) -> tuple[str, str, str, str]:

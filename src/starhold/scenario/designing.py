@@ -40,13 +40,10 @@ def design(scenario: Scenario, law: str | None = None) -> list[Design]:
     designed = [_design(scenario, entry, entry.form) for entry in entries if entry.form is not None]
     if not designed:
         allowed = 'at least one [[law]] with a form, such as type = "lqr", form = "II"'
-        given = "only modes, whose designs are not shown" if any(_has_modes(entry) for entry in entries) else "no form"
+        modes = any(isinstance(entry.law.module, Modes) for entry in entries)
+        given = "only modes, whose designs are not shown" if modes else "no form"
         raise InputError(scenario.where, "law" if law is None else f"law {law}", given, allowed)
     return designed
-
-
-def _has_modes(entry: LawEntry) -> bool:
-    return isinstance(entry.law.module, Modes)
 
 
 def _design(scenario: Scenario, entry: LawEntry, form: str) -> Design:

@@ -57,10 +57,13 @@ class Distribution(Table):
         """The names of distributions that have a flag, as errors list them."""
         return " or ".join(name for name, kind in DISTRIBUTIONS.items() if getattr(kind, flag))
 
+    DIMS: ClassVar[int] = 1
+    """The number of uniforms that a draw takes, where it does not depend on the parameters."""
+
     @property
-    @abstractmethod
     def dims(self) -> int:
         """The number of uniforms that a draw takes."""
+        return self.DIMS
 
     @property
     def bounded(self) -> bool:

@@ -141,11 +141,6 @@ class Choice(Relative):
     values: Annotated[list[Any], Field(description="words, truths or numbers")]
     weights: Annotated[list[Any] | None, Field(description="how likely they are to one another; equally if absent")] = None
 
-    @property
-    def dims(self) -> int:
-        """One for all numbers of a value."""
-        return 1
-
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
         weights = [1.0] * len(self.values) if self.weights is None else self.weights
         if len(weights) != len(self.values):
@@ -236,13 +231,8 @@ class Rotations(Distribution):
 
     Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992): the subgroup algorithm."""
 
-    BOUNDED = True
+    BOUNDED, DIMS = True, 3
     distribution: Literal["rotations"]
-
-    @property
-    def dims(self) -> int:
-        """Those of the group."""
-        return 3
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
         if key.place.shape != (4,):
@@ -264,15 +254,10 @@ class Rotations(Distribution):
 class Shell(Relative):
     """A vector in any direction, uniform in the volume between two norms."""
 
-    BOUNDED = True
+    BOUNDED, DIMS = True, 3
     distribution: Literal["shell"]
     low: Annotated[Any, *raw("the least norm")] = 0.0
     high: Annotated[Any, *raw("the greatest norm")]
-
-    @property
-    def dims(self) -> int:
-        """Those of space."""
-        return 3
 
     @property
     def shares(self) -> bool:

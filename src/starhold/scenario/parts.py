@@ -12,7 +12,7 @@ from pydantic import Field, create_model
 from starhold.algebra.quantity import quantities
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
-from starhold.errors import InputError, is_interrupt
+from starhold.errors import InputError, input_at, is_interrupt
 from starhold.files import read_text
 from starhold.laws.catalogue import Law
 from starhold.laws.modes import Modes
@@ -235,15 +235,13 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
     for fitted in loop.parts:
         own_file = fitted.part.file is not None
         one = _watched(fitted, loop, where) if own_file else fitted
-        try:
+        with input_at(where, _key(fitted)):
             if own_file and (fitted.part.role == "estimator" or (fitted.part.role == "sensor" and is_recorded(fitted.part))):
                 before_first(fitted.part, loop.start)
             params, check = one.prepared(loop.period), one.part.hook("check")
             if check is not None:
                 for craft in crafts:
                     check(params, craft)
-        except ValueError as error:
-            raise InputError(where, _key(fitted), "", str(error)) from None
     if all(fitted.part.file is None for fitted in loop.parts):
         return
     tried = replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))

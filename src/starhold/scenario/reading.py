@@ -19,6 +19,7 @@ from starhold.scenario.checking import nearest as nearest
 from starhold.scenario.making import changed, plain
 from starhold.scenario.modes import has_modes, read_gains, read_modes
 from starhold.scenario.parts import read_parts
+from starhold.scenario.requirement_files import with_files
 from starhold.scenario.schema import APART
 from starhold.scenario.writing import toml_text
 
@@ -182,6 +183,7 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
 def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
     """The scenario of the raw tables that a text holds."""
     body = body_of(data, where, folder)
+    data = with_files(data, folder, where)
     # First of all, for it scales the numbers of the other tables.
     context = body.context(data, where)
     table = _tables(body, data, where, context)

@@ -16,6 +16,7 @@ from starhold.laws.interface import Gain
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.checking import MOST_SUBSTEPS
 from starhold.scenario.quantity import any_quantity, quantity
+from starhold.scenario.requirement import RequirementTable, check_family
 from starhold.scenario.tables import Name, Table, at_key, own_fields
 
 APART = ("law", "part")
@@ -29,6 +30,7 @@ class ScenarioTable(Table):
 
     name: Annotated[Name, Field(description="how results and folders are called")]
     description: Annotated[str, Field(description="a sentence for the report")] = ""
+    requirement: list[RequirementTable] = Field(default=[], description="what is required, and how that is verified")
     campaign: CampaignTable | None = None
     nominal: dict[str, dict[str, Any] | list[dict[str, Any]]] = Field(
         default={},
@@ -36,6 +38,11 @@ class ScenarioTable(Table):
     )
     SHARED: ClassVar[Mapping[str, Any]] = MappingProxyType({})
     """The keys that give a number to all parts that declare it as `shared`, with the default of each."""
+
+    @model_validator(mode="after")
+    def _requirements_fit(self) -> ScenarioTable:
+        check_family(self.requirement)
+        return self
 
     @property
     def shared(self) -> dict[str, Any]:

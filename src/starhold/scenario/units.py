@@ -34,6 +34,13 @@ def to_number(text: str, unit: str) -> float:
     return _convert(value, _powers(given, unit), unit)
 
 
+def apart(text: str) -> tuple[float, str]:
+    """The number and the unit of a text that `to_number` takes, as they are written."""
+    number = _NUMBER.match(text.strip())
+    assert number is not None
+    return float(number[0]), text.strip()[number.end() :].strip()
+
+
 def shown(unit: str) -> str:
     """The name of a unit in messages."""
     return "no unit" if unit == "1" else unit

@@ -26,7 +26,7 @@ from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import law_model
 from starhold.scenario.tables import Table, refuse_own
 
-SHARED = ("name", "description", "campaign", "simulation", "certify")
+SHARED = ("name", "description", "requirement", "campaign", "simulation", "certify")
 """Tables and keys that all runs of a campaign share."""
 STRUCTURE = ("type", "name", "form", "file")
 """Keys that say what a table is."""

@@ -161,8 +161,9 @@ class RunningBatch:
         part = self.x[piece.start : piece.stop]
         if turn is not None and first in (None, phase.first):
             rows = list(self.rows.state.rate)
-            rates = self._unblocked(part[:, rows])
-            part[:, rows] = self._blocked(np.array(turn(tuple(rates), piece)), len(piece))
+            rates = part[:, rows].swapaxes(0, 1).reshape(len(rows), -1)
+            turned = np.array(turn(tuple(rates), piece))
+            part[:, rows] = turned.reshape(len(rows), len(piece), self.width).swapaxes(0, 1)
         memories = {
             "carry": part,
             "noted": self.noted[piece.start : piece.stop],
@@ -174,12 +175,6 @@ class RunningBatch:
         steps = phase.last - phase.first if count is None else count
         run = self.first_run + piece.start * self.width
         kernel(memories, begin, steps, len(piece), self.width, self.loop.seed, run)
-
-    def _unblocked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
-        return blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)
-
-    def _blocked(self, rows: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-        return rows.reshape(len(rows), count, self.width).swapaxes(0, 1)
 
     def prepare(self, phase: Phase, observer: Observer | None = None) -> Any:
         """Compile the kernel of a phase once, before threads use it."""

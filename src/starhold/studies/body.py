@@ -45,6 +45,9 @@ class BodyStudy:
     stands it is the study of any body: what its part records is flown and measured, in the units of the recording, and
     nothing is claimed."""
 
+    EXTRAS: tuple[str, ...] = ()
+    """Metrics that are measured only where they are asked for."""
+
     def name_samples(self, scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
         """Name the samples of `fly`; the attributes hold the numbers that metrics need."""
         return label(loop, samples, carry, scenario.table.simulation.record_every)
@@ -52,6 +55,10 @@ class BodyStudy:
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         """Measure a recorded run; `diverged_at` (s) is None for a motion that was not lost."""
         return any_body.measure(run)
+
+    def measure_required(self, run: Recording, cones: Cones) -> dict[str, Any]:
+        """Measure a recorded run, or a part of it, as requirements ask: with extras and cones, as `meter` does."""
+        return self.metrics_of(run)
 
     def meter(self, scenario: Scenario, loop: Any, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES) -> Meter:
         """Make the meter that measures many flights along their way, as `metrics_of` does recordings of every control step.

@@ -21,6 +21,8 @@ from starhold.analysis.pointing import (
     ANGLE,
     KNOWLEDGE,
     LINE,
+    MEANINGS,
+    PERFORMANCE,
     Array,
     Figures,
     Interpretation,
@@ -40,6 +42,7 @@ from starhold.parts.part import Fitted
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.simulation.lanes import RunningBatch, ThreadPool, carry_columns
+from starhold.studies.requirements import Requirement, at_most, tables_of
 from starhold.trace.machine import widest
 
 if TYPE_CHECKING:
@@ -162,7 +165,8 @@ def study(
     A source's contribution is by how much it moves the error of the loop without any, run by run and instant by instant.
     `notice` hears the number done, that of all, and the flight that comes next. InputError where nothing disturbs the loop,
     the windows do not fit into the run, or a motion is lost."""
-    scenario = scenario.about("rigid-body").with_({"fault": None, "campaign": None})
+    required = {one.metric.upper(): one.bound for one in check_budget(scenario)}
+    scenario = scenario.about("rigid-body").with_({"fault": None, "campaign": None, "requirement": None})
     disturbing, clock = sources(scenario), _Clock.of(scenario)
     if not disturbing:
         allowed = "noise, a torque, wheel friction or another source of error"
@@ -192,10 +196,20 @@ def study(
         kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
         moved = errors if kind != "source" else tuple(_less(a, b) for a, b in zip(errors, still, strict=True))
         rows.append(Contribution(name, kind, _figures(clock, *moved)))
-    rows.insert(-1, Contribution(COMBINED, "combined", _combined(rows[:-1])))
-    wanted = scenario.table.budget.requirement.model_dump()
-    required = {index.upper(): most for index, most in wanted.items() if most is not None}
+    combined = {
+        index: {axis: root_sum_square([row.figures[index][axis] for row in rows[:-1]]) for axis in axes}
+        for index, axes in rows[0].figures.items()
+    }
+    rows.insert(-1, Contribution(COMBINED, "combined", combined))
     return Budget(scenario.name, entry.name, clock.settings, tuple(rows), required)
+
+
+def check_budget(scenario: Scenario) -> tuple[Requirement, ...]:
+    """The requirements that the budget of a scenario decides. InputError where one is about anything but the level of an
+    index, "ape" and others, that is to be at most some angle, and where an index needs an estimator that there is not."""
+    tables = tables_of(scenario, "budget")
+    known = PERFORMANCE if all(fitted.part.role != "estimator" for fitted in scenario.parts) else MEANINGS
+    return at_most(scenario, tables, dict.fromkeys([index.lower() for index in known], "rad"))
 
 
 def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
@@ -368,12 +382,4 @@ def _figures(clock: _Clock, errors: Array | None, knowledge: Array | None) -> di
             for axis, values in about_axes(samples, settings.boresight).items()
         }
         for index, samples in vectors.items()
-    }
-
-
-def _combined(rows: list[Contribution]) -> dict[str, dict[str, Figures]]:
-    """The root sum square of rows."""
-    return {
-        index: {axis: root_sum_square([row.figures[index][axis] for row in rows]) for axis in axes}
-        for index, axes in rows[0].figures.items()
     }

@@ -193,7 +193,8 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     samples, carry = fly(loop, steps, every)
     recording = label(loop, samples, carry, every)
     # A motion that is lost later is lost all the same.
-    metrics = measure(recording.until(table.simulation.duration), *_tolerances(scenario))
+    whole, settling = recording.until(table.simulation.duration), table.settling
+    metrics = measure(whole, settling.attitude_tolerance, settling.rate_tolerance)
     working = [i for i in range(len(require_wheels(scenario).axes)) if i + 1 not in failure.lost]
     filled = recording["wheel_momentum"][:, working] / np.array(require_wheels(scenario).momentum_limit)[working]
     lost_at = metrics["diverged_at"]
@@ -223,10 +224,6 @@ def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[f
         return None
     # Where nothing limits the wheels no claim is made, so that the set is bounded.
     return claim.numbers["slew_angle"], claim.numbers["rate"]
-
-
-def _tolerances(scenario: Scenario) -> tuple[float, float]:
-    return scenario.table.settling.attitude_tolerance, scenario.table.settling.rate_tolerance
 
 
 def _orbit_period(scenario: Scenario) -> float | None:

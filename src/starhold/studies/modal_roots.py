@@ -1,11 +1,9 @@
 """The roots of the modal law that turn fastest within a scenario's limits: the search and the fit through it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +11,9 @@ from numpy.typing import NDArray
 from starhold.analysis.roots import PUBLISHED, Found, SlewProblem, TwoPieceFit, fit, search, unmet
 from starhold.analysis.transient import Limits
 from starhold.errors import InputError
+from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.building import build
-
-if TYPE_CHECKING:
-    from starhold.scenario.bodies.rigid_body.transient import TransientTable
-    from starhold.scenario.reading import LawEntry, Scenario
+from starhold.scenario.reading import LawEntry, Scenario
 
 Notice: TypeAlias = Callable[[int, int, str], None]
 DIGITS = 6

@@ -9,7 +9,7 @@ import numpy as np
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.invariant import InvariantProblem, System, WantedSet
-from starhold.certification.invariant.search import Candidate, Floats, Values
+from starhold.certification.invariant.search import Candidate, Values
 from starhold.certification.invariant.theorems import common, indicator
 
 POINTS = 400
@@ -57,10 +57,9 @@ def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, lengt
     what = Candidate(system, Polynomial.constant(0), tuple(box))
     moving, count = len(system.variables), np.shape(starts)[1]
     others = [np.full(count, 0.5 * (low + high)) for low, high in what.box[moving:]]
-    rates_at = _Rates(what, moving)
 
     def heading(state: Any) -> Any:
-        rates = rates_at(np.array([*state, *others]))
+        rates, _ = what.rates(np.array([*state, *others]))
         return rates / np.maximum(np.linalg.norm(rates, axis=0), TINY)
 
     step, state, going = length / steps, np.array(starts, dtype=float), np.ones(count)
@@ -88,7 +87,7 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
     points[0], points[1] = (side.ravel() for side in np.meshgrid(x, y))
     values = Values(what, points)
     shape = (len(y), len(x))
-    u, v = (rate.reshape(shape) for rate in _Rates(what, 2)(points)) if flat else (None, None)
+    u, v = (rate.reshape(shape) for rate in what.rates(points)[0]) if flat else (None, None)
     # Of what is left, all of which some motions start from.
     sign = -1.0 if wanted.theorem == "unstable" else 1.0
     V = (values.V if flat else sign * _least(what, points, len(problem.system.variables), sign)).reshape(shape)
@@ -119,38 +118,14 @@ def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
     return values
 
 
-class _Rates:
-    """The rates of what moves, in floats at points (n, N) of variables and parameters; NaN where no cell is."""
-
-    def __init__(self, what: Candidate, moving: int) -> None:
-        pieces = what.pieces
-        self._moving, self._system = moving, what.system
-        self._surfaces = [Floats(surface) for surface in pieces.surfaces]
-        self._cells = [(cell.signs, [Floats(rate) for rate in cell.rates[:moving]]) for cell in pieces.cells]
-
-    def __call__(self, points: Any) -> Any:
-        points = self._system.with_angles(points)
-        speeds = np.full((self._moving, points.shape[1]), np.nan)
-        sides, free = [surface.at(points) for surface in self._surfaces], np.ones(points.shape[1], dtype=bool)
-        for signs, rates in self._cells:
-            here = free.copy()
-            for sign, side in zip(signs, sides, strict=True):
-                here &= sign * side >= 0.0
-            free &= ~here
-            for k, rate in enumerate(rates):
-                speeds[k, here] = rate.at(points[:, here])
-        return speeds
-
-
 def _orbit(what: Candidate, start: Any) -> Any:
     """One turn of the closed motion that the motion from a state reaches backwards in time; None where it reaches none."""
     from scipy.integrate import solve_ivp
 
-    rates = _Rates(what, 2)
     others = [0.5 * (low + high) for low, high in what.box[2:]]
 
     def back(time: float, state: Any) -> Any:
-        return -rates(np.array([*state, *others])[:, None])[:, 0]
+        return -what.rates(np.array([*state, *others])[:, None])[0][:, 0]
 
     options: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-9}
     settled = solve_ivp(back, (0.0, AHEAD), start, **options)

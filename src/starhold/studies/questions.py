@@ -1,28 +1,23 @@
 """The program asks questions of a scenario's numbers before it flies them; here they become programs of the keys that a
 page moves: those of the craft and the start, and each law's own `check` and `remember`, in the words of their refusals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from itertools import product
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from starhold.algebra.scalar import both, opposite, where
 from starhold.algebra.structure import leaves
 from starhold.errors import InputError
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import matrix
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.trace.calling import record_call
 from starhold.trace.handles import Handle, RecordingError
 from starhold.trace.program import Program
 from starhold.trace.recording import MARK, Path
-
-if TYPE_CHECKING:
-    from starhold.loop.closed_loop import ClosedLoop
-    from starhold.scenario.reading import LawEntry, Scenario
-
 
 MOST = 100
 """Ways through a check."""

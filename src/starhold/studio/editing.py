@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any, cast
 
+from starhold.campaign.verify import check as check_requirements
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.scenario.building import build
@@ -12,18 +13,20 @@ from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import builtin_names, parse
 
-TABLES = (".csv", ".aem")
+TABLES = (".csv", ".aem", ".reqif")
 """How files of numbers end; others that a scenario names are Python."""
 
 _HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 
 
 def check(text: str, where: str, folder: Any) -> dict[str, Any]:
-    """Tell whether a text is a scenario whose loops can be flown, with its name and laws, or what is wrong, where."""
+    """Tell whether a text is a scenario that can be flown and verified, with its name and laws, or what is wrong, where."""
     try:
         scenario = parse(text, where, folder)
         for entry in scenario.laws:
             build(scenario, entry)
+        if scenario.table.requirement:
+            check_requirements(scenario, scenario.laws[0])
     except InputError as error:
         line = line_of(text, error.key, error.given)
         return {"error": str(error), "key": error.key, "line": line}

@@ -32,6 +32,8 @@ def _compare(scenario: Scenario, folder: Path, tell: Tell) -> str:
 
 
 def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
+    from starhold.report.answer import proofs
+    from starhold.report.page_parts import fold
     from starhold.report.proved import section
     from starhold.report.results import write_proofs
     from starhold.scenario.building import build
@@ -50,39 +52,51 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
         certificates = tuple(one.certificate for one in tried)
         flights.append(Flight(entry.name, entry.law.name, run, {}, {}, study.metric_set(run), certificates))
     write_proofs([certificate for flight in flights for certificate in flight.certificates], scenario.name, folder)
-    return _document(scenario, folder, [section(flights)])
+    return _document(scenario, folder, [proofs(flights), fold("Proofs", section(flights))])
 
 
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     """A page of a study: its picture, what it shows, and its files."""
     from starhold.report.results import write_result
+    from starhold.report.tables import pill
 
     command = commands.command(name)
     subject = command.prepare(scenario)
     result = command.result(subject, tell)
     files = write_result(result, name, scenario.name, folder) if command.suffix else {}
-    parts = [f"<h2>{escape(result.title)}</h2>"]
+    parts = [f"<h2>{escape(result.title)}</h2>", *map(_block, result.blocks)]
     if "Picture" in files:
         drawn = base64.b64encode(files["Picture"].read_bytes()).decode()
         source = f"data:image/png;base64,{drawn}"
         parts.append(f'<p><img src="{source}" alt="{escape(result.title)}" style="max-width:100%"></p>')
-    parts += [_block(block) for block in result.blocks]
     links = (f'{what}: <a href="{path.name}" download>{path.name}</a>' for what, path in files.items())
     parts += [f"<p>{'. '.join(links)}.</p>"] if files else []
-    return _document(scenario, folder, parts)
+    judged = any('class="outcome' in part for part in parts)
+    return _document(scenario, folder, parts, pill(result.outcome.replace("undecided", "not decided")) if judged else "")
 
 
 def _block(block: commands.Block) -> str:
-    from rich.text import Text
-
     from starhold.report.tables import table_html
 
     if isinstance(block, commands.Heading):
         return f"<h2>{escape(block.name + block.rest)}</h2>"
     if isinstance(block, str):
         return f'<p style="white-space:pre-wrap">{escape(block)}</p>' if block else ""
-    rows = [[Text.from_markup(text).plain for text in row] for row in block.texts()]
-    return table_html(block._replace(rows=rows), "text")
+    return table_html(block._replace(rows=[[_marked(text) for text in row] for row in block.texts()]), "text tight")
+
+
+def _marked(text: str) -> str:
+    """The text of a cell, an outcome in it in its colour."""
+    from rich.text import Text
+
+    from starhold.report.tables import Markup, pill
+
+    read = Text.from_markup(text)
+    for span in read.spans:
+        before, word, after = read.plain[: span.start], read.plain[span.start : span.end], read.plain[span.end :]
+        if shown := pill(word):
+            return Markup(f"{escape(before)}{shown}{escape(after)}")
+    return read.plain
 
 
 def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
@@ -109,10 +123,10 @@ def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:
     return _document(scenario, folder, parts)
 
 
-def _document(scenario: Scenario, folder: Path, parts: list[str]) -> str:
+def _document(scenario: Scenario, folder: Path, parts: list[str], answer: str = "") -> str:
     from starhold.report.page_parts import document, versions
 
-    text = document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}.")
+    text = document(scenario, parts, {"laws": [], "plots": []}, (), f"{versions()}.", answer=answer)
     (folder / "report.html").write_text(text, encoding="utf-8", newline="\n")
     return "report.html"
 

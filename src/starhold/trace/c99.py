@@ -8,7 +8,7 @@ doubles are IEEE doubles and the compiler contracts nothing (`-std=c99 -ffp-cont
 from typing import Any, ClassVar
 
 from starhold.algebra.operations import INDEX, NUMBER, TRUTH, UNIFORM, WORD
-from starhold.trace.program import Call, Function, Memory
+from starhold.trace.program import Call, Function
 from starhold.trace.source import TIE, Source, names
 
 TYPES = {NUMBER: "double", TRUTH: "int", WORD: "uint64_t", INDEX: "long", UNIFORM: "int"}
@@ -72,7 +72,7 @@ class C99(Source):
     def _head(self, function: Function) -> str:
         main = self.is_main(function)
         memories = self.program.memories if main else self.memories[function.name]
-        given = [_pointer(memory) for memory in memories]
+        given = [f"{'' if memory.writable else f'const{TIE}'}double{TIE}*{memory.name}" for memory in memories]
         given += [f"{self.types[kind]}{TIE}{name}" for name, kind in function.params]
         gives = "void"
         if len(function.outs) == 1:
@@ -130,7 +130,3 @@ class C99(Source):
                 self.put(f"{self.types[kind]} {name};")
             given += [f"&{name}" for name, _ in s.refs]
         self.put(f"{self.titles[function.name]}({', '.join(given)});")
-
-
-def _pointer(memory: Memory) -> str:
-    return f"{'' if memory.writable else f'const{TIE}'}double{TIE}*{memory.name}"

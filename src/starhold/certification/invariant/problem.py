@@ -14,7 +14,7 @@ from typing import Any, cast
 from starhold.algebra.polynomial import Polynomial, exact, pieces
 from starhold.certification.certificate import Certificate
 from starhold.certification.evidence.finding import certificate as kernel_certificate
-from starhold.certification.invariant.system import TURNED, System, split, turned
+from starhold.certification.invariant.system import TURNED, System, check_sizes, turned
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
 from starhold.certification.invariant.theorems import THEOREMS, Shown, WantedSet, a_state, indicator, show
 from starhold.errors import InputError
@@ -211,7 +211,7 @@ class _File:
                 raise InputError(self.where, f"{key}.equilibrium.{x}", "an angle at an equilibrium", "zero")
         try:
             for V in (indicator(wanted), wanted.core):
-                split(system, 0 if V is None else V)
+                check_sizes(system, 0 if V is None else V)
         except ValueError as error:
             raise InputError(self.where, f"{key}.V", str(error), "fewer comparisons, or lower powers") from None
         for name in ("start", "unsafe") if wanted.theorem == "avoids" else ():

@@ -3,76 +3,159 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
-from itertools import islice
-from typing import Any
+from itertools import combinations, islice
+from typing import Any, TypeAlias
 
 import numpy as np
-from flint import fmpq
 from numpy.typing import NDArray
 
-from starhold.algebra.polynomial import exact
-from starhold.certification.invariant.system import Cell, Cells, Poly, System, along, solve, split
-from starhold.certification.matrices import number
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A system, a function V and a box; M is {V <= 0} in it. `equilibrium`: the point that M is told to be, its
-    coordinates, None for parameters; else None."""
-
-    system: System
-    V: Any
-    box: tuple[tuple[float, float], ...]
-    equilibrium: tuple[Any, ...] | None = None
-
-    @cached_property
-    def pieces(self) -> Cells:
-        """Return the cells of rates and V together."""
-        return split(self.system, self.V)
-
-
-class Floats:
-    """A polynomial is evaluated in floats."""
-
-    def __init__(self, polynomial: Poly) -> None:
-        self._terms = [(tuple(int(power) for power in powers), number(c)) for powers, c in polynomial.to_dict().items()]
-
-    def at(self, points: Any) -> Any:
-        """Return its values at points (n, ...)."""
-        total = np.zeros(np.shape(points)[1:])
-        for powers, c in self._terms:
-            term = c
-            for x, power in zip(points, powers, strict=True):
-                term = term * x**power if power else term
-            total = total + term
-        return total
-
+from starhold.certification.invariant.prover import Attempt
+from starhold.certification.invariant.system import System, check_sizes, program
+from starhold.kernel.cells import Cell as Wired
+from starhold.kernel.polynomials import Poly, poly, var
 
 Array = NDArray[np.float64]
+State: TypeAlias = tuple[Fraction, ...]
+"""Exact values of variables and parameters."""
+Found: TypeAlias = dict[str, Any] | None
 POINTS = {1: 4001, 2: 301, 3: 61, 4: 23, 7: 5, 8: 3, 9: 3}
 """Points of a grid along each side, by the number of sides."""
 TRIES = 40
 """States that are verified exactly before one gives up."""
 
 
+def sides(names: Sequence[str], box: Sequence[tuple[float, float]]) -> dict[str, str]:
+    """The ends of a box as the kernel reads them."""
+    return {f"box.{x}.{k}": str(Fraction(end)) for x, ends in zip(names, box, strict=True) for k, end in enumerate(ends)}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell as the kernel has it, and V' in it."""
+
+    own: Wired
+    slope: Poly
+
+    @cached_property
+    def sides(self) -> list[Poly]:
+        """The polynomials that are not negative in it."""
+        return [Poly(dict(surface)) * sign for surface, sign in self.own.signs.items() if sign]
+
+    @cached_property
+    def zero(self) -> list[Poly]:
+        """The polynomials that vanish in it, if it is a thin one."""
+        return [Poly(dict(surface)) for surface, sign in self.own.signs.items() if not sign]
+
+    @property
+    def function(self) -> Poly:
+        """V in it."""
+        return self.own.V[0]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A system, a function V and a box; M is {V <= 0} in it. `equilibrium`: the point that M is told to be, a number for
+    every variable; else None."""
+
+    system: System
+    V: Any
+    box: tuple[tuple[float, float], ...]
+    equilibrium: State | None = None
+
+    @cached_property
+    def wired(self) -> Any:
+        """The system and V as the kernel wires them. ValueError where they are too large."""
+        check_sizes(self.system, self.V)
+        programs = {role: program(of, self.system.inputs) for role, of in (("rates", self.system.rates), ("V", [self.V]))}
+        return Attempt("", programs, sides(self.system.names, self.box), {}, {}).system
+
+    @cached_property
+    def cells(self) -> list[Cell]:
+        """All cells."""
+        return [Cell(own, self.wired.slope(own.V[0], own.rates)) for own in self.wired.all]
+
+    @cached_property
+    def whole(self) -> list[Cell]:
+        """The cells that lie in no surface."""
+        return [cell for cell in self.cells if not cell.zero]
+
+    @cached_property
+    def values(self) -> "Fields":
+        """V and V' at points."""
+        return Fields(self, lambda cell: (cell.function, cell.slope))
+
+    @cached_property
+    def rates(self) -> "Fields":
+        """The rates of all variables at points."""
+        return Fields(self, lambda cell: cell.own.rates)
+
+    def at(self, p: Poly, state: State) -> Fraction:
+        """The value of a polynomial at an exact state."""
+        values = dict(zip(self.system.names, state, strict=True))
+        return sum((c * math.prod(values[x] for x in m) for m, c in p.terms.items()), Fraction(0))
+
+    def near(self, state: State) -> list[Cell]:
+        """All the cells, thin ones too, whose closures hold an exact state."""
+        closed = [cell for cell in self.cells if all(self.at(p, state) >= 0 for p in cell.sides)]
+        return [cell for cell in closed if all(self.at(p, state) == 0 for p in cell.zero)]
+
+    def has(self, state: State) -> bool:
+        """Whether the box holds an exact state."""
+        return all(low <= x <= high for x, (low, high) in zip(state, self.box, strict=True))
+
+    def value(self, state: State) -> Fraction | None:
+        """V at an exact state, None where its cells do not agree."""
+        found = {self.at(cell.function, state) for cell in self.near(state)}
+        return found.pop() if len(found) == 1 else None
+
+
+class Floats:
+    """A polynomial is evaluated in floats."""
+
+    def __init__(self, p: Poly, names: Sequence[str]) -> None:
+        self._terms = [([(k, m.count(x)) for k, x in enumerate(names) if x in m], float(c)) for m, c in p.terms.items()]
+
+    def at(self, points: Any) -> Any:
+        """Return its values at points (n, ...) of the names."""
+        total = np.zeros(np.shape(points)[1:])
+        for powers, c in self._terms:
+            term = c
+            for k, power in powers:
+                term = term * points[k] ** power
+            total = total + term
+        return total
+
+
+class Fields:
+    """Polynomials of each cell in floats, at points (n, N) of variables and parameters; NaN where no cell is."""
+
+    def __init__(self, what: Candidate, of: Callable[[Cell], Sequence[Poly]]) -> None:
+        self._system, self._names = what.system, what.system.inputs
+        self._cells = [[[Floats(p, self._names) for p in part] for part in (cell.sides, of(cell))] for cell in what.whole]
+
+    def __call__(self, points: Any) -> tuple[Array, NDArray[np.int64]]:
+        """Return their values (k, N), and the number of the cell at each point."""
+        points = self._system.with_angles(points)
+        cell = np.full(points.shape[1], -1)
+        values = np.full((len(self._cells[0][1]), points.shape[1]), np.nan)
+        for place, (sides, fields) in enumerate(self._cells):
+            here = cell < 0
+            for side in sides:
+                here &= side.at(points) >= 0.0
+            cell[here] = place
+            for k, field in enumerate(fields):
+                values[k, here] = field.at(points[:, here])
+        return values, cell
+
+
 class Values:
     """V and V' in floats at points (n, N); NaN where no cell is. `cell`: its number at each point."""
 
     def __init__(self, what: Candidate, points: Array) -> None:
-        count = points.shape[1]
         self.points = points
-        self.V, self.slope = np.full(count, np.nan), np.full(count, np.nan)
-        self.cell = np.full(count, -1)
-        points = what.system.with_angles(points)
-        surfaces = [Floats(s).at(points) for s in what.pieces.surfaces]
-        for place, cell in enumerate(what.pieces.cells):
-            here = self.cell < 0
-            for side, values in zip(cell.signs, surfaces, strict=True):
-                here &= side * values >= 0.0
-            self.cell[here] = place
-            self.V[here] = Floats(cell.V).at(points[:, here])
-            self.slope[here] = Floats(cell.slope).at(points[:, here])
+        (self.V, self.slope), self.cell = what.values(points)
 
 
 def grid(box: Sequence[tuple[float, float]], count: int | None = None) -> Array:
@@ -117,15 +200,14 @@ def _refined(what: Candidate, start: Array, sense: int, spread: Array, count: in
 def stuck(what: Candidate) -> list[Array]:
     """Rests of single cells with V > 0, by Newton's method from a coarse grid."""
     found: list[Array] = []
-    moving, ring = what.pieces.moving, what.pieces.context
-    units = ([ring.constant(int(j == k)) for j in range(len(what.box))] for k in range(moving))
-    ways = [what.system.rates_with_angles(unit, ring) for unit in units]
-    for place, cell in enumerate(what.pieces.cells):
-        rates = [Floats(rate) for rate in cell.rates[:moving]]
-        slopes = [[Floats(along(rate, way)) for way in ways] for rate in cell.rates[:moving]]
+    system, moving = what.system, len(what.system.variables)
+    units = [[poly(int(j == k)) for j in range(moving)] for k in range(moving)]
+    for place, cell in enumerate(what.whole):
+        rates = [Floats(rate, system.inputs) for rate in cell.own.rates]
+        slopes = [[Floats(what.wired.slope(rate, unit), system.inputs) for unit in units] for rate in cell.own.rates]
         points = grid(what.box, 7 if len(what.box) < 6 else 3)
         for _ in range(12):
-            turned = what.system.with_angles(points)
+            turned = system.with_angles(points)
             f = np.array([rate.at(turned) for rate in rates])
             jacobian = np.moveaxis(np.array([[s.at(turned) for s in row] for row in slopes]), -1, 0)
             with np.errstate(all="ignore"):
@@ -133,7 +215,7 @@ def stuck(what: Candidate) -> list[Array]:
             points[:moving] -= steps[:, :, 0].T
             points = np.clip(points, *np.array(what.box).T[:, :, None])
         values = Values(what, points)
-        size = np.max(np.abs([rate.at(what.system.with_angles(points)) for rate in rates]), axis=0)
+        size = np.max(np.abs([rate.at(system.with_angles(points)) for rate in rates]), axis=0)
         for k in np.flatnonzero((size < 1e-9) & (values.cell == place) & (values.V > 1e-9)):
             if all(np.max(np.abs(points[:, k] - other)) > 1e-6 for other in found):
                 found.append(points[:, k])
@@ -144,7 +226,7 @@ def ceiling(what: Candidate, equilibria: bool = True) -> float:
     """The least V that points of a grid give for a state that no set may hold: on the border of the box, where V rises, or
     (if `equilibria`) at an equilibrium. Infinite if there is none."""
     least = math.inf
-    for k in range(what.pieces.moving):
+    for k in range(len(what.system.variables)):
         for end in what.box[k]:
             face = [(end, end) if j == k else side for j, side in enumerate(what.box)]
             count = POINTS.get(len(face) - 1, 9)
@@ -157,166 +239,107 @@ SIMPLE, NEAR = (2, 3, 4, 6, 9, 12, 17), (6, 9, 12, 17, 4, 3, 2)
 """Digits of states that are tried: those a reader likes best first, or those nearest to a guess."""
 
 
-def rounded(point: Array, digits: Sequence[int] = SIMPLE) -> Iterator[tuple[Any, ...]]:
+def rounded(point: Array, digits: Sequence[int] = SIMPLE) -> Iterator[State]:
     """Exact states near a point, all of them floats too."""
     for count in digits:
         # What is zero up to rounding is taken for zero.
-        yield tuple(exact(float(f"{round(float(x), 12):.{count}g}")) for x in point)
+        yield tuple(Fraction(float(f"{round(float(x), 12):.{count}g}")) for x in point)
 
 
-def in_box(what: Candidate, state: Sequence[Any]) -> bool:
-    """Whether the box holds an exact state."""
-    return all(exact(low) <= x <= exact(high) for x, (low, high) in zip(state, what.box, strict=True))
-
-
-def cell_of(what: Candidate, state: Sequence[Any]) -> Cell | None:
-    """The cell whose interior holds an exact state of the box; None for states on a surface or outside."""
-    if not in_box(what, state):
-        return None
-    sides = [surface(*state) for surface in what.pieces.surfaces]
-    return next((c for c in what.pieces.cells if all(not s or s * v > 0 for s, v in zip(c.signs, sides, strict=True))), None)
-
-
-def closed_cells(what: Candidate, state: Sequence[Any]) -> list[Cell]:
-    """All the cells, thin ones too, whose closures hold an exact state."""
-    sides = [surface(*state) for surface in what.pieces.surfaces]
-    cells = [c for c in (*what.pieces.cells, *what.pieces.thin) if all(sides[k] == 0 for k in c.on)]
-    return [c for c in cells if all(s * v >= 0 for s, v in zip(c.signs, sides, strict=True))]
-
-
-def at(polynomial: Poly, equilibrium: Sequence[Any]) -> Poly:
-    """A polynomial at an equilibrium: one of the parameters."""
-    context = polynomial.context()
-    pairs = zip(context.gens(), equilibrium, strict=True)
-    return polynomial.compose(*(g if x is None else context.constant(x) for g, x in pairs))
-
-
-def value(what: Candidate, state: Sequence[Any]) -> Any:
-    """V at an exact state, None where its cells do not agree."""
-    found = [cell.V(*state) for cell in closed_cells(what, state)]
-    return found[0] if found and all(v == found[0] for v in found) else None
-
-
-def rising(what: Candidate, level: float, sense: int = 1, digits: Sequence[int] = SIMPLE) -> dict[str, Any] | None:
+def rising(what: Candidate, level: float, sense: int = 1, digits: Sequence[int] = SIMPLE) -> Found:
     """A state with 0 < V <= level, verified, where V rises (sense -1: does not grow) or that is an equilibrium; or None."""
     for point in islice([*wrong(what, sense), *stuck(what)], TRIES):
         for state in rounded(point, digits):
-            cell = cell_of(what, state)
+            inside = (cell for cell in what.whole if all(what.at(p, state) > 0 for p in cell.sides))
+            cell = next(inside, None) if what.has(state) else None
             if cell is None:
                 continue
-            V, slope = cell.V(*state), cell.slope(*state)
-            still = slope == 0 and (sense < 0 or not any(rate(*state) != 0 for rate in cell.rates))
-            if V > 0 and at_most(V, level) and (sense * slope > 0 or still):
-                return {"state": named(what, state), "V": number(V), "V'": number(slope)}
+            V, slope = what.at(cell.function, state), what.at(cell.slope, state)
+            still = slope == 0 and (sense < 0 or not any(what.at(rate, state) for rate in cell.own.rates))
+            if 0 < V <= level and (sense * slope > 0 or still):
+                return {"state": named(what, state), "V": float(V), "V'": float(slope)}
     return None
 
 
-def reaching(what: Candidate, level: float, digits: Sequence[int] = SIMPLE) -> dict[str, Any] | None:
+def reaching(what: Candidate, level: float, digits: Sequence[int] = SIMPLE) -> Found:
     """A state on the border of the box with V <= level, of those found the one of the least V, verified; or None."""
-    best: tuple[Any, tuple[Any, ...]] | None = None
-    for k in range(what.pieces.moving):
+    best: tuple[Fraction, State] | None = None
+    for k in range(len(what.system.variables)):
         for end in what.box[k]:
             face = [(end, end) if j == k else side for j, side in enumerate(what.box)]
             values = Values(what, grid(face, POINTS.get(len(face) - 1, 9)))
             for state in rounded(values.points[:, int(np.nanargmin(values.V))], digits):
-                on_face = tuple(exact(end) if j == k else x for j, x in enumerate(state))
-                V = value(what, on_face) if in_box(what, on_face) else None
-                if V is not None and at_most(V, level):
+                on_face = tuple(Fraction(end) if j == k else x for j, x in enumerate(state))
+                V = what.value(on_face) if what.has(on_face) else None
+                if V is not None and level >= V:
                     best = (V, on_face) if best is None or best[0] > V else best
                     break
-    return None if best is None else {"state": named(what, best[1]), "V": number(best[0])}
+    return None if best is None else {"state": named(what, best[1]), "V": float(best[0])}
 
 
-def not_positive(what: Candidate) -> dict[str, Any] | None:
+def low(what: Candidate) -> Iterator[tuple[State, Fraction]]:
+    """States of the box where V is least, with V, which is exact."""
+    values = Values(what, grid(what.box))
+    for place in np.argsort(values.V, kind="stable")[:TRIES]:
+        for state in rounded(values.points[:, place]):
+            V = what.value(state)
+            if V is not None:
+                yield state, V
+
+
+def not_positive(what: Candidate) -> Found:
     """A state of the box that is not the equilibrium and has V <= 0, verified; None if none is found."""
-    values = Values(what, grid(what.box))
-    for place in np.argsort(values.V, kind="stable")[:TRIES]:
-        for state in rounded(values.points[:, place]):
-            V = value(what, state)
-            point = what.equilibrium
-            there = point is not None and all(p is None or p == x for p, x in zip(point, state, strict=True))
-            if V is not None and V <= 0 and not there and closed_cells(what, state):
-                return {"state": named(what, state), "V": number(V)}
-    return None
+    point = what.equilibrium or ()
+    beside = ((state, V) for state, V in low(what) if V <= 0 and state[: len(point)] != point)
+    return next(({"state": named(what, state), "V": float(V)} for state, V in beside), None)
 
 
-def member(what: Candidate, level: float) -> tuple[Any, ...] | None:
+def member(what: Candidate, level: float) -> State | None:
     """An exact state with V <= level, None if none is found."""
-    values = Values(what, grid(what.box))
-    for place in np.argsort(values.V, kind="stable")[:TRIES]:
-        for state in rounded(values.points[:, place]):
-            V = value(what, state)
-            if V is not None and at_most(V, level):
-                return state
-    return None
+    return next((state for state, V in low(what) if level >= V), None)
 
 
-def jump(what: Candidate) -> dict[str, Any] | None:
+def jump(what: Candidate) -> Found:
     """A state of two closed cells at which their V differ, verified, on a linear surface; None if none is found."""
-    every = (*what.pieces.cells, *what.pieces.thin)
-    for place, one in enumerate(every):
-        for other in every[place + 1 :]:
-            linear = ((m, solve(m)) for m in (what.pieces.surfaces[k] for k in one.apart(other)))
-            surface, solved = next((found for found in linear if found[1] is not None), (None, None))
-            if solved is None or what.pieces.agree(one, other, [(one.V, other.V)]):
-                continue
-            free, instead = solved
-            points = grid([(0.0, 0.0) if k == free else side for k, side in enumerate(what.box)], 41)
-            gaps = np.abs(Floats(what.pieces.reduced(one.V - other.V, [surface])).at(points))
-            for k in np.argsort(-gaps, kind="stable"):
-                state = list(next(rounded(points[:, k])))
-                state[free] = instead(*state)
-                cells = closed_cells(what, state)
-                if in_box(what, state) and one in cells and other in cells and one.V(*state) != other.V(*state):
-                    sides = [number(one.V(*state)), number(other.V(*state))]
-                    return {"state": named(what, state), "V from both sides": sides}
-    return None
-
-
-def from_equilibrium(q: Poly, equilibrium: Sequence[Any]) -> Poly:
-    """The polynomial in the distance from an equilibrium."""
-    generators = q.context().gens()
-    return q.compose(*(g if x is None else g + x for g, x in zip(generators, equilibrium, strict=True)))
-
-
-def lowest(q: Poly, moving: Sequence[int]) -> int:
-    """The lowest degree in the moving variables among a polynomial's terms."""
-    return min((sum(powers[k] for k in moving) for powers in q.to_dict()), default=0)
-
-
-def ray(what: Candidate, wanted: Callable[[Poly, Poly], Poly | None]) -> dict[str, Any] | None:
-    """A direction from the equilibrium in which a polynomial that `wanted` makes of V and V' of the cell there is positive
-    however near, by its terms of the lowest degree; None if none is found."""
-    equilibrium = what.equilibrium
-    if equilibrium is None or any(x is None for x in equilibrium):
-        return None
-    moving = range(what.pieces.moving)
-    random = np.random.default_rng(0)
-    choices = [*np.eye(len(equilibrium)), *-np.eye(len(equilibrium)), *random.integers(-9, 10, size=(300, len(equilibrium)))]
-    directions = [tuple(fmpq(int(x)) for x in choice) for choice in choices]
-    for cell in what.pieces.cells:
-        asked = wanted(cell.V, cell.slope)
-        if asked is None or asked.is_zero():
+    names = what.system.names
+    for one, other in combinations(what.cells, 2):
+        between = (Poly(dict(surface)) for surface in what.wired.surfaces if one.own.on(surface, other.own))
+        surface = next((p for p in between if max(map(len, p.terms)) == 1), None)
+        if surface is None:
             continue
-        leading = [_lowest_part(q, equilibrium, moving) for q in (asked, *what.pieces.guards(cell))]
-        for d in directions:
-            if all(part(*d) > 0 for part in leading):
-                return {"direction": dict(zip(what.pieces.names, map(number, d), strict=True))}
+        # The variable with the largest coefficient is what the others make it on the surface.
+        slopes = {x: surface.terms[x,] for x in names if (x,) in surface.terms}
+        free = max(slopes, key=lambda x: abs(slopes[x]))
+        k, instead = names.index(free), var(free) - surface * (1 / slopes[free])
+        gap = (one.function - other.function).at({free: instead})
+        points = grid([(0.0, 0.0) if j == k else side for j, side in enumerate(what.box)], 41)
+        for place in np.argsort(-np.abs(Floats(gap, names).at(points)), kind="stable") if gap.terms else ():
+            state = next(rounded(points[:, place]))
+            state = (*state[:k], what.at(instead, state), *state[k + 1 :])
+            near = what.near(state) if what.has(state) else []
+            if one in near and other in near and what.at(gap, state):
+                return {
+                    "state": named(what, state),
+                    "V from both sides": [float(what.at(c.function, state)) for c in (one, other)],
+                }
     return None
 
 
-def _lowest_part(q: Poly, equilibrium: Sequence[Any], moving: Sequence[int]) -> Poly:
-    about = from_equilibrium(q, equilibrium)
-    degree = lowest(about, moving)
-    return q.context().from_dict({p: c for p, c in about.to_dict().items() if sum(p[k] for k in moving) == degree})
+def ray(what: Candidate) -> dict[str, Fraction] | None:
+    """A direction from the equilibrium in which V is positive however near, by its terms of the lowest degree; None if none
+    is found."""
+    if what.equilibrium is None or what.system.parameters:
+        return None
+    count, random = len(what.equilibrium), np.random.default_rng(0)
+    for choice in [*np.eye(count), *-np.eye(count), *random.integers(-9, 10, size=(300, count))]:
+        along = {x: var("t") * int(d) + e for x, d, e in zip(what.system.names, choice, what.equilibrium, strict=True)}
+        for cell in what.whole:
+            terms = [p.at(along).terms for p in (cell.function, *cell.sides)]
+            if all(own and own[min(own, key=len)] > 0 for own in terms):
+                return {x: Fraction(int(d)) for x, d in zip(what.system.names, choice, strict=True)}
+    return None
 
 
-def at_most(V: Any, level: float) -> bool:
-    """Whether an exact value is at most a float, which may be infinite."""
-    return math.isinf(level) or exact(level) >= V
-
-
-def named(what: Candidate, state: Sequence[Any]) -> dict[str, float]:
+def named(what: Candidate, state: State) -> dict[str, float]:
     """A state by the names of its variables."""
-    pairs = zip(what.pieces.names, state, strict=True)
-    return {name: number(x) for name, x in pairs if x is not None}
+    return dict(zip(what.system.names, map(float, state), strict=True))

@@ -18,77 +18,20 @@ from fractions import Fraction
 from functools import reduce
 from typing import Any
 
-from starhold.algebra.polynomial import Case, Polynomial, exact, pieces
+from starhold.algebra.polynomial import exact, pieces
 from starhold.algebra.scalar import maximum, minimum
 from starhold.certification.certificate import Claim, Obligation
 from starhold.certification.evidence.finding import certificate
 from starhold.certification.invariant import search
 from starhold.certification.invariant.prover import Attempt, proved, scales
 from starhold.certification.invariant.search import Candidate
-from starhold.certification.invariant.system import System, plain, turned
+from starhold.certification.invariant.system import System, program, turned
 from starhold.kernel.check import prove as kernel_proves
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import Poly as Exact
 from starhold.kernel.polynomials import var
 from starhold.kernel.reading import Claim as KernelClaim
 from starhold.kernel.reading import read_certificate
-
-
-class Line:
-    """A straight line of steps over named inputs; equal steps are kept once."""
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self.names, self.steps = list(names), list[list[Any]]()
-        self._places: dict[Any, int] = {}
-
-    def step(self, *parts: Any) -> int:
-        """Return the place of a step's value."""
-        if parts not in self._places:
-            self.steps.append([*parts])
-            self._places[parts] = len(self.names) + len(self.steps) - 1
-        return self._places[parts]
-
-    def polynomial(self, p: Polynomial) -> int:
-        """Return the place of a polynomial's value."""
-        total: int | None = None
-        for monomial, c in sorted(p.terms.items()):
-            text = str(Fraction(int(c.p), int(c.q)))
-            term = None if text == "1" and monomial else self.step("constant", text)
-            for name in monomial:
-                place = self.names.index(name)
-                term = place if term is None else self.step("product", term, place)
-            total = term if total is None else self.step("plus", total, term)
-        return self.step("constant", "0") if total is None else total
-
-    def value(self, cases: Sequence[Case]) -> int:
-        """Return the place of a piecewise polynomial's value: a choice by one of its conditions, and so on."""
-        condition = next((condition for case in cases for condition, _ in case.truths), None)
-        if condition is None:
-            return self.polynomial(cases[0].value)
-        sides = [_where(cases, condition, side) for side in (True, False)]
-        if not all(sides):
-            # Whatever else holds there contradicts one side.
-            return self.value(sides[0] or sides[1])
-        truth = self.step("less", self.step("constant", "0"), self.polynomial(condition.positive))
-        return self.step("select", truth, *map(self.value, sides))
-
-
-def _where(cases: Sequence[Case], condition: Any, side: bool) -> list[Case]:
-    """Return the cases where a condition has one truth, without it."""
-    found: list[Case] = []
-    for case in cases:
-        others = tuple(truth for truth in case.truths if truth[0].key != condition.key)
-        if not any(c.key == condition.key and truth != side for c, truth in case.truths):
-            found.append(Case(others, case.value))
-    return found
-
-
-def program(values: Sequence[Any], names: Sequence[str]) -> dict[str, Any]:
-    """Return piecewise polynomials of the named numbers as one program."""
-    line = Line(names)
-    outputs = [line.value(pieces(value)) for value in values]
-    return {"inputs": line.names, "steps": line.steps, "outputs": outputs}
-
 
 SQUARES, VERIFIED = "sums of squares", "exact inequality"
 KERNEL = {"stable": "is stable", "unstable": "is unstable", "avoids": "avoids"}
@@ -184,8 +127,7 @@ def candidate(system: System, wanted: WantedSet) -> Candidate:
     """Return the function V of a claim with its box; of the point that M is if no core is about that."""
     point = None
     if wanted.core is None and wanted.equilibrium is not None:
-        others = (*(None for _ in system.parameters), *map(exact, (0, 1) * len(system.angles)))
-        point = (*map(exact, wanted.equilibrium), *others)
+        point = tuple(map(fraction, wanted.equilibrium))
     return Candidate(system, indicator(wanted), wanted.box, point)
 
 
@@ -240,12 +182,12 @@ class _Proof:
         """Return a claim for the kernel without evidence, of the box, or of all states."""
         wanted, system = self.wanted, self.what.system
         box = dict(zip(system.names, wanted.box, strict=True))
-        subject = {f"box.{x}.{k}": str(Fraction(end)) for x, ends in box.items() for k, end in enumerate(ends)}
+        subject = search.sides(system.names, wanted.box)
         if not within:
             subject = {f"box.{x}.{k}": subject[f"box.{x}.{k}"] for x in system.parameters for k in (0, 1)}
         point: dict[str, Any] = {}
         if wanted.equilibrium is not None:
-            point = dict(zip(system.variables, (fraction(exact(x)) for x in wanted.equilibrium), strict=True))
+            point = dict(zip(system.variables, map(fraction, wanted.equilibrium), strict=True))
         told = {f"equilibrium.{x}": v for x, v in point.items()} | numbers
         sizes = scales(box, {x: float(v) for x, v in point.items()})
         for x in system.angles:
@@ -256,13 +198,13 @@ class _Proof:
     def polynomial(self, function: Any) -> Exact:
         """Return a function that is not piecewise as the kernel has it: from the equilibrium, of a cosine what it lacks."""
         system = self.what.system
-        found = plain(system, function).to_dict().items()
-        names = system.inputs
-        terms = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in found}
+        first, *more = pieces(function)
+        if more:
+            raise ValueError("the function has to be one polynomial")
         point = zip(system.variables, self.wanted.equilibrium or (), strict=False)
-        about = {x: var(x) + fraction(exact(at)) for x, at in point}
+        about = {x: var(x) + fraction(at) for x, at in point}
         about |= {cosine: 1 - var(cosine) for cosine in (turned("cos", x) for x in system.angles)}
-        return Exact({tuple(sorted(m)): Fraction(int(c.p), int(c.q)) for m, c in terms.items()}).at(about)
+        return Exact({tuple(sorted(m)): fraction(c) for m, c in first.value.terms.items()}).at(about)
 
     def proof(self) -> dict[str, Any] | str:
         """Return the claim with evidence that the kernel accepts, or why there is none."""
@@ -287,12 +229,12 @@ class _Proof:
             member = search.member(what, min(wanted.level or math.inf, 0.1 * top) if decreasing else 0.0)
             if member is None:
                 return "no state with V <= 0 was found in the box: member"
-            numbers |= {f"member.{x}": fraction(v) for x, v in zip(what.pieces.names, member, strict=True)}
+            numbers |= {f"member.{x}": v for x, v in zip(what.system.names, member, strict=True)}
         elif self.unstable and what.equilibrium is not None:
-            way = search.ray(what, lambda V, slope: V)
+            way = search.ray(what)
             if way is None:
                 return "no direction was found in which V > 0: direction"
-            numbers |= {f"direction.{x}": Fraction(v) for x, v in way["direction"].items()}
+            numbers |= {f"direction.{x}": v for x, v in way.items()}
         escape = None if wanted.escape is None else self.polynomial(wanted.escape)
         attempt = self.attempt(KERNEL.get(wanted.theorem, "attracts"), numbers)
         attempt.given = given
@@ -306,7 +248,7 @@ class _Proof:
     def avoided(self) -> dict[str, Any] | str:
         """Return the claim that one set avoids another with its evidence: of all states, or else in the box."""
         names = self.what.system.names
-        numbers = {f"{role}.{x}": fraction(v) for role, at in self.states.items() for x, v in zip(names, at, strict=True)}
+        numbers = {f"{role}.{x}": v for role, at in self.states.items() for x, v in zip(names, at, strict=True)}
         for self.numbers["within"] in (False, True):
             found = proved(self.attempt("avoids", numbers, within=self.numbers["within"]), math.inf, None)
             if not isinstance(found, str):
@@ -379,5 +321,6 @@ def claim_of(claim: dict[str, Any], programs: dict[str, dict[str, Any]]) -> Kern
 
 
 def fraction(x: Any) -> Fraction:
-    """Return an exact number of flint."""
-    return Fraction(int(x.p), int(x.q))
+    """Return an exact number, of flint too, as the kernel has it."""
+    number = exact(x)
+    return Fraction(int(number.p), int(number.q))

@@ -11,6 +11,7 @@ from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, nearer, normalise
 from starhold.algebra.rotation import short_turn
 from starhold.algebra.scalar import Scalar, Truth, both, less, maximum, sqrt, where
+from starhold.algebra.structure import chosen
 from starhold.algebra.vector import IDENTITY, ZERO, Matrix, Vector, add, cross, dot, scale, transpose
 from starhold.algebra.vector import multiply as product
 from starhold.parts import magnetic_field, sun
@@ -95,12 +96,8 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
     )
     usable = both(there, clear)
     # An unusable measurement is replaced by something finite.
-    matrix: Any = tuple(
-        tuple(where(usable, x, y) for x, y in zip(row, still, strict=True))
-        for row, still in zip(product(axes, transpose(reference)), IDENTITY, strict=True)
-    )
-    measured = nearer(to_quaternion(matrix), carried)
-    attitude: Any = tuple(where(usable, x, y) for x, y in zip(measured, carried, strict=True))
+    matrix = chosen(usable, product(axes, transpose(reference)), IDENTITY)
+    attitude = chosen(usable, nearer(to_quaternion(matrix), carried), carried)
     age = where(usable, 0.0, memory.age + period)
     return Estimate(attitude, rate, age), Memory(attitude, rate, age, memory.steps + 1.0)
 

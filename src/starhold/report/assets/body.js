@@ -94,7 +94,7 @@ function paint(view, where) {
 
   const { away, right, up } = upright(stance());
   const lamp = plus(plus(away, up, 0.6), right, -0.5).map((c) => c / 1.27);
-  const scale = Math.min(width, 0.95 * height) * (scene.down ? 0.33 : scene.earth ? 0.31 : 0.385);
+  const scale = Math.min(width - 30, 0.95 * height - 24) * (scene.down ? 0.33 : scene.earth ? 0.31 : 0.385);
   // Off the middle, for the target's axes have only one half each; the Earth may be anywhere.
   const flat = (p) => [width / 2 + scale * dot(p, right), (scene.down ? 0.37 : scene.earth ? 0.51 : 0.56) * height - scale * dot(p, up)];
 

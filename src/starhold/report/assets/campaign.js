@@ -19,7 +19,12 @@ function smallest(values) {
   return Math.min(...values.filter((value) => value > 0));
 }
 
+// Side by side plots fill their boxes; in a fold there is no room to draw in until it is opened.
+const box = (plot) => document.getElementById(plot.name);
+const heightOf = (plot, otherwise) => (box(plot).closest(".two, .one") ? box(plot).clientHeight : otherwise);
+
 function drawHistogram(plot) {
+  if (!box(plot).clientWidth) return;
   const { axis, layout } = look();
   const curves = shownCurves(plot);
   // On a logarithmic scale bars stand on what a single run would reach, or half of the least bar.
@@ -51,7 +56,7 @@ function drawHistogram(plot) {
     ];
   });
   Object.assign(layout, {
-    height: 250, margin: { l: 62, r: 14, t: 12, b: 44 }, hovermode: "closest", showlegend: false,
+    height: heightOf(plot, 250), margin: { l: 62, r: 14, t: 12, b: 44 }, hovermode: "closest", showlegend: false,
     xaxis: {
       ...axis, title: title(plot.xlabel, 8), nticks: 7, zeroline: false,
       ...(plot.log ? { type: "log", exponentformat: "power", dtick: decades(plot), tickfont: { size: 11 } } : {}),
@@ -109,6 +114,7 @@ function bands(curve, plot) {
 }
 
 function drawEnvelope(plot) {
+  if (!box(plot).clientWidth) return;
   const { axis, layout } = look();
   const curves = shownCurves(plot);
   // From the start on, at which the first window begins.
@@ -136,7 +142,7 @@ function drawEnvelope(plot) {
     };
   });
   Object.assign(layout, {
-    height: 320, margin: { l: 78, r: 18, t: 14, b: 44 }, hovermode: "x unified", showlegend: false,
+    height: heightOf(plot, 320), margin: { l: 78, r: 18, t: 14, b: 44 }, hovermode: "x unified", showlegend: false,
     xaxis: { ...axis, title: title(plot.xlabel, 8), hoverformat: ".5~g", range: [0, Math.max(...plot.curves.flatMap((curve) => curve.times))] },
     yaxis: {
       ...axis, title: title(plot.ylabel, 6),
@@ -172,4 +178,5 @@ if (rareButton) {
 }
 
 drawCampaign();
+document.addEventListener("toggle", drawCampaign, true);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawCampaign);

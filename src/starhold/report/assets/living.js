@@ -215,13 +215,21 @@ function rank() {
     const winners = given.filter((number) => found[number][name] === least);
     return given.length > 1 && winners.length < given.length ? winners : [];
   });
+  const names = (list) => list.map((number) => `<span class="swatch" style="background:${rows[number].colour}"></span>${plain(rows[number].name)}`).join(", ");
+  const won = measures.flatMap(({ name, heading }, k) => (order.includes(name) && best[k].length ? [`<span>${plain(heading)}: ${names(best[k])}</span>`] : []));
+  const told = document.querySelector(".best-at");
+  if (told) {
+    told.innerHTML = `<strong>Best</strong> ${won.join("")}`;
+    told.hidden = !won.length;
+  }
   const body = document.querySelector("table.ranking tbody");
-  body.innerHTML = rows.map((_, number) => number).sort(before).map((number, place) => {
+  body.innerHTML = rows.map((_, number) => number).sort(before).map((number) => {
     const row = rows[number];
-    const why = stays(number) ? "as the file has it" : lost(number) ? `diverged at ${general(found[number].diverged_at, 6)} s` : row.law !== row.name ? row.law : "";
-    const cells = measures.map((measure, k) => `<td${best[k].includes(number) ? ' class="best"' : ""}>${shown(measure, found[number])}</td>`).join("");
-    return `<tr class="${lost(number) ? "lost" : ""}${stays(number) ? " stays" : ""}"><td>${place + 1}</td><th scope="row" style="text-align:left">`
-      + `<span class="swatch" style="background:${row.colour}"></span>${plain(row.name)}${why ? `<small>${plain(why)}</small>` : ""}</th>${cells}</tr>`;
+    const why = stays(number) ? "as the file has it" : lost(number) ? `at ${general(found[number].diverged_at, 6)} s` : row.law !== row.name ? row.law : "";
+    const cells = measures.map((measure, k) => `<td class="number${best[k].includes(number) ? " best" : ""}">${shown(measure, found[number])}</td>`).join("");
+    const [word, mood] = lost(number) ? ["diverged", "refuted"] : found[number].settling_time === null ? ["not settled", "undecided"] : ["settled", "proved"];
+    return `<tr class="${lost(number) ? "lost" : ""}${stays(number) ? " stays" : ""}"><th scope="row">`
+      + `<span class="swatch" style="background:${row.colour}"></span>${plain(row.name)}${why ? `<small>${plain(why)}</small>` : ""}</th><td class="words"><span class="outcome ${mood}">${word}</span></td>${cells}</tr>`;
   }).join("");
 }
 

@@ -39,6 +39,8 @@ function paint(view, where) {
     pen.globalAlpha = 1;
   }
   function word(p, text, colour, align) {
+    // In a small picture words would cover the path.
+    if (width < 200 || height < 160) return;
     const [x, y] = flat(p);
     pen.font = "12px system-ui, sans-serif";
     pen.fillStyle = colour;

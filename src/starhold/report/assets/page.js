@@ -7,3 +7,10 @@ const css = (name) => getComputedStyle(document.documentElement).getPropertyValu
 // What reads names as HTML is given what comes from files as it stands.
 const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;").replace(/"/g, "&quot;");
 const dark = matchMedia("(prefers-color-scheme: dark)");
+// Buttons that lead to a fold open it.
+document.addEventListener("click", ({ target }) => {
+  const fold = target.dataset.open && document.getElementById(target.dataset.open);
+  if (!fold) return;
+  fold.open = true;
+  fold.scrollIntoView({ behavior: "smooth" });
+});

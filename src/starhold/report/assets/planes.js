@@ -18,6 +18,7 @@ function drawPlanes(plot) {
   const { axis, layout } = look();
   const count = plot.planes.length;
   const box = document.getElementById(plot.name);
+  if (!box.clientWidth) return;
   const wide = Math.min(box.clientWidth, count === 1 ? 760 : 1300);
   const columns = wide < 820 ? Math.min(count, 2) : count;
   const rows = Math.ceil(count / columns);
@@ -63,4 +64,6 @@ function drawAllPlanes() {
 
 drawAllPlanes();
 addEventListener("resize", drawAllPlanes);
+// In a fold there is no room to draw in until it is opened.
+document.addEventListener("toggle", drawAllPlanes, true);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAllPlanes);

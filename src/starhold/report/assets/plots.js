@@ -24,6 +24,31 @@ function short(value, digits = 4) {
   return `${Number(mantissa)}×10${superscript(Number(power))}`.replace("-", "−");
 }
 
+// --- units that suit the numbers ---
+
+const SPANS = [[172800, 86400, "days"], [7200, 3600, "h"], [600, 60, "min"], [0, 1, "s"]];
+
+// The unit of a plot's time axis, and how many of its clock's ticks that is.
+function clockOf(plot) {
+  if (plot.clock !== "s") return [1, plot.clock];
+  const times = timesOf(plot);
+  return SPANS.find(([least]) => times[times.length - 1] >= least).slice(1);
+}
+
+const PREFIXES = { "-12": "p", "-9": "n", "-6": "µ", "-3": "m", 3: "k", 6: "M" };
+
+// By what a panel's numbers are divided, and its label then.
+function unitOf(panel, u) {
+  const [, name, unit] = panel.label.match(/^(?:(.*), )?(.*)$/);
+  const written = (text) => [name, text === "1" ? "" : text.replace("^2", "²").replace("^3", "³")].filter(Boolean).join(", ");
+  const most = Math.max(Math.abs(u.scales.y.min), Math.abs(u.scales.y.max));
+  const power = 3 * Math.floor(Math.log10(most) / 3 + 1e-9);
+  if (panel.log || !Number.isFinite(power) || (most >= 0.01 && most < 1e4)) return { factor: 1, label: written(unit) };
+  const prefix = PREFIXES[power];
+  if (prefix && /^(N|A|T|W|J|V|rad)\b/.test(unit)) return { factor: 10 ** power, label: written(prefix + unit) };
+  return { factor: 10 ** power, label: `${written(unit)} ×10${superscript(power)}` };
+}
+
 // Where the words of marks stand above a plot: rows of which none overlaps another; "" for what has no room.
 const WORD_ROWS = 3, WORD_HEIGHT = 13;
 function placedWords(marks, place, measure) {
@@ -33,6 +58,13 @@ function placedWords(marks, place, measure) {
     if (row >= 0 && word) ends[row] = x + measure(word) + 8;
     return { x, word: row < 0 ? "" : word, row };
   });
+}
+
+// A number made 1, 2 or 5 times a power of ten, down or up.
+function rounded(value, way) {
+  const power = 10 ** Math.floor(Math.log10(value)), digits = [1, 2, 5, 10];
+  const share = value / power;
+  return power * (way === Math.floor ? digits.findLast((d) => d <= share * (1 + 1e-9)) : digits.find((d) => d >= share * (1 - 1e-9)));
 }
 
 // The ordinates to show: of laws that are shown and were not lost, with the levels.
@@ -51,106 +83,173 @@ function span(panel, chart, u) {
       if (value > high) high = value;
     }
   }
+  // What is drawn stretches an axis by itself at the most; a limit farther off is told in words.
+  const [under, over] = panel.log ? [low / 100, high * 100] : [2 * low - high, 2 * high - low];
   for (const level of panel.levels) {
-    low = Math.min(low, level);
-    high = Math.max(high, level);
+    if (level >= under && level <= over) [low, high] = [Math.min(low, level), Math.max(high, level)];
   }
   if (low > high) return panel.log ? [0.1, 1] : [0, 1];
   // Below this share of the largest there is rounding, and more decades than there is room for.
   if (panel.log) low = Math.max(low, 1e-15 * high);
-  if (panel.log) return [10 ** Math.floor(Math.log10(low) - 1e-9), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
+  if (panel.log) return [rounded(low, Math.floor), rounded(high, Math.ceil)];
   if (low === high) return [low - 1, high + 1];
   return uPlot.rangeNum(chart.plot.split ? 0 : low, high, 0.08, true);
 }
 
-// Dashed levels, and dotted lines where something happens.
+const TINTS = ["79,70,229,.10", "245,158,11,.14", "16,185,129,.13", "100,116,139,.15", "236,72,153,.10", "14,165,233,.13"];
+const bands = report.bands || [];
+const modes = [...new Set(bands.map(([, , name]) => name))];
+const tint = (name) => `rgba(${TINTS[modes.indexOf(name) % TINTS.length]})`;
+
+// Modes as bands of time, behind the curves.
+function tinted(u) {
+  const { ctx, bbox, scales: { x } } = u;
+  ctx.save();
+  for (const [start, end, name] of bands) {
+    const [from, to] = [Math.max(start, x.min), Math.min(end, x.max)].map((time) => u.valToPos(time, "x", true));
+    if (to <= from) continue;
+    ctx.fillStyle = tint(name);
+    ctx.fillRect(from, bbox.top, to - from, bbox.height);
+  }
+  ctx.restore();
+}
+
+// Dashed levels, dotted lines where something happens, and the words above a panel.
 function guides(panel, plot) {
   return (u) => {
-    const { ctx, bbox } = u;
+    const { ctx, bbox, scales: { x, y } } = u;
+    const dot = devicePixelRatio, right = bbox.left + bbox.width;
     ctx.save();
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
     ctx.strokeStyle = colours.soft;
-    ctx.lineWidth = devicePixelRatio;
+    ctx.lineWidth = dot;
     const line = (from, to, dash) => {
-      ctx.setLineDash(dash.map((d) => d * devicePixelRatio));
+      ctx.setLineDash(dash.map((d) => d * dot));
       ctx.beginPath();
       ctx.moveTo(...from);
       ctx.lineTo(...to);
       ctx.stroke();
     };
     for (const level of panel.levels) {
-      const y = u.valToPos(level, "y", true);
-      line([bbox.left, y], [bbox.left + bbox.width, y], [6, 4]);
+      const high = u.valToPos(level, "y", true);
+      line([bbox.left, high], [right, high], [6, 4]);
     }
-    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-    const inside = (plot.marks || []).filter(([time]) => time >= u.scales.x.min && time <= u.scales.x.max);
-    const words = placedWords(inside, (time) => u.valToPos(time, "x", true), (word) => ctx.measureText(word).width);
-    for (const { x } of words) line([x, bbox.top], [x, bbox.top + bbox.height], [2, 3]);
+    ctx.font = `${11 * dot}px system-ui, sans-serif`;
+    const inside = (report.marks || []).filter(([time]) => time >= x.min && time <= x.max);
+    const words = plot.split ? [] : placedWords(inside, (time) => u.valToPos(time, "x", true), (word) => ctx.measureText(word).width);
+    for (const { x: place } of words) line([place, bbox.top], [place, bbox.top + bbox.height], [2, 3]);
     ctx.restore();
-    if (panel !== plot.panels[0]) return;
     ctx.save();
-    ctx.fillStyle = colours.soft;
-    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-    ctx.textAlign = "left";
+    ctx.fillStyle = colours.ink;
     ctx.textBaseline = "alphabetic";
-    for (const { x, word, row } of words) {
-      const room = bbox.left + bbox.width + 20 * devicePixelRatio - ctx.measureText(word).width;
-      ctx.fillText(word, Math.min(x, room), bbox.top - (4 + row * WORD_HEIGHT) * devicePixelRatio);
+    ctx.textAlign = "left";
+    ctx.font = `${12 * dot}px system-ui, sans-serif`;
+    const { factor, label } = unitOf(panel, u), top = bbox.top - 6 * dot - wordsAbove(plot, panel) * dot;
+    ctx.fillText(label, bbox.left, top);
+    ctx.fillStyle = colours.soft;
+    ctx.textAlign = "right";
+    const sizes = [...new Set(panel.levels.map(Math.abs))], off = panel.levels.some((level) => level < y.min || level > y.max);
+    const both = panel.levels.length > sizes.length ? "±" : "";
+    const room = right - bbox.left + 20 * dot - ctx.measureText(label).width;
+    const told = sizes.map((size) => `– – ${both}${short(size / factor, 3)}${off ? ", off the scale" : ""}`).join("  ");
+    if (ctx.measureText(told).width < room) ctx.fillText(told, right, top);
+    if (wordsAbove(plot, panel)) {
+      ctx.font = `${11 * dot}px system-ui, sans-serif`;
+      ctx.textAlign = "center";
+      for (const [start, end, name] of bands) {
+        const [from, to] = [Math.max(start, x.min), Math.min(end, x.max)].map((time) => u.valToPos(time, "x", true));
+        if (to - from > ctx.measureText(name).width + 4 * dot) ctx.fillText(name, 0.5 * (from + to), bbox.top - 4 * dot);
+      }
+      ctx.textAlign = "left";
+      for (const { x: place, word, row } of words) {
+        const most = right + 20 * dot - ctx.measureText(word).width;
+        ctx.fillText(word, Math.min(place, most), bbox.top - (4 + (row + Boolean(bands.length)) * WORD_HEIGHT) * dot);
+      }
     }
     ctx.restore();
   };
 }
 
-// The values under the pointer, in the corner of each panel.
+// The values under the pointer, in the corner of each panel, and a line at the moment that the views show.
 function readout(panel, k, chart) {
-  const box = document.createElement("div");
+  const box = document.createElement("div"), line = document.createElement("i");
   box.className = "readout";
+  box.hidden = true;
+  line.className = "moment";
   return {
     hooks: {
-      init: (u) => u.over.append(box),
+      init: (u) => {
+        u.over.append(box);
+        if (!chart.plot.split) u.over.append(line);
+        u.atMoment = () => {
+          const { min, max } = u.scales.x;
+          line.hidden = moment === null || moment < min || moment > max;
+          if (!line.hidden) line.style.left = `${u.valToPos(moment, "x")}px`;
+        };
+      },
+      draw: (u) => u.atMoment(),
       setCursor: (u) => {
         const { idx } = u.cursor;
-        box.hidden = idx === null || idx === undefined;
+        box.hidden = !chart.seen || idx === null || idx === undefined;
         if (box.hidden) return;
+        const time = u.data[0][idx], { factor } = unitOf(panel, u), [size, unit] = chart.plot.split ? [1, ""] : clockOf(chart.plot);
+        if (!chart.plot.split && u.over.matches(":hover")) document.dispatchEvent(new CustomEvent("looked-at", { detail: time }));
         const parts = panel.order.map((number, place) => [number, u.data[1 + place][idx]])
           .filter(([number]) => !hidden.has(number)).sort((a, b) => a[0] - b[0]);
-        box.innerHTML = (k === 0 ? `<b>${short(u.data[0][idx], 5)}</b>` : "")
-          + parts.map(([number, value]) => `<span style="color:${report.laws[number].colour}">${short(value)}</span>`).join("");
+        box.innerHTML = (k === 0 ? `<b>${short(time / size, 5)} ${unit}</b>` : "")
+          + parts.map(([number, value]) => `<span style="color:${report.laws[number].colour}">${short(value === null ? value : value / factor)}</span>`).join("");
       },
     },
   };
 }
 
+let moment = null;
+document.addEventListener("moment", ({ detail }) => {
+  moment = detail;
+  for (const chart of charts.values()) if (chart.seen && !chart.plot.split) chart.panels.forEach((u) => u.atMoment());
+});
+
+const STEPS = [1, 2, 2.5, 5].flatMap((x) => [-3, -2, -1, 0, 1, 2, 3, 4].map((power) => x * 10 ** power)).sort((a, b) => a - b);
+
 function options(plot, panel, k, chart, size) {
   const bottom = plot.split || k === plot.panels.length - 1;
   const grid = { stroke: () => colours.line, width: 1 };
   const axis = { stroke: () => colours.ink, grid, ticks: { show: false }, font: "12px system-ui, sans-serif", labelFont: "12.5px system-ui, sans-serif" };
+  const [tick, unit] = plot.split ? [1, ""] : clockOf(plot);
+  const told = plot.split ? { space: 50, label: plot.xlabel, incrs: [1], values: (u, splits) => splits }
+    : { space: 75, label: `time, ${unit}`, incrs: STEPS.map((step) => step * tick), values: (u, splits) => splits.map((v) => short(v / tick, 6)) };
   return {
-    ...size, plugins: [readout(panel, k, chart)], legend: { show: false }, padding: [k === 0 ? 8 + wordsAbove(plot) : 8, 22, 0, 0],
-    cursor: { sync: { key: plot.split ? `${plot.name}${k}` : plot.name, setSeries: false }, drag: { x: true, y: false }, points: { size: 6 } },
+    ...size, plugins: [readout(panel, k, chart)], legend: { show: false }, padding: [22 + wordsAbove(plot, panel), 16, 0, 0],
+    cursor: { sync: { key: plot.split ? `${plot.name}${k}` : "time", setSeries: false }, drag: { x: true, y: false }, points: { size: 6 } },
     scales: {
       x: { time: false, ...(plot.split ? { range: [0.8, 6.2] } : {}) },
       y: { distr: panel.log ? 3 : 1, range: (u) => span(panel, chart, u) },
     },
     axes: [
-      bottom ? { ...axis, label: plot.xlabel, size: 30, labelSize: 20, ...(plot.split ? { incrs: [1] } : {}) }
-        : { ...axis, size: 6, values: (u, splits) => splits.map(() => "") },
+      bottom ? { ...axis, ...told, size: 26, labelSize: 18 } : { ...axis, ...told, label: undefined, size: 6, values: (u, splits) => splits.map(() => "") },
       {
-        ...axis, label: panel.label, size: 58, labelSize: 20, ...(panel.log ? { grid: { ...grid, filter: decades } } : {}),
-        ...(panel.log ? {
-          values: (u, splits) => splits.map((v) => (v !== null && nearlyWhole(Math.log10(v)) ? `10${superscript(Math.round(Math.log10(v)))}` : "")),
-          filter: decades,
-        } : { values: (u, splits) => splits.map((v) => (v === null ? "" : short(v, 6))) }),
+        ...axis, size: 50, ...(panel.log ? { grid: { ...grid, filter: decades } } : {}),
+        ...(panel.log ? { values: powersOfTen, filter: decades }
+          : { values: (u, splits) => splits.map((v) => (v === null ? "" : short(v / unitOf(panel, u).factor, 6))) }),
       },
     ],
     series: [{}, ...panel.order.map((number) => ({
       stroke: report.laws[number].colour, width: panel.widths[number], show: !hidden.has(number),
       points: { show: Boolean(plot.markers), size: 8, fill: report.laws[number].colour },
     }))],
-    hooks: { draw: [guides(panel, plot)] },
+    hooks: { drawAxes: plot.split ? [] : [tinted], draw: [guides(panel, plot)] },
   };
+}
+
+// Powers of ten as they are read, where the axis has none too small for that.
+function powersOfTen(u, splits) {
+  const { min, max } = u.scales.y;
+  return splits.map((v) => {
+    if (v === null || !nearlyWhole(Math.log10(v))) return "";
+    return min >= 0.9e-4 && max <= 1.1e5 ? String(Number(v.toPrecision(1))) : `10${superscript(Math.round(Math.log10(v)))}`;
+  });
 }
 
 // Of powers of ten as many as there is room for.
@@ -170,18 +269,27 @@ function dataOf(plot, panel) {
   return [times, ...panel.order.map((number) => gaps(panel.curves[number], times.length, panel.log))];
 }
 
-const wordsAbove = (plot) => ((plot.marks || []).some(([, word]) => word) ? WORD_ROWS * WORD_HEIGHT : 0);
+// The room for words above the first panel of a plot.
+function wordsAbove(plot, panel) {
+  if (plot.split || panel !== plot.panels[0]) return 0;
+  const rows = (report.marks || []).length ? Math.min(WORD_ROWS, report.marks.length) : 0;
+  return (rows + Boolean(bands.length)) * WORD_HEIGHT;
+}
 
 function sizes(plot, box) {
-  const rows = plot.split ? 1 : plot.panels.length;
-  const width = Math.floor(plot.split ? box.clientWidth / (box.clientWidth > 700 ? 2 : 1) : box.clientWidth);
-  const high = rows === 1 ? 270 : rows === 2 ? 200 : 150;
-  return plot.panels.map((_, k) => ({ width, height: high + (k === 0 ? wordsAbove(plot) : 0) + (plot.split || k === plot.panels.length - 1 ? 44 : 0) }));
+  const room = box.clientWidth || document.body.clientWidth - 80, lead = plot.name === report.plots[0].name;
+  const width = Math.floor(plot.split && room > 700 ? room / 2 : room);
+  const high = lead ? box.clientHeight - box.querySelector(".legend-row").offsetHeight : plot.panels.length === 1 || plot.split ? 230 : 130;
+  return plot.panels.map((panel, k) => ({
+    width, height: lead ? Math.max(high, 120) : high + wordsAbove(plot, panel) + (plot.split || k === plot.panels.length - 1 ? 44 : 0),
+  }));
 }
 
 function legend(plot) {
-  return `<div class="legend-row">${report.laws.map((law, number) => `<button type="button" class="law-name" data-law="${number}">`
-    + `<i style="background:${law.colour}"></i>${plain(law.name)}</button>`).join("")}</div>`;
+  const laws = report.laws.map((law, number) => `<button type="button" class="law-name" data-law="${number}" `
+    + `title="click: hide; double click: alone"><i style="background:${law.colour}"></i>${plain(law.name)}</button>`);
+  const keys = modes.map((name) => `<span class="mode"><i style="background:${tint(name)}"></i>${plain(name)}</span>`);
+  return `<div class="legend-row">${(laws.length > 1 ? laws : []).concat(plot.name === report.plots[0].name ? keys : []).join("")}</div>`;
 }
 
 // A plot's panels, made anew; what flies again changes their data afterwards.
@@ -272,7 +380,7 @@ const fit = new ResizeObserver((entries) => {
   for (const { target } of entries) {
     const chart = charts.get(target.id);
     const measures = sizes(chart.plot, chart.box);
-    chart.panels.forEach((u, k) => { if (u.width !== measures[k].width) u.setSize(measures[k]); });
+    if (chart.box.clientWidth) chart.panels.forEach((u, k) => { if (u.width !== measures[k].width || u.height !== measures[k].height) u.setSize(measures[k]); });
   }
 });
 // What is out of sight is drawn when it comes into sight.

@@ -49,6 +49,13 @@ function startShow(views, paint, timeText) {
     clock.textContent = text;
     slider.setAttribute("aria-valuetext", text);
     views.forEach((view) => paint(view, place));
+    document.dispatchEvent(new CustomEvent("moment", { detail: timeAt(place) / (scene.tick || 1) }));
+  }
+
+  // The frame of a time; between two of them it need not be whole.
+  function frameAt(time) {
+    const k = Math.max(0, Math.min(last - 1, scene.times.findIndex((other) => other > time) - 1));
+    return time >= scene.times[last] ? last : k + (time - scene.times[k]) / (scene.times[k + 1] - scene.times[k]);
   }
 
   function play(on) {
@@ -70,6 +77,7 @@ function startShow(views, paint, timeText) {
   slider.max = last;
   slider.addEventListener("input", () => { play(false); show(Number(slider.value)); });
   button.addEventListener("click", () => play(!playing));
+  document.addEventListener("looked-at", ({ detail }) => { if (!playing) show(frameAt(detail * (scene.tick || 1))); });
   for (const { canvas } of views) {
     canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
     canvas.addEventListener("pointermove", (event) => {

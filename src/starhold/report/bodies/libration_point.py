@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.analysis.libration_point import DAY, goal_of
+from starhold.analysis.libration_point import DAY, YEAR, goal_of
 from starhold.report.body import PageParts
 from starhold.report.figures import POINTS, Picture, headed, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import rounded, views
 from starhold.report.path_plots import PathPlots, collect
-from starhold.report.plane_plots import GREY, draw_planes, plane_box, plane_data
-from starhold.report.plots import colour
+from starhold.report.plane_plots import GREY, draw_planes, plane_data
+from starhold.report.plots import colour, first_alone
+from starhold.report.tables import listed, titled
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -47,17 +47,17 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
     """Show the path in planes and in space, with what is held, and the control over time."""
     plots = collect(flights, PAGE_POINTS, scenario)
-    planes, scene = [plane_data(plot) for plot in plots.planes], _scene(scenario, flights, plots)
+    scene, (lead, *rest) = _scene(scenario, flights, plots), plots.over_time
+    drawn = [*first_alone(lead), *rest]
     data = {
         "times": rounded(plots.times),
-        "plots": [*planes, *(over_time_data(plot, flights) for plot in plots.over_time)],
+        "plots": [*(over_time_data(plot, flights) for plot in drawn), *map(plane_data, plots.planes)],
         "scene": scene,
     }
-    space = views(flights, len(scene["times"]), "Path", _VIEWS)
     return PageParts(
         data,
-        views=(*(plane_box(plot) for plot in planes), "<h2>In space</h2>", space),
-        units=_units(scenario),
+        views=views(flights, len(scene["times"]), "In space", "Path", _VIEWS),
+        folds={"Numbers and settings": titled("Libration point and units", listed(_units(scenario)))},
         scripts=("planes.js", "space.js", "orbit.js"),
     )
 
@@ -95,10 +95,11 @@ def _size(plots: PathPlots, flights: Sequence[Flight]) -> float:
     return max([farthest, *plots.rings]) or float(max((np.abs(path[0]).max() for path in plots.paths), default=1.0)) or 1.0
 
 
-def _units(scenario: Scenario) -> str:
+def _units(scenario: Scenario) -> list[tuple[str, str]]:
+    """Tell how much one of the scaled numbers in the settings is worth."""
     units, plant = scenario.table.libration.units, scenario.craft
     pair = scenario.table.libration.pair
-    rows = (
+    return [
         ("bodies", f"{pair.name}, {pair.separation / 1e3:.6g} km apart, {scenario.table.libration.point}"),
         ("distance of the point", f"{abs(plant.from_smaller) * units.length / 1e3:.6g} km from the smaller body"),
         ("stiffness C", f"{plant.stiffness:.6g} Ω²"),
@@ -106,13 +107,7 @@ def _units(scenario: Scenario) -> str:
         ("time", f"{units.time / DAY:.6g} days; 2π is a revolution of the two bodies"),
         ("velocity", f"{units.velocity:.6g} m/s"),
         ("acceleration", f"{units.acceleration * 1e6:.6g} µm/s²"),
-    )
-    cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(text)}</td></tr>" for name, text in rows)
-    return (
-        "<h2>Libration point and units</h2>\n"
-        f'<p class="note">Numbers in the settings are scaled: one of them is worth this.</p>\n'
-        f'<div class="columns"><section><table class="text"><tbody>{cells}</tbody></table></section></div>'
-    )
+    ]
 
 
 def _scene(scenario: Scenario, flights: Sequence[Flight], plots: PathPlots) -> dict[str, Any]:
@@ -138,6 +133,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight], plots: PathPlots) -> d
     farthest = max((float(np.abs(flight.recording["position"]).max()) for flight in sound), default=0.0)
     return {
         "times": rounded(times * units.time / DAY),
+        "tick": YEAR / DAY if plots.over_time[0].clock == "years" else 1.0,
         "paths": paths,
         "rings": rounded(plots.rings),
         "size": max([farthest, *plots.rings]) or 1.0,

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,14 +15,25 @@ from starhold.algebra.quaternion import conjugate, multiply, to_body
 from starhold.analysis.rigid_body import DECADES
 from starhold.parts.craft import EARTH, total_inertia
 from starhold.report import transients
-from starhold.report.attitude_plots import ACCURACIES, AttitudePlots, collect, early, steps_within, until
+from starhold.report.attitude_plots import (
+    ACCURACIES,
+    AttitudePlots,
+    begun,
+    closest_limit,
+    collect,
+    early,
+    steps_within,
+    until,
+)
 from starhold.report.body import PageParts, Sampling
 from starhold.report.figures import POINTS, Picture, blank, over_time, width_of, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import panel_data, rounded, views
 from starhold.report.plots import Panel, Plot, colour, thinning
-from starhold.studies.flight import Flight
+from starhold.report.tables import swatch
+from starhold.scenario.bodies.rigid_body.faults import fault_times
+from starhold.studies.flight import Begun, Flight
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -66,7 +78,8 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
 
     plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
     scene = _scene(scenario, flights)
-    data = {"times": rounded(plots.times), "plots": [*_drawn(plots, flights), _accuracy(flights)], "scene": scene}
+    data = {"times": rounded(plots.times), "plots": [*_drawn(plots, flights, scenario), _accuracy(flights)]}
+    data |= {"scene": scene, **_happenings(scenario, flights)}
     longest = max(len(flight.recording["time"]) for flight in flights)
     sampling = Sampling(thinning(longest, PAGE_POINTS))
     if end is not None:
@@ -74,19 +87,25 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
         count = max(len(flight.recording["time"]) for flight in early_flights)
         sampling = sampling._replace(early=(count, thinning(count, EARLY_POINTS)))
         first = collect(early_flights, EARLY_POINTS, scenario, end)
-        drawn = {one["name"]: one for one in _drawn(first, flights)}
+        drawn = {one["name"]: one for one in _drawn(first, flights, scenario)}
         data["transient"] = {"times": rounded(first.times), "plots": drawn}
     return PageParts(
         data,
-        views=("<h2>The turning body</h2>", views(flights, len(scene["times"]), "Attitude", _simplification(scene))),
-        measured=transients.section(flights),
+        views=views(flights, len(scene["times"]), "The turning body", "Attitude", _simplification(scene)),
+        measured=_limits(flights, scenario) + transients.section(flights),
+        folds={"Linear loop": section(scenario, flights)},
         transient=end,
-        settings="Spacecraft and settings",
-        units=section(scenario, flights),
         scripts=("space.js", "body.js"),
         footer=f"; seed {scenario.table.simulation.seed}",
         sampling=sampling,
     )
+
+
+def _limits(flights: Sequence[Flight], scenario: Scenario) -> str:
+    """Tell what limits each flight."""
+    closest = [(number, *closest_limit(flight, scenario)) for number, flight in enumerate(flights)]
+    said = "".join(f"<span>{swatch(number)}{name} {100.0 * share:.3g} %</span>" for number, share, name in closest if name)
+    return f'<p class="best-at of-file"><strong>Of torque and wheels, closest to a limit</strong>{said}</p>' if said else ""
 
 
 def _accuracy_figure(flights: Sequence[Flight], name: str) -> Any:
@@ -111,11 +130,27 @@ def _simplification(scene: Mapping[str, Any]) -> str:
     return _VIEWS + (_ORBITAL if scene["down"] else "") + arrow
 
 
-def _drawn(plots: AttitudePlots, flights: Sequence[Flight]) -> list[dict[str, Any]]:
-    """The plots over time for the script."""
+def _drawn(plots: AttitudePlots, flights: Sequence[Flight], scenario: Scenario) -> list[dict[str, Any]]:
+    """The plots over time for the script, first the error that the laws are there for."""
+    (angle, speed), of_angle = plots.angle.panels, replace(plots.angle, title="error angle")
+    lead = [replace(of_angle, panels=[angle]), replace(of_angle, name="speed", title="relative rate", panels=[speed])]
+    # Where every attitude is within its tolerance, the rate is what counts.
+    if scenario.table.settling.attitude_tolerance >= math.pi:
+        lead.reverse()
     quaternion = Plot("quaternion", "error quaternion", [*plots.scalar.panels, *plots.attitude.panels])
-    drawn = (plots.angle, plots.roll_pitch_yaw, quaternion, plots.rate, plots.torque, *plots.further)
-    return [over_time_data(plot, flights, plots.marks) for plot in drawn]
+    drawn = (*lead, plots.roll_pitch_yaw, quaternion, plots.rate, plots.torque, *plots.further)
+    return [over_time_data(plot, flights) for plot in drawn]
+
+
+def _happenings(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
+    """When faults happen and are acted on, and modes: as bands of time where one law has such, else by their beginnings."""
+    struck = {fault.time for fault in scenario.table.fault}
+    marks = [(time, "fault" if time in struck else "acted on") for time in fault_times(scenario)]
+    moded = [flight for flight in flights if flight.modes]
+    if len(moded) != 1:
+        return {"marks": [*marks, *begun(flights)], "bands": []}
+    begin = [*moded[0].modes, Begun("", float(moded[0].recording["time"][-1]))]
+    return {"marks": marks, "bands": [(one.time, after.time, one.mode) for one, after in pairwise(begin)]}
 
 
 def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
@@ -127,6 +162,7 @@ def _accuracy(flights: Sequence[Flight]) -> dict[str, Any]:
     period = flights[0].recording.attrs["control_period"]
     return {
         "name": "accuracy",
+        "topic": "Motion",
         "title": "control steps needed to stay within 10⁻ᵏ",
         "dashed": "",
         "xlabel": f"k; a control step lasts {period:g} s",

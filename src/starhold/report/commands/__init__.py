@@ -15,18 +15,20 @@ if TYPE_CHECKING:
 
 
 class Column(NamedTuple):
-    """A column of a table: its heading, the unit below it, and the format of its numbers; without one it holds words."""
+    """A column of a table: its heading, the unit below it, the format of its numbers (without one it holds words), and what
+    it means."""
 
     name: str
     unit: str = ""
     format: str = ""
+    meaning: str = ""
 
 
 class Cell(NamedTuple):
     """Words of a table with a look of their own. kind: "law", in the colour of the law of this number, or "name" where it
-    names its row; an outcome, "met", "missed" or "not decided"; "typed", to be copied; "share", with a bar of this share of
-    the column below it; "shade", in the colour that detail names, the stronger the farther the number is from 0; else detail
-    says what the words mean."""
+    names its row, with detail below it; an outcome, as "met" or "missed"; "best" of its column; "typed", to be copied;
+    "share", with a bar of this share of the column below it; "shade", in the colour that detail names, the stronger the
+    farther the number is from 0; else detail says what the words mean."""
 
     text: str
     kind: str = ""
@@ -76,13 +78,15 @@ Block: TypeAlias = Table | Heading | str
 class Result(NamedTuple):
     """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
     and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; certificate writes one. outcome: whether all that is required is met, or proved."""
+    summary.json; xml is the text of NAME.xml; certificate writes one. outcome: whether all that is required is met, or
+    proved."""
 
     title: str
     blocks: Sequence[Block]
     numbers: Table | None = None
     figure: Callable[[], Any] | None = None
     summary: Mapping[str, Any] | None = None
+    xml: str | None = None
     certificate: Callable[[Path], None] | None = None
     outcome: Literal["met", "missed", "undecided"] = "met"
 

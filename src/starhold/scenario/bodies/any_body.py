@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, create_
 
 from starhold.algebra.quantity import quantities
 from starhold.algebra.vector import ZERO
-from starhold.errors import InputError, is_interrupt
+from starhold.errors import InputError, input_at, is_interrupt
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Gain
 from starhold.loop.closed_loop import ClosedLoop
@@ -159,10 +159,8 @@ class NamedByTable:
             given_name = "nothing" if name is None else show(name)
             allowed = f"{nearest(str(name), list(known))}; or a file" if known else "a file, for no other body is installed"
             raise InputError(where, f"{MARKER}.type", given_name, allowed)
-        try:
+        with input_at(where, f"{MARKER}.type"):
             return AnyBody(known[name], folder)
-        except ValueError as error:
-            raise InputError(where, f"{MARKER}.type", "", str(error)) from None
 
 
 NAMED_BY_TABLE = NamedByTable()

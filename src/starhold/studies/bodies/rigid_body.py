@@ -34,6 +34,8 @@ TRANSIENT = ("rate_limit", "acceleration_limit", "angle_end", "rate_end")
 class RigidBodyStudy(BodyStudy):
     """Everything is in SI. Laws with wheels are certified anew after faults that they know of."""
 
+    EXTRAS = EXTRAS
+
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         settling, transient = scenario.table.settling, scenario.table.transient
         described = {f"settling_{name}": getattr(settling, name) for name in ("attitude_tolerance", "rate_tolerance")}
@@ -57,6 +59,10 @@ class RigidBodyStudy(BodyStudy):
             return metrics
         rate, acceleration, angle_end, rate_end = (attrs[f"transient_{name}"] for name in TRANSIENT)
         return metrics | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, metrics["cut_off"])
+
+    def measure_required(self, run: Recording, cones: Cones) -> dict[str, Any]:
+        attrs = run.attrs
+        return measure(run, attrs["settling_attitude_tolerance"], attrs["settling_rate_tolerance"], cones)
 
     def meter(
         self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES

@@ -1,22 +1,18 @@
 """Calls of a law cost processor time along a flight, and operations."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.cost import CALLS, Replay, recorded_states
 from starhold.loop.kernels import Numbers, make_step, replay
+from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
 from starhold.trace.bounds import work
-
-if TYPE_CHECKING:
-    from starhold.publications.desk import Desk
 
 PASSES = 3
 WINDOW = 2000

@@ -1,9 +1,7 @@
 """The equations of the publication are tried by numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +11,9 @@ from starhold.algebra.quaternion import derivative, to_body
 from starhold.analysis.rigid_body import error_angle
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
+from starhold.publications.desk import Desk
 from starhold.publications.verdicts import Finding
 from starhold.simulation.lane import fly
-
-if TYPE_CHECKING:
-    from starhold.publications.desk import Desk
 
 Array = NDArray[np.float64]
 COMMON = "three-laws"

@@ -1,22 +1,18 @@
 """Control steps are counted over random starts: for good, as the campaign has them, and at the first passage."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.rigid_body import DECADES
+from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
 from starhold.simulation.batched import Flying, fly_batched
 from starhold.simulation.lane import Recording, label
-
-if TYPE_CHECKING:
-    from starhold.publications.desk import Desk
 
 Array = NDArray[np.float64]
 FILE = "random-starts"

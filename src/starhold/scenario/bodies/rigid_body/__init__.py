@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from starhold.errors import InputError
+from starhold.errors import input_at
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.modes import join_targets
@@ -85,11 +85,9 @@ class RigidBody(Dials):
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
         for event in loop.events:
-            try:
+            key = f'law {entry.name} from {event.step * loop.period:g} s (fault_action = "none" flies on as before)'
+            with input_at(scenario.where, key):
                 entry.law.remember(event.gains, event.nominal, loop.period)
-            except ValueError as error:
-                key = f'law {entry.name} from {event.step * loop.period:g} s (fault_action = "none" flies on as before)'
-                raise InputError(scenario.where, key, "", str(error)) from None
 
 
 BODY = RigidBody()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from starhold.errors import InputError
+from starhold.errors import input_at
 from starhold.parts.catalogue import find, fit
 from starhold.parts.craft import Craft, bare_inertia, compact, inverse, make_craft
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
@@ -90,11 +90,9 @@ class Made(NamedTuple):
 
 def make(table: RigidBodyTable, where: str) -> Made:
     """The spacecraft of these tables. InputError where it cannot be."""
-    try:
+    with input_at(where, "wheel" if table.wheels or table.wheel else "spacecraft"):
         effectors = effectors_in(table)
         return Made(_craft(table, effectors, table.spacecraft.inertia), effectors)
-    except ValueError as error:
-        raise InputError(where, "wheel" if table.wheels or table.wheel else "spacecraft", "", str(error)) from None
 
 
 def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:

@@ -16,7 +16,7 @@ from starhold.algebra.cosines import from_angles
 from starhold.algebra.scalar import both, less_equal, minimum, where
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import apply
-from starhold.errors import InputError
+from starhold.errors import input_at
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse
 from starhold.parts.stated_attitude import check_attitude
@@ -83,18 +83,14 @@ class Dials(Body):
         them."""
         crafts = _crafts(scenario, values)
         for key, craft in zip((KNOWN, TRUE), crafts, strict=True):
-            try:
+            with input_at("", key):
                 if key in values:
                     check_moments(values[key])
                 if key in values and craft.with_rotors:
                     check_rest(craft.inertia)
-            except ValueError as error:
-                raise InputError("", key, "", str(error)) from None
         if ATTITUDE in values:
-            try:
+            with input_at("", ATTITUDE):
                 check_attitude(values[ATTITUDE])
-            except ValueError as error:
-                raise InputError("", ATTITUDE, "", str(error)) from None
         return crafts[0]
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.errors import InputError
+from starhold.errors import InputError, input_at
 from starhold.loop.closed_loop import Event
 from starhold.parts.craft import Craft
 from starhold.parts.effectors.envelope import authority
@@ -99,10 +99,8 @@ def _body(scenario: Scenario, place: int, fault: FaultTable) -> Craft | None:
     """The craft with the fault's inertia, None where that stays."""
     if fault.inertia is None:
         return None
-    try:
+    with input_at(scenario.where, f"fault[{place}].inertia"):
         return craft_with(scenario, fault.inertia)
-    except ValueError as error:
-        raise InputError(scenario.where, f"fault[{place}].inertia", "", str(error)) from None
 
 
 def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:

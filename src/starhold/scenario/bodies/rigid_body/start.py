@@ -15,7 +15,7 @@ from starhold.algebra.cosines import from_angles
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, stretch, to_body
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, most, subtract
-from starhold.errors import InputError
+from starhold.errors import InputError, input_at
 from starhold.export.aem import OFF_UNIT, from_date, read_aem
 from starhold.files import read_text
 from starhold.laws.interface import Start
@@ -63,10 +63,8 @@ def target_of(scenario: Scenario) -> Fitted:
 def _tried(scenario: Scenario, target: Fitted, key: str) -> Fitted:
     """The target itself; InputError for numbers that it refuses, for a start may be relative to it before all parts are
     tried together."""
-    try:
+    with input_at(scenario.where, key):
         target.prepared(scenario.table.simulation.control_period)
-    except ValueError as error:
-        raise InputError(scenario.where, key, "", str(error)) from None
     return target
 
 

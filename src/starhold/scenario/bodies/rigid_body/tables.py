@@ -16,24 +16,11 @@ from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
 from starhold.scenario.orbit import Orbit
 from starhold.scenario.quantity import quantity, quantity_or, reader
+from starhold.scenario.requirement import without_requirements
 from starhold.scenario.schema import LawTable, ScenarioTable, SeededTiming
 from starhold.scenario.tables import Flag, Table, at_key, refuse
 
 MOST_RUNS = 100_000
-ANGLE = "largest of all sources together, about the boresight where there is one"
-
-
-def _at_most(index: str) -> Any:
-    return quantity(Gain("rad", above=0.0, text=f"{index}, {ANGLE}"))
-
-
-class PointingRequirement(Table):
-    """The largest errors that are allowed."""
-
-    ape: Annotated[float | None, *_at_most("absolute performance error")] = None
-    mpe: Annotated[float | None, *_at_most("mean performance error")] = None
-    rpe: Annotated[float | None, *_at_most("relative performance error")] = None
-    pde: Annotated[float | None, *_at_most("performance drift error")] = None
 
 
 class BudgetTable(Table):
@@ -62,7 +49,11 @@ class BudgetTable(Table):
     boresight: Annotated[
         Any, *quantity(Gain("1", shape=(3,), spread=False, text="line of sight, body axes; all three axes if absent"))
     ] = None
-    requirement: PointingRequirement = PointingRequirement()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_requirements(cls, given: Any) -> Any:
+        return without_requirements(given, "budget")
 
     @model_validator(mode="after")
     def _has_a_direction(self) -> BudgetTable:

@@ -1,22 +1,27 @@
-"""Requirements: bounds that runs must keep, each with its margin."""
+"""Requirements as numbers: bounds of metrics, each with its margin."""
+
+from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.rigid_body import EXTRAS, Cone
-from starhold.errors import InputError
-from starhold.scenario.campaign import RequirementTable
+from starhold.errors import InputError, input_at
 from starhold.scenario.checking import nearest, show
+from starhold.scenario.requirement import CONE, RequirementTable
 from starhold.scenario.units import shown, to_number
 
-LOST, CONE = "lost", "exclusion-cone"
-"""What may be required beside metrics: that the motion is not lost, and that a body axis stays away from a direction."""
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+LOST = "lost"
+"""What may be required beside metrics, with the exclusion-cone: that the motion is not lost."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +53,7 @@ class Requirement:
         return f"{self.metric} {'at most' if self.at_most else 'at least'} {self.bound:.6g} {shown(self.unit)}"
 
 
-def cones_of(tables: Sequence[RequirementTable]) -> dict[str, Cone]:
+def cones_of(tables: Iterable[RequirementTable]) -> dict[str, Cone]:
     """The cones that requirements ask for, by the names of their metrics; axes and directions of unit length."""
     cones = [table for table in tables if table.metric == CONE]
     return {_cone_column(table): Cone(_unit(table.axis), _unit(table.direction)) for table in cones}
@@ -56,34 +61,47 @@ def cones_of(tables: Sequence[RequirementTable]) -> dict[str, Cone]:
 
 def _cone_column(table: RequirementTable) -> str:
     """The angle between the axis of a requirement and its direction."""
-    return f"angle of {table.called}" if table.name else "cone_angle"
+    return f"angle of {table.called}" if table.id else "cone_angle"
 
 
-def extras_of(tables: Sequence[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
+def extras_of(tables: Iterable[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
     """The metrics, or kinds of them, beyond the usual that are to be measured: those asked for, and those required."""
-    wanted = {*more, *(extra for table in tables for extra in EXTRAS if extra in table.metric)}
+    wanted = {*more, *(extra for table in tables for extra in EXTRAS if extra in str(table.metric))}
     return tuple(extra for extra in (*EXTRAS, *sorted(wanted - {*EXTRAS})) if extra in wanted)
 
 
-def read_requirements(tables: Sequence[RequirementTable], units: Mapping[str, str], where: str) -> tuple[Requirement, ...]:
-    """The requirements of tables; units: those of the metrics that are measured. InputError where one asks for what is not
-    measured, or for no bound."""
+def tables_of(scenario: Scenario, method: str | None) -> dict[str, RequirementTable]:
+    """The [[requirement]] tables of a scenario that have this method, by what errors call them."""
+    numbered = enumerate(scenario.table.requirement, 1)
+    return {f"requirement[{number}]": table for number, table in numbered if table.method == method}
+
+
+def read_requirements(
+    tables: Mapping[str, RequirementTable], units: Mapping[str, str], where: str
+) -> tuple[Requirement, ...]:
+    """The requirements of tables, which errors call by their keys; units: those of the metrics that the method measures.
+    InputError where one asks for what is not measured, or for no bound."""
+    beside = [LOST, CONE] if {table.method for table in tables.values()} <= {"campaign", "flight"} else []
     requirements: list[Requirement] = []
-    for number, table in enumerate(tables, 1):
-        key = f"campaign.requirement[{number}]"
-        column = table.metric
-        if table.metric == CONE:
-            column = _cone_column(table)
-        elif table.metric != LOST and table.metric not in units:
-            raise InputError(where, f"{key}.metric", show(table.metric), nearest(table.metric, [*units, LOST, CONE]))
+    for key, table in tables.items():
+        metric = str(table.metric)
+        column = _cone_column(table) if metric == CONE else metric
+        if metric not in (*units, *beside):
+            raise InputError(where, f"{key}.metric", show(metric), nearest(metric, [*units, *beside]))
         bound = _bound(table, units.get(column, "1"), where, key)
         at_most = table.at_least is None
         requirements.append(
-            Requirement(
-                table.called, table.metric, column, units.get(column, "1"), bound, at_most, table.share, table.confidence
-            )
+            Requirement(table.called, metric, column, units.get(column, "1"), bound, at_most, table.share, table.confidence)
         )
     return tuple(requirements)
+
+
+def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: Mapping[str, str]) -> tuple[Requirement, ...]:
+    """The requirements of tables of methods that bound metrics from above alone, as `read_requirements` has them."""
+    for key, table in tables.items():
+        if table.at_least is not None:
+            raise InputError(scenario.where, f"{key}.at_least", show(table.at_least), f"at_most, with a {table.method}")
+    return read_requirements(tables, units, scenario.where)
 
 
 def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
@@ -100,10 +118,8 @@ def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
     if not isinstance(value, str | Real):
         allowed = f"one number, in {shown(unit)} or with its unit"
         raise InputError(where, f"{key}.{side}", show(value), allowed)
-    try:
+    with input_at(where, f"{key}.{side}", show(value)):
         return to_number(value, unit) if isinstance(value, str) else float(value)
-    except ValueError as error:
-        raise InputError(where, f"{key}.{side}", show(value), str(error)) from None
 
 
 def _unit(vector: Any) -> Any:

@@ -1,0 +1,88 @@
+"""Whether what is required of a law is met."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from starhold.report.commands import Block, Column, Command, Result, Table, later
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.verification import RequirementVerdict
+
+STYLES = {"met": "green", "missed": "red", "not decided": "yellow"}
+
+
+def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementVerdict]) -> Result:
+    """One row a requirement, and below the table why one is not met."""
+    from rich.markup import escape
+
+    head = [Column("requirement"), Column("number", "", ">"), Column("limit", "", ">"), Column("margin", "", ">")]
+    rows: list[list[Any]] = []
+    for one in verdicts:
+        style = STYLES[one.verdict]
+        shown = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
+        side = "≤ " if one.at_most else "≥ "
+        limit = amount(one, one.limit)
+        rows.append(
+            [escape(one.id), amount(one, one.number), limit and side + limit, amount(one, one.margin), one.method, shown]
+        )
+    blocks: list[Block] = ["", Table([*head, Column("method"), Column("verdict")], rows), ""]
+    blocks += [f"{one.id}: {one.evidence}." for one in verdicts if one.verdict != "met"]
+    outcomes = {one.verdict for one in verdicts}
+    outcome = "missed" if "missed" in outcomes else "undecided" if "not decided" in outcomes else "met"
+    title = f"{scenario.name}, {entry.name}: what is required"
+    return Result(title, blocks, _matrix(verdicts), xml=junit(title, entry.name, verdicts), outcome=outcome)
+
+
+def amount(one: RequirementVerdict, value: float | None) -> str | None:
+    """A number in the unit that the limit is typed in, rounded for reading."""
+    if value is None:
+        return None
+    unit = one.typed_unit or ("" if one.unit == "1" else one.unit)
+    return f"{value * one.scale:.5g} {unit}".rstrip()
+
+
+def _matrix(verdicts: Sequence[RequirementVerdict]) -> Table:
+    """All that is known of each, numbers in SI."""
+    columns = ("id", "parent", "text", "rationale", "method", "metric", "verdict", "number", "limit", "margin", "unit")
+    rows: list[list[Any]] = []
+    for one in verdicts:
+        left = "; ".join(one.left_out)
+        side = "" if one.limit is None else "at most" if one.at_most else "at least"
+        rows.append([*(getattr(one, name) for name in columns), side, left, one.evidence])
+    return Table([*map(Column, (*columns, "side", "leaving out", "evidence"))], rows)
+
+
+def junit(title: str, law: str, verdicts: Sequence[RequirementVerdict]) -> str:
+    """The verdicts as JUnit's XML: a requirement that is missed failed, and one that is not decided is an error, so that
+    nothing passes that was not shown."""
+    from xml.etree import ElementTree as Tree
+
+    counts = {name: sum(one.verdict == kind for one in verdicts) for kind, name in JUNIT.items()}
+    totals = {"tests": str(len(verdicts)), **{f"{name}s": str(count) for name, count in counts.items()}}
+    suite = Tree.Element("testsuite", {"name": title, **totals})
+    for one in verdicts:
+        case = Tree.SubElement(suite, "testcase", {"classname": law, "name": one.id})
+        if one.verdict in JUNIT:
+            number, limit = (amount(one, value) or "none" for value in (one.number, one.limit))
+            message = f"{one.verdict}: {number}, limit {limit}"
+            Tree.SubElement(case, JUNIT[one.verdict], {"message": message, "type": one.method or "derived"})
+        Tree.SubElement(case, "system-out").text = f"{one.text}\n{one.sentence}\n{one.evidence}".strip()
+    Tree.indent(suite)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{Tree.tostring(suite, encoding="unicode")}\n'
+
+
+JUNIT = {"missed": "failure", "not decided": "error"}
+"""How JUnit calls verdicts; a requirement that is met passed."""
+
+COMMAND = Command(
+    "Tell which requirements of a file are met, each by its own method: a table, verify.csv, and verify.xml for JUnit.",
+    "verify",
+    later("campaign.verify.study"),
+    present,
+    doing="by {}",
+    unstable=True,
+    body="",
+)

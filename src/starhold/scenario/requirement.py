@@ -1,0 +1,137 @@
+"""The [[requirement]] tables of a scenario: what is required of a flight, and how that is to be verified.
+
+Limits carry the unit of their metric, so they stay here as the file has them; `studies.requirements` reads them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Annotated, Any, Literal, TypeAlias, cast
+
+from pydantic import AfterValidator, Field, model_validator
+
+from starhold.laws.interface import Gain
+from starhold.scenario.quantity import quantity, raw
+from starhold.scenario.tables import LONGEST_NAME, Table, at_key, refuse, told_at
+
+CONE = "exclusion-cone"
+Method: TypeAlias = Literal["proof", "flight", "campaign", "budget", "margin", "inspection"]
+METHODS_OF: Mapping[str, tuple[Method, ...]] = MappingProxyType(
+    {
+        "after": ("flight", "proof"),
+        "in_mode": ("flight", "proof"),
+        "window": ("flight",),
+        "axis": ("flight", "campaign"),
+        "direction": ("flight", "campaign"),
+        "share": ("campaign",),
+        "confidence": ("campaign",),
+        "record": ("inspection",),
+    }
+)
+"""The methods that have a use for a key; any other key goes with all of them."""
+_IN_IDS = "-_. /:#()+{}"
+
+
+def _check_id(given: str) -> str:
+    sound = bool(given) and all(c.isalnum() or c in _IN_IDS for c in given) and given == given.strip()
+    if not sound or len(given) > LONGEST_NAME:
+        raise refuse(f"at most {LONGEST_NAME} letters, digits and, between them, spaces or any of {_IN_IDS.strip()}")
+    return given
+
+
+Id: TypeAlias = Annotated[str, AfterValidator(_check_id)]
+
+
+class RequirementTable(Table):
+    """A requirement, with the method that verifies it; without a method it is as those are that have it as parent."""
+
+    id: Annotated[Id | None, Field(description="how tables, columns and other tools call it; the metric if absent")] = None
+    text: Annotated[str, Field(description="the requirement in words")] = ""
+    method: Annotated[Method | None, Field(description="how it is verified")] = None
+    metric: Annotated[
+        str | None, Field(description="what is bounded: a metric as summaries name them, lost, or exclusion-cone")
+    ] = None
+    at_most: Annotated[Any, *raw("the greatest value allowed, in the metric's unit")] = None
+    at_least: Annotated[Any, *raw("the least value allowed, in the metric's unit")] = None
+    after: Annotated[Any, *raw("the time from which on it is required, since the start or since the mode began")] = None
+    in_mode: Annotated[str | None, Field(description="the mode of the law in which it is required")] = None
+    window: Annotated[Any, *raw("the two times between which it is required")] = None
+    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="body axis that keeps out of a cone"))] = None
+    direction: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="inertial axis of that cone"))] = None
+    share: Annotated[
+        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="of the runs that must keep it, such as 99.73 %"))
+    ] = 0.9973
+    confidence: Annotated[
+        float, *quantity(Gain("1", above=0.0, at_most=1.0, text="of the verdict: one less the consumer's risk"))
+    ] = 0.9
+    record: Annotated[str | None, Field(description="a file of its inspection, relative to this one")] = None
+    parent: Annotated[Id | None, Field(description="the id of the requirement that it is derived from")] = None
+    rationale: Annotated[str, Field(description="why it is required")] = ""
+    file: Annotated[str | None, Field(description="a CSV or ReqIF file of requirements, relative to this one")] = None
+    attributes: dict[str, str] = Field(default={}, description="what else another tool says of it, kept as it is")
+
+    @model_validator(mode="after")
+    def _has_a_metric(self) -> RequirementTable:
+        if self.metric is None and self.method not in (None, "inspection"):
+            raise at_key("metric", f'this key is required with method = "{self.method}"', None)
+        if self.metric is None and self.id is None:
+            raise at_key("id", "an id, where there is no metric", None)
+        return self
+
+    @model_validator(mode="after")
+    def _has_a_cone(self) -> RequirementTable:
+        for key in ("axis", "direction"):
+            value = getattr(self, key)
+            if (self.metric == CONE) != (value is not None):
+                allowed = "a vector, for the exclusion-cone" if value is None else 'only with metric = "exclusion-cone"'
+                raise at_key(key, allowed, value)
+            if value is not None and not any(value):
+                raise at_key(key, "a vector that is not zero", list(value))
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_decided(self) -> RequirementTable:
+        if self.at_most is not None and self.at_least is not None:
+            raise at_key("at_least", "either at_most or at_least; a range is two requirements", self.at_least)
+        for key in ("share", "confidence"):
+            if getattr(self, key) == 1.0:
+                raise at_key(key, "below 1, for no number of runs shows that there is no exception", 1.0)
+        for key, methods in METHODS_OF.items():
+            if key in self.model_fields_set and self.method is not None and self.method not in methods:
+                named = " or ".join(f'"{method}"' for method in methods)
+                raise at_key(key, f"only with method = {named}", getattr(self, key))
+        if self.after is not None and self.window is not None:
+            raise at_key("window", "either after or window", self.window)
+        return self
+
+    @property
+    def called(self) -> str:
+        """Its id, by default the metric's name."""
+        return self.id or str(self.metric)
+
+
+def without_requirements(given: Any, method: Method) -> Any:
+    """A raw table, refused where it holds the requirements that [[requirement]] tables of a method are now."""
+    if isinstance(given, dict) and "requirement" in given:
+        raise told_at("requirement", "an old key", f'[[requirement]] tables with id, metric and method = "{method}"')
+    return cast(Any, given)
+
+
+def check_family(requirements: Sequence[RequirementTable]) -> None:
+    """Refuse requirements with equal ids, without regard to case, for columns have these names and SQL ignores it; parents
+    that are none of them; and those without a method that nothing decides."""
+    ids = [requirement.called.casefold() for requirement in requirements]
+    parents = {one.called: one.parent for one in requirements}
+    for number, one in enumerate(requirements, 1):
+        key = f"requirement[{number}]"
+        if ids[number - 1] in ids[: number - 1]:
+            raise at_key(f"{key}.id", "an id that no other requirement has, in any case", one.called)
+        line, above = {one.called}, one.parent
+        while above is not None:
+            if above not in parents or above in line:
+                raise at_key(f"{key}.parent", "the id of another requirement, which is not derived from it", one.parent)
+            line, above = line | {above}, parents[above]
+    for number, one in enumerate(requirements, 1):
+        if one.method is None and one.called not in parents.values():
+            raise at_key(f"requirement[{number}].method", "proof, flight, campaign, budget, margin or inspection", None)

@@ -1,0 +1,210 @@
+"""Verdicts on requirements by proofs, by the margins of the linear loop and by the pointing budget."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from starhold.analysis.margins import margins
+from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
+from starhold.certification.wording import enumerated, left_out, sentence
+from starhold.errors import InputError
+from starhold.scenario.building import build
+from starhold.scenario.checking import show
+from starhold.studies.body import study_of
+from starhold.studies.budget import TOGETHER, study
+from starhold.studies.linear import linear_of
+from starhold.studies.requirements import Requirement, at_most, read_requirements, tables_of
+from starhold.studies.verification import (
+    RequirementVerdict,
+    check_modes,
+    compared,
+    limits,
+    mode_names,
+    times_of,
+    undecided,
+)
+
+if TYPE_CHECKING:
+    from starhold.certification.certificate import Claim
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.scenario.requirement import RequirementTable
+    from starhold.studies.body import Issued
+
+Verdicts = dict[str, RequirementVerdict]
+POINTING = "pointing"
+BOUNDS: Mapping[str, tuple[str, str, str]] = {
+    "final_attitude_error": ("rad", POINTING, "angle"),
+    "peak_attitude_error": ("rad", POINTING, "angle"),
+    "final_rate_error": ("rad/s", POINTING, "rate"),
+    "peak_rate_error": ("rad/s", POINTING, "rate"),
+    "settling_time": ("s", POINTING, "settling"),
+    "peak_torque": ("N m", "torque-limit", "limit"),
+    "peak_wheel_momentum": ("N m s", "wheels", "wheel_momentum"),
+}
+"""The metrics that claims bound from above: unit, kind of the claim, and which of its numbers."""
+IDEAL = {
+    "continuous-torque": "the holding of the torque between control instants",
+    UNLIMITED: "the limit of the torque",
+    WHEELS: "the limits and the friction of the wheels",
+    FRICTIONLESS: "the friction of the wheels",
+    "settled-estimate": "the time until the estimate has settled",
+}
+"""What a claim leaves out beside parts, by its assumptions."""
+MARGINS = {
+    "gain_margin": "gain",
+    "lower_gain_margin": "less",
+    "phase_margin": "phase",
+    "delay_margin": "delay",
+    "crossover": "crossover",
+    "sensitivity": "sensitivity",
+}
+"""The metrics of the linear loop, each the worst of the three axes, with their names among the margins of one."""
+OF_MARGINS = dict(zip(MARGINS, ("1", "1", "rad", "s", "rad/s", "1"), strict=True))
+
+
+def refuse_other_bodies(scenario: Scenario) -> None:
+    """InputError where a requirement asks for a method that the scenario's body does not have."""
+    for method in ("proof", "budget", "margin"):
+        for key in tables_of(scenario, method) if scenario.body != "rigid-body" else ():
+            raise InputError(scenario.where, f"{key}.method", show(method), "flight, campaign or inspection, for this body")
+
+
+# --- by proof ---------------------------------------------------------------------------------------------------------
+
+
+def check_proofs(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]:
+    """The requirements that claims decide. InputError for a metric that none bounds from above, and for modes and times."""
+    tables = tables_of(scenario, "proof")
+    check_modes(scenario, entry, tables)
+    for key, table in tables.items():
+        # A proof is about all times, however long the flight is.
+        times_of(scenario, key, table)
+    return at_most(scenario, tables, {metric: unit for metric, (unit, _, _) in BOUNDS.items()})
+
+
+def by_proof(scenario: Scenario, entry: LawEntry) -> Verdicts:
+    """The verdicts that the claims about a law's loop give: met, or not decided, for what a claim does not bound may be
+    kept all the same."""
+    tables = tables_of(scenario, "proof")
+    if scenario.supposed is not None:
+        return {key: undecided(table, "the law takes the craft for another one") for key, table in tables.items()}
+    required = check_proofs(scenario, entry)
+    loop = build(scenario, entry)
+    issued = study_of(scenario.body).certify(scenario, entry, loop, pointing=True)
+    # What flies from later on has certificates of its own, which begin where this flight is not looked at.
+    begun = [one for one in issued if one.step == 0 and one.before is None]
+    changes = [f"what changes at {event.step * loop.period:g} s" for event in loop.events][:1]
+    return {
+        key: _proved(scenario, entry, key, table, one, begun, changes)
+        for (key, table), one in zip(tables.items(), required, strict=True)
+    }
+
+
+def _proved(
+    scenario: Scenario,
+    entry: LawEntry,
+    key: str,
+    table: RequirementTable,
+    required: Requirement,
+    issued: Sequence[Issued],
+    changes: Sequence[str],
+) -> RequirementVerdict:
+    """The verdict of the claim that leaves out the least and keeps the limit, else of the least bound, else why there is
+    none."""
+    _, kind, name = BOUNDS[required.metric]
+    modes, place = mode_names(entry), None
+    if modes and table.in_mode is None:
+        return undecided(table, f"claims are about each mode by itself: in_mode = {modes[0]}", **limits(table, required))
+    place = modes.index(str(table.in_mode)) + 1 if modes else None
+    why, verdicts = f"no claim {kind} is proved", list[RequirementVerdict]()
+    for one in (one for one in issued if one.mode == place):
+        claim = one.certificate.claim(kind)
+        if claim is None or claim.outcome != "proved":
+            continue
+        if not study_of(scenario.body).start_inside(one).get(kind):
+            where = "the mode does not begin with the flight, or outside of" if modes else "the flight begins outside of"
+            why = f"{where} the set of the claim: {sentence(claim, one.certificate.subject)}"
+            continue
+        why = _late(scenario, key, table, claim) if kind == POINTING else ""
+        if why:
+            continue
+        absent = [*([enumerated(left_out(claim))] if left_out(claim) else []), *changes]
+        absent += [text for assumed, text in IDEAL.items() if assumed in claim.assumptions]
+        number = claim.numbers.get(name)
+        most = max((x for x in number if x is not None), default=None) if isinstance(number, list) else number
+        evidence = f"proved: {sentence(claim, one.certificate.subject)}"
+        verdict = compared(table, required, most, evidence, left_out=tuple(absent))
+        verdicts.append(verdict if verdict.verdict == "met" else _open(table, required, verdict))
+    return min(verdicts, key=lambda one: (one.verdict != "met", len(one.left_out)), default=None) or undecided(
+        table, why, **limits(table, required)
+    )
+
+
+def _open(table: RequirementTable, required: Requirement, verdict: RequirementVerdict) -> RequirementVerdict:
+    """The verdict of a bound beyond the limit, which shows nothing of the number itself."""
+    return undecided(table, f"only so much is {verdict.evidence}", number=verdict.number, **limits(table, required))
+
+
+def _late(scenario: Scenario, key: str, table: RequirementTable, claim: Claim) -> str:
+    """Why a claim of where motions end does not speak of the time, or the tolerances, that a requirement is about; empty
+    where it does."""
+    settling, begin = claim.numbers["settling"], times_of(scenario, key, table).begin
+    tolerances = scenario.table.settling
+    if table.metric == "settling_time":
+        ends = claim.numbers["angle"] <= tolerances.attitude_tolerance and claim.numbers["rate"] <= tolerances.rate_tolerance
+        return "" if ends else "motions are not proved to end within the tolerances of [settling]"
+    if str(table.metric).startswith("final"):
+        if table.in_mode is not None:
+            return "no last quarter of a mode is known beforehand: a peak after some time is"
+        begin += 0.75 * (scenario.table.simulation.duration - begin)
+    return "" if settling <= begin else f"motions are proved to have ended after {settling:.6g} s, not by {begin:g} s"
+
+
+# --- by margins -------------------------------------------------------------------------------------------------------
+
+
+def check_margins(scenario: Scenario) -> tuple[Requirement, ...]:
+    """The requirements that the linear loop decides. InputError for a metric that it does not have."""
+    return read_requirements(tables_of(scenario, "margin"), OF_MARGINS, scenario.where)
+
+
+def by_margins(scenario: Scenario, entry: LawEntry) -> Verdicts:
+    """The verdicts that the margins of a law's linear loop give, of the worst axis each."""
+    tables, required = tables_of(scenario, "margin"), check_margins(scenario)
+    pairs = list(zip(tables.items(), required, strict=True))
+    try:
+        linear = linear_of(scenario, entry)
+    except InputError as error:
+        return {key: undecided(table, error.given, **limits(table, one)) for (key, table), one in pairs}
+    axes = margins(linear) if linear.is_stable else []
+    verdicts: Verdicts = {}
+    for (key, table), one in pairs:
+        values = [(getattr(axis, MARGINS[one.metric]), axis.axis) for axis in axes]
+        values = [pair for pair in values if not math.isnan(pair[0])]
+        number, axis = (max if one.at_most else min)(values, default=(None, ""))
+        evidence = f"the linear loop near rest, about {axis}" if values else "the linear loop is not stable"
+        verdicts[key] = compared(table, one, number, evidence, left_out=linear.left_out)
+    return verdicts
+
+
+# --- by budget --------------------------------------------------------------------------------------------------------
+
+
+def by_budget(scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None]) -> Verdicts:
+    """The verdicts that the pointing budget of a law gives: the level of all sources together."""
+    tables = tables_of(scenario, "budget")
+    units = {f"{table.metric}": "rad" for table in tables.values()}
+    pairs: Any = zip(tables.items(), at_most(scenario, tables, units), strict=True)
+    try:
+        budget = study(scenario, entry, notice)
+    except InputError as error:
+        return {key: undecided(table, f"no budget: {error.given}", **limits(table, one)) for (key, table), one in pairs}
+    settings = budget.settings
+    share = f"{100.0 * settings.confidence:.6g} % of errors from {settings.start:g} s on, {settings.runs} runs"
+    faults = ("faults, which never come in a budget",) if scenario.table.fault else ()
+    return {
+        key: compared(table, one, budget.level(TOGETHER, one.metric.upper()), f"budget: {share}", left_out=faults)
+        for (key, table), one in pairs
+    }

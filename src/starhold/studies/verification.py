@@ -1,0 +1,266 @@
+"""Whether requirements are met: verdicts with the number, its limit and what they rest on; those that one flight gives."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.laws.modes import Modes
+from starhold.scenario.building import build
+from starhold.scenario.checking import nearest, show
+from starhold.scenario.units import apart, to_number
+from starhold.studies.body import study_of
+from starhold.studies.modes import stretches
+from starhold.studies.requirements import LOST, Requirement, cones_of, read_requirements, tables_of
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.scenario.requirement import RequirementTable
+    from starhold.simulation.lane import Recording
+    from starhold.studies.flight import Flight
+
+Outcome: TypeAlias = Literal["met", "missed", "not decided"]
+WORST: tuple[Outcome, ...] = ("met", "not decided", "missed")
+"""Outcomes, the worst last."""
+DEARER, ELSEWHERE = ("proof", "campaign", "budget", "margin"), "not decided here: starhold verify"
+"""The methods for which one flight is not enough, and what is said of them where there is only that."""
+
+
+@dataclass(frozen=True)
+class RequirementVerdict:
+    """Whether a requirement is met. number, limit and margin are in `unit` (SI), None where there is none; a margin of 0 or
+    more keeps it. evidence: a sentence, without its end, on what the verdict rests on; left_out: what the loop has and the
+    evidence does not speak of, without which "met" must not be said."""
+
+    id: str
+    text: str
+    method: str
+    verdict: Outcome
+    evidence: str
+    number: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    at_most: bool = True
+    metric: str = ""
+    left_out: tuple[str, ...] = ()
+    parent: str = ""
+    rationale: str = ""
+    typed_unit: str = ""
+    scale: float = 1.0
+    """The unit that the limit is typed in, and the worth of a unit of SI in it."""
+
+    @property
+    def margin(self) -> float | None:
+        """How far the number is on the good side of the limit."""
+        if self.number is None or self.limit is None:
+            return None
+        return self.limit - self.number if self.at_most else self.number - self.limit
+
+    @property
+    def sentence(self) -> str:
+        """The verdict, with what it leaves out: a verdict without that would say more than is known."""
+        return f"{self.verdict}, leaving out {'; '.join(self.left_out)}" if self.left_out else self.verdict
+
+
+def undecided(table: RequirementTable, why: str, **known: Any) -> RequirementVerdict:
+    """The verdict that nothing decides a requirement, with the reason."""
+    return verdict_on(table, "not decided", why, **known)
+
+
+def limits(table: RequirementTable, required: Requirement) -> dict[str, Any]:
+    """The fields of a verdict that tell its limit, in its unit and in the one that is typed."""
+    fields: dict[str, Any] = {"limit": required.bound, "unit": required.unit, "at_most": required.at_most}
+    typed = table.at_most if required.at_most else table.at_least
+    if isinstance(typed, str) and required.bound:
+        number, unit = apart(typed)
+        fields |= {"typed_unit": unit, "scale": number / required.bound}
+    return fields
+
+
+def verdict_on(table: RequirementTable, verdict: Outcome, evidence: str, **known: Any) -> RequirementVerdict:
+    """The verdict on the requirement of a table; known: number, limit, unit and others of its fields."""
+    stated = {"metric": table.metric or "", "parent": table.parent or "", "rationale": table.rationale}
+    fields: dict[str, Any] = stated | known
+    return RequirementVerdict(table.called, table.text, table.method or "", verdict, evidence, **fields)
+
+
+def compared(
+    table: RequirementTable, required: Requirement, number: float | None, evidence: str, **known: Any
+) -> RequirementVerdict:
+    """The verdict of a number, which misses the limit where it is None or not a number."""
+    there = None if number is None or math.isnan(number) else float(number)
+    decided = verdict_on(table, "missed", evidence, number=there, **limits(table, required) | known)
+    return replace(decided, verdict="met") if decided.margin is not None and decided.margin >= 0.0 else decided
+
+
+def in_order(scenario: Scenario, decided: Mapping[str, RequirementVerdict]) -> tuple[RequirementVerdict, ...]:
+    """The verdicts in the order of the file: those decided, by what errors call the tables, and those without a method,
+    which are as the worst of those derived from them."""
+    tables = {f"requirement[{place}]": table for place, table in enumerate(scenario.table.requirement, 1)}
+    by_id = {tables[key].called: verdict for key, verdict in decided.items()}
+
+    def of(table: RequirementTable) -> RequirementVerdict:
+        if table.called not in by_id:
+            below = [of(one) for one in tables.values() if one.parent == table.called]
+            verdict = WORST[max(WORST.index(one.verdict) for one in below)]
+            named = ", ".join(f"{one.id} {one.verdict}" for one in below)
+            left = tuple(dict.fromkeys(what for one in below for what in one.left_out))
+            by_id[table.called] = verdict_on(table, verdict, f"derived from it: {named}", left_out=left)
+        return by_id[table.called]
+
+    return tuple(of(table) for table in tables.values())
+
+
+def verdicts_of_flight(scenario: Scenario, flight: Flight) -> tuple[RequirementVerdict, ...]:
+    """The verdicts on a scenario's requirements that a flight of one of its laws gives, and records of inspections: nothing
+    is flown or proved, and what needs other methods is left to `starhold verify`. InputError as `check_flight` has it."""
+    entry = scenario.pick(flight.name)
+    decided = by_flight(scenario, entry, flight.recording) | by_inspection(scenario)
+    others = {key: table for method in DEARER for key, table in tables_of(scenario, method).items()}
+    return in_order(scenario, decided | {key: undecided(table, ELSEWHERE) for key, table in others.items()})
+
+
+# --- by inspection ----------------------------------------------------------------------------------------------------
+
+
+def by_inspection(scenario: Scenario) -> dict[str, RequirementVerdict]:
+    """The verdicts of requirements that are inspected: met where the file of the record is there."""
+    return {key: _inspected(scenario, table) for key, table in tables_of(scenario, "inspection").items()}
+
+
+def _inspected(scenario: Scenario, table: RequirementTable) -> RequirementVerdict:
+    if table.record is None:
+        return undecided(table, "no record is named")
+    try:
+        with (scenario.folder / table.record).open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+    except (OSError, ValueError):
+        return undecided(table, f"its record {table.record} is not there")
+    return verdict_on(table, "met", f"as by record {table.record}, SHA-256 {digest}")
+
+
+# --- by one flight ----------------------------------------------------------------------------------------------------
+
+
+def check_flight(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]:
+    """The requirements that one flight of a law decides. InputError for a metric that the body's flights do not have, a
+    limit in another unit, a mode that the law does not have, and times that are not within the flight."""
+    tables, study = tables_of(scenario, "flight"), study_of(scenario.body)
+    check_modes(scenario, entry, tables)
+    loop = build(scenario, entry)
+    try:
+        meter = study.meter(scenario, loop, loop.gains, study.EXTRAS, cones_of(tables.values()))
+    except ValueError as error:
+        raise InputError(scenario.where, "requirement", "an exclusion-cone", str(error)) from None
+    for key, table in tables.items():
+        times_of(scenario, key, table, meter.steps * meter.instant)
+    return read_requirements(tables, meter.units, scenario.where)
+
+
+def mode_names(entry: LawEntry) -> list[str]:
+    """The names of a law's modes; none of a law without."""
+    module: Any = entry.law.module
+    return [mode.name for mode in module.modes] if isinstance(module, Modes) else []
+
+
+def check_modes(scenario: Scenario, entry: LawEntry, tables: Mapping[str, RequirementTable]) -> None:
+    """InputError where a requirement is about a mode that the law does not have."""
+    names = mode_names(entry)
+    for key, table in tables.items():
+        if table.in_mode is not None and table.in_mode not in names:
+            allowed = nearest(table.in_mode, names) if names else f"no mode, for the law {entry.name} has none"
+            raise InputError(scenario.where, f"{key}.in_mode", show(table.in_mode), allowed)
+
+
+class Times(NamedTuple):
+    """From when until when something is required (s), since the flight or the mode began."""
+
+    begin: float = 0.0
+    end: float = math.inf
+
+    def __str__(self) -> str:
+        if self == Times():
+            return ""
+        return f" from {self.begin:g} s on" if math.isinf(self.end) else f" from {self.begin:g} s to {self.end:g} s"
+
+
+def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: float = math.inf) -> Times:
+    """The times of a requirement. InputError where they are none, or not within a flight of such a duration (s)."""
+
+    def seconds(name: str, value: Any) -> float:
+        try:
+            time = to_number(value, "s") if isinstance(value, str) else float(value)
+        except (ValueError, TypeError) as error:
+            raise InputError(scenario.where, f"{key}.{name}", show(value), str(error)) from None
+        if not 0.0 <= time <= duration:
+            raise InputError(scenario.where, f"{key}.{name}", show(value), f"between 0 s and the flight's {duration:g} s")
+        return time
+
+    if table.after is not None:
+        return Times(seconds("after", table.after))
+    if table.window is None:
+        return Times()
+    if not isinstance(table.window, list | tuple) or len(table.window) != 2:
+        raise InputError(scenario.where, f"{key}.window", show(table.window), "two times")
+    times = Times(*(seconds("window", value) for value in table.window))
+    if times.begin >= times.end:
+        raise InputError(scenario.where, f"{key}.window", show(table.window), "two times, the later one last")
+    return times
+
+
+def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, RequirementVerdict]:
+    """The verdicts that a recorded flight of a law gives. InputError as `check_flight` has it."""
+    tables = tables_of(scenario, "flight")
+    if not tables:
+        return {}
+    study, cones = study_of(scenario.body), cones_of(tables.values())
+    measured: dict[Any, list[dict[str, Any]]] = {}
+    decided: dict[str, RequirementVerdict] = {}
+    modes = mode_names(entry)
+    for (key, table), required in zip(tables.items(), check_flight(scenario, entry), strict=True):
+        about = times_of(scenario, key, table), modes.index(table.in_mode) + 1 if table.in_mode else None
+        if about not in measured:
+            measured[about] = [study.measure_required(part, cones) for part in _parts(run, *about)]
+        flight = f"one flight of {entry.name}{f', in its mode {table.in_mode}' if table.in_mode else ''}{about[0]}"
+        decided[key] = _flown(table, required, measured[about], run.attrs.get("diverged_at"), flight)
+    return decided
+
+
+def _flown(
+    table: RequirementTable, required: Requirement, parts: Sequence[Mapping[str, Any]], lost: Any, flight: str
+) -> RequirementVerdict:
+    if required.metric == LOST:
+        verdict = "met" if lost is None else "missed"
+        return verdict_on(table, verdict, flight if lost is None else f"{flight}, which is lost")
+    if not parts and lost is None:
+        return undecided(table, f"{flight}: it has no such time", **limits(table, required))
+    values: list[Any] = [part.get(required.column) for part in parts]
+    if not values or None in values:
+        return compared(table, required, None, f"{flight}: {'it is lost' if lost is not None else 'there is no such value'}")
+    return compared(table, required, (max if required.at_most else min)(values), flight)
+
+
+def _parts(run: Recording, times: Times, mode: int | None) -> list[Recording]:
+    """The parts of a recording, of two samples at least, that lie within times since its start, or since a mode,
+    counted from 1, began."""
+    attrs, time = run.attrs, run["time"]
+    clock, period, every = attrs.get("time_unit_s", 1.0), attrs["control_period"], attrs["record_every"]
+    spans = [(0, None)]
+    if mode is not None:
+        spans = [(one.first, one.last) for one in stretches(run) if one.mode == mode]
+    parts: list[Recording] = []
+    for first, last in spans:
+        since = (time - first * period) * clock
+        inside = (since >= times.begin * (1.0 - 1e-12)) & (since <= times.end * (1.0 + 1e-12))
+        inside[: -(-first // every)] = False
+        inside[len(time) if last is None else -(-last // every) :] = False
+        if np.count_nonzero(inside) > 1:
+            sampled = {name: values[inside] if len(values) == len(time) else values for name, values in run.arrays.items()}
+            parts.append(replace(run, arrays=sampled))
+    return parts
