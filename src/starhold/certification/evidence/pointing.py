@@ -32,7 +32,7 @@ optimize: Any = import_module("scipy.optimize")
 Array = NDArray[np.float64]
 
 POINTS = "points"
-ANGLES = (175, 150, 120, 90, 60, 30, 10)
+ANGLES = (175, 150, 120, 90, 60, 45, 30, 20, 10)
 """From up to which turns (deg) motions are tried to be shown to come to the target."""
 LEAST = 1e-6
 """By how much (rad) a spring as stiff as the law gives to the least torque from outside that is told of."""
