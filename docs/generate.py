@@ -28,6 +28,7 @@ FILLED = (
     "law-authors.md",
     "not-claimed.md",
     "part-authors.md",
+    "requirements.md",
 )
 
 

@@ -10,7 +10,7 @@ from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\s*\\([(\[])(.*?)\\[)\]]\s*</\1>', re.DOTALL)
-ABOVE = {"ARCHITECTURE.md": "architecture.md", "CONTRIBUTING.md": "contributing.md"}
+ABOVE = {f"{name.upper()}.md": f"{name}.md" for name in ("architecture", "contributing", "support", "code_of_conduct")}
 """Files that lie beside `docs`, with what their pages are called."""
 
 

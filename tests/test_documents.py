@@ -23,7 +23,6 @@ from starhold.campaign.sequence import runs_to_meet
 from starhold.campaign.verdicts import runs_needed
 from starhold.certification.certificate import write
 from starhold.certification.certify import certify
-from starhold.certification.wording import HEADINGS, sentence
 from starhold.cli.main import app
 from starhold.conformance.suite import examine
 from starhold.laws.catalogue import catalogue, from_file
@@ -33,6 +32,7 @@ from starhold.scenario.distributions import DISTRIBUTIONS
 from starhold.scenario.reading import load
 from starhold.scenario.requirement import CONE
 from starhold.studies.requirements import LOST
+from tests.running import starhold
 
 ROOT = Path(__file__).parents[1]
 BODIES = "src/starhold/scenario/bodies"
@@ -59,7 +59,6 @@ def run(capsys):
 
 
 PRINTED = {
-    "README.md": "from 180 to ",
     "docs/python.md": "<Scenario cubesat: pd, lyapunov; 3000 control steps> [<Flight pd: settling",
     "docs/machines.md": "0.18257418583505536",
 }
@@ -70,6 +69,49 @@ PRINTED = {
 def test_python_of_a_page_runs(page, monkeypatch, run):
     monkeypatch.setattr("pandas.DataFrame.plot", lambda table, **how: None)
     assert PRINTED[page] in run(page)[0]
+
+
+def test_readme_is_a_first_screen(run):
+    """Ten lines to paste print what is quoted below them."""
+    assert len(read("README.md").splitlines()) <= 80
+    (pasted,), (quoted,) = blocks("README.md", "python"), blocks("README.md", "text")
+    assert len(list(filter(None, pasted.splitlines()))) == 10
+    assert run("README.md")[0] == quoted
+
+
+MEASURED = {
+    "starhold certify cubesat-nadir --law wheel": (
+        "within 0.3092° of the target after 1049 s at all times, in at least 99.73 % of orbits",
+        "from up to 45° at up to 0.2692°/s",
+        "of the loop's 13 parts 12 are in",
+    ),
+    "starhold verify cubesat-mission": ("0.027819 deg",),
+}
+"""What README says of the output of its commands."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", MEASURED)
+def test_numbers_of_the_readme_are_measured_by_its_commands(line, tmp_path):
+    assert f"`{line}`" in read("README.md")
+    printed = starhold(*line.split()[1:], cwd=tmp_path, code=0).stdout
+    for text in (read("README.md"), printed):
+        assert [number for number in MEASURED[line] if number not in " ".join(text.lower().split())] == []
+
+
+def test_version_is_said_alike():
+    assert f"version {sh.__version__}\n" in read("README.md")
+    assert f"\nversion: {sh.__version__}\n" in read("CITATION.cff")
+    assert re.search(r"^## (\S+?),? ", read("CHANGELOG.md"), flags=re.MULTILINE)[1] == sh.__version__
+
+
+def test_paper_is_as_its_journal_asks():
+    """At most a thousand words below its head, under the headings that are asked for."""
+    _, _, body = read("paper/paper.md").split("---\n", 2)
+    assert len(body.split()) <= 1000
+    asked = {"Summary", "Statement of need", "State of the field", "Software design", "Research impact statement"}
+    assert asked | {"AI usage disclosure", "References"} == {*re.findall(r"^# (.+)$", body, flags=re.MULTILINE)}
+    assert {*re.findall(r"@(\w+)", body)} == {*re.findall(r"^@\w+\{(\w+),", read("paper/paper.bib"), flags=re.MULTILINE)}
 
 
 @pytest.fixture
@@ -124,9 +166,12 @@ NAMED = {
         f"and {COUNTED[len(catalogue('libration-point'))]} that hold a craft",
         {10_000: "ten thousand flights each"}[FLIGHTS],
     ],
-    "docs/comparison.md: ratios of the paper": lambda: re.findall(
-        r"\d+ to \d+ times", " ".join(read("paper/paper.md").split())
-    ),
+    **{
+        f"docs/comparison.md: ratios of {page}": lambda page=page: re.findall(
+            r"\d+ to \d+ times", " ".join(read(page).split())
+        )
+        for page in ("paper/paper.md", "README.md")
+    },
 }
 """What a page must name, by the page."""
 
@@ -152,20 +197,22 @@ def test_files_stay_short():
 
 
 def commands():
-    """What README lists, as printed, without what follows the sign of a comment."""
-    listed = re.search(r"puts it on the path:\n\n```\n(.*?)```", read("README.md"), flags=re.DOTALL)
+    """What the overview lists, as printed, without what follows the sign of a comment."""
+    listed = re.search(r"run as printed:\n\n```\n(.*?)```", read("docs/index.md"), flags=re.DOTALL)
     assert listed is not None
     return [line.split(" # ")[0].strip() for line in listed[1].splitlines()]
 
 
-def test_commands_of_the_readme_are_commands():
+def test_commands_of_the_readme_and_of_the_overview_are_commands():
     """All but those that lists or schemas come from, and an old name; a slow test runs them."""
     assert len(commands()) >= 15
+    assert {"new", "compare"} == known_commands(re.findall(r"^(starhold .*?) *#", read("README.md"), flags=re.MULTILINE))
+    assert {"certify", "verify"} == known_commands(MEASURED)
     assert {*typer.main.get_command(app).commands} - known_commands(commands()) <= {"schema", "wheels", "check-law"}
 
 
 @pytest.mark.slow
-def test_commands_of_the_readme_run_from_top_to_bottom(tmp_path):
+def test_commands_of_the_overview_run_from_top_to_bottom(tmp_path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for line in commands():
@@ -174,15 +221,6 @@ def test_commands_of_the_readme_run_from_top_to_bottom(tmp_path):
         # The template's laws are not all decided, which `certify` says by its exit code.
         assert done.returncode == (4 if line.startswith("starhold certify") else 0), (line, done.stderr)
         assert "Traceback" not in done.stderr, line
-
-
-def test_readme_quotes_the_certificate():
-    text = " ".join(read("README.md").split())
-    scenario = load("three-laws")
-    certificate = certify(build(scenario, scenario.pick("lyapunov")), "lyapunov")
-    assert [claim.kind for claim in certificate.claims] == ["convergence", "torque-limit", "inertia", "sampling"]
-    for claim in certificate.claims:
-        assert f"{claim.outcome} {HEADINGS[claim.kind]} {sentence(claim, certificate.subject)}" in text
 
 
 def pages():

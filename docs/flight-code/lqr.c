@@ -1,4 +1,4 @@
-/* lqr.c: made by starhold 0.1.0; see lqr.h. Do not edit: change the scenario and export it again. */
+/* lqr.c: made by starhold 0.3.0; see lqr.h. Do not edit: change the scenario and export it again. */
 
 #include "lqr.h"
 

@@ -3,7 +3,7 @@
    u = -K_rate w - K_attitude q (+ w x Jw), optimal for the linearised motion; gains from formulas by
    `form`
 
-   Made by starhold 0.1.0 from the scenario three-laws, law lqr.
+   Made by starhold 0.3.0 from the scenario three-laws, law lqr.
    Source: published study of inertial stabilisation by closed-form linear-quadratic laws
    Assumes: rigid body; inertia known; no external torque; torque not limited; K_attitude^-1 J > 0,
    K_attitude^-1 K_rate > 0; w.K_attitude^-1(w x Jw) = 0 for all w, or the gyroscopic torque cancelled.
@@ -16,7 +16,7 @@
 
    Program of the law: sha256 851ab1c92f50234498ca20e7141e8ad0edc5898615f514d663a47b1df0e15661
 
-   Certificate: certificate.json, sha256 2967db7a6a7872c2e2620f51a62331a10a1ca74b0615d325563ee36d5f68b30c:
+   Certificate: certificate.json, sha256 559cdee7d92d8fe70868160c964065cac89c1f3bb38bfae4b74eacbf2ad32516:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -1,4 +1,4 @@
-/* lyapunov.c: made by starhold 0.1.0; see lyapunov.h. Do not edit: change the scenario and export it
+/* lyapunov.c: made by starhold 0.3.0; see lyapunov.h. Do not edit: change the scenario and export it
    again. */
 
 #include "lyapunov.h"

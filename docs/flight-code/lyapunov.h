@@ -2,7 +2,7 @@
 
    u = -k_rate w - k_attitude q + w x Jw - M_ext: V is non-increasing whatever the modelled torque
 
-   Made by starhold 0.1.0 from the scenario three-laws, law lyapunov.
+   Made by starhold 0.3.0 from the scenario three-laws, law lyapunov.
    Source: published comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (9)
    Assumes: rigid body; inertia known; external torque known; torque not limited.
 
@@ -14,7 +14,7 @@
 
    Program of the law: sha256 d5137098524b4413b6d496ad62634b43647fe728da0c5962b960f411facfefe2
 
-   Certificate: certificate.json, sha256 c8fdf60d9108da389f8e6d9cf218455f51a5839c4a6e033604d0ec8bd6b8d132:
+   Certificate: certificate.json, sha256 15e7149fcf02c675178ea20d94cf7a71e2cf2cc99950e5c5f8d9aeead4a46c7e:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -1,4 +1,4 @@
-/* modal.c: made by starhold 0.1.0; see modal.h. Do not edit: change the scenario and export it again. */
+/* modal.c: made by starhold 0.3.0; see modal.h. Do not edit: change the scenario and export it again. */
 
 #include "modal.h"
 

@@ -2,7 +2,7 @@
 
    u = -M - K x, x = (q0 - 1, q, w): K gives the linear motion around x the spectra phi_0, phi_1 and b |w|2
 
-   Made by starhold 0.1.0 from the scenario landing, law fit.
+   Made by starhold 0.3.0 from the scenario landing, law fit.
    Source: published work on modal control of a spacecraft's angular motion on quaternions, by multi-level
    decomposition
    Assumes: rigid body; inertia known; external torque known; torque not limited.
@@ -15,7 +15,7 @@
 
    Program of the law: sha256 99130acbe6b13c7bcd3c5cbc219c37d087ae6db2517dfd9e6fe729d84998d648
 
-   Certificate: certificate.json, sha256 91fb7f76857faaedd434e8dec533f9ac8397739b260866b428e97526b3ffa902:
+   Certificate: certificate.json, sha256 f6a0e055e7f42ac34a377ae14cc881285b0d08be2a3a1fafd9aa8bb7b9325459:
    proved
    Claims:
      proved: region of attraction: from the level set of V that holds rest at every attitude told by the

@@ -1,4 +1,4 @@
-/* mpc.c: made by starhold 0.1.0; see mpc.h. Do not edit: change the scenario and export it again. */
+/* mpc.c: made by starhold 0.3.0; see mpc.h. Do not edit: change the scenario and export it again. */
 
 #include "mpc.h"
 

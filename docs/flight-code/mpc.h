@@ -2,7 +2,7 @@
 
    minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised anew, inside the torque limit
 
-   Made by starhold 0.1.0 from the scenario three-laws, law mpc.
+   Made by starhold 0.3.0 from the scenario three-laws, law mpc.
    Source: published comparison of Lyapunov, sliding-mode and predictive attitude control
    Assumes: rigid body; inertia known; no external torque but the gravity gradient; small attitude error,
    or a horizon short against the turn.
@@ -19,7 +19,7 @@
    wheels.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 a196f23941c63a5acfb57fa56ccc05470536e266050723eeaba63fa41ba23416:
+   Certificate: certificate.json, sha256 17bc635dc0b5b6050eba4f9671b10b6c1a1aeeeda5200bb0ec29047e09956620:
    undecided
    Claims:
    Check it independently: starhold check certificate.json */

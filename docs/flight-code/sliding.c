@@ -1,4 +1,4 @@
-/* sliding.c: made by starhold 0.1.0; see sliding.h. Do not edit: change the scenario and export it again. */
+/* sliding.c: made by starhold 0.3.0; see sliding.h. Do not edit: change the scenario and export it again. */
 
 #include "sliding.h"
 

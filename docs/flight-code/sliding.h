@@ -2,7 +2,7 @@
 
    reaches the surface w + K q = 0 against any torque below `switching_gain`, then slides to the target
 
-   Made by starhold 0.1.0 from the scenario three-laws, law sliding.
+   Made by starhold 0.3.0 from the scenario three-laws, law sliding.
    Source: Smooth sliding-mode control for spacecraft attitude tracking maneuvers (1995)
    Source: published comparison of Lyapunov, sliding-mode and predictive attitude control, eq. (18)
    Assumes: rigid body; inertia known; |M_ext| < switching_gain on every axis; torque not limited; q0 > 0
@@ -20,7 +20,7 @@
    0.1 s.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 4dcf83f9b4500d73daaf69cb34659a77c80e4ca9d4a4bbaef236925864f3a52e:
+   Certificate: certificate.json, sha256 eb9c7f669777bff36ad24cf15c3a955e3c0096b985224e9f38686a076ed5f710:
    undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches

@@ -1,4 +1,4 @@
-/* wheel.c: made by starhold 0.1.0; see wheel.h. Do not edit: change the scenario and export it again. */
+/* wheel.c: made by starhold 0.3.0; see wheel.h. Do not edit: change the scenario and export it again. */
 
 #include "wheel.h"
 

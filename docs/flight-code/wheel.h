@@ -2,7 +2,7 @@
 
    u = -k_rate w - S + w_abs x (J w_abs + H) + J w_target' - M_ext, S = 4 k q0 q from direction cosines
 
-   Made by starhold 0.1.0 from the scenario wheels-orbital, law wheel.
+   Made by starhold 0.3.0 from the scenario wheels-orbital, law wheel.
    Source: published study of reaction-wheel attitude control with a given degree of stability
    Assumes: rigid body; inertia and wheel momentum known; external torque known; torque not limited.
 
@@ -14,7 +14,7 @@
 
    Program of the law: sha256 4f874e55fa16eec8b64cc78923eef683c9775f1cdd52baf71d83b3a67f9942c4
 
-   Certificate: certificate.json, sha256 e68c2eb0b8885a5b15776ed789c934e1935bab43c4fe248045012e4227964c08:
+   Certificate: certificate.json, sha256 4b04b39c809c9eaafdf3391aa69d34fed8d67edebf048a1144cb20a66134d757:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the

@@ -108,7 +108,9 @@ def _members(cls: Any) -> list[list[str]]:
             continue
         function = item if inspect.isfunction(item) else item.fget if isinstance(item, property) else item.func
         shown = f"`.{name}({signature(item)})`" if inspect.isfunction(item) else f"`.{name}`"
-        kind = str(function.__annotations__.get("return", "")).replace("xr.", "")
+        # As it is written: evaluated types tell of what stands behind their names.
+        returns = ast.parse(dedent(inspect.getsource(function))).body[0].returns  # type: ignore[attr-defined]
+        kind = "" if returns is None else ast.unparse(returns).replace("xr.", "")
         rows.append([shown, f"`{kind}`" if kind else "", _plain(told(function))])
     return rows
 

@@ -15,14 +15,18 @@ from typing import Any
 import typer
 
 from generators.kernel import files_table
-from generators.laws import POINT, laws_table
+from generators.laws import POINT
 from generators.sets import sets_table
 from generators.tables import fields_table, first_sentence, signature, table
 from starhold.algebra import quaternion, scalar, several, structured
 from starhold.algebra import vector as vectors
 from starhold.analysis import libration_point, rigid_body
+from starhold.analysis.pointing import MEANINGS
 from starhold.analysis.ranking import Measure
+from starhold.analysis.rigid_body import make_meter
+from starhold.certification.openness import READ
 from starhold.cli.main import app
+from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Card, Gain, Measurement, Start
 from starhold.laws.point import PointMeasurement
 from starhold.parts import roles
@@ -32,6 +36,11 @@ from starhold.parts.contract import Card as PartCard
 from starhold.parts.contract import Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.random import Dice
+from starhold.publications.paper import PAPERS
+from starhold.scenario.reading import builtin_names
+from starhold.scenario.requirement import CONE
+from starhold.studies.deciding import BOUNDS, MARGINS
+from starhold.studies.requirements import LOST
 
 
 def roles_text() -> str:
@@ -115,6 +124,44 @@ def limits_table() -> str:
     return table(["role", "part", "assumes or leaves out"], rows)
 
 
+def claims_table() -> str:
+    """The parts that claims take in, and those that every claim leaves out, by what the certifier looks at."""
+    rows: list[list[str]] = []
+    for role in PACKAGES:
+        if role in ("body", "law"):
+            continue
+        found: dict[str, list[str]] = {"every claim": [], "pointing": [], "none": []}
+        for name, part in parts(role).items():
+            tells = any(part.hook(hook) is not None for hook in ("bound", "error", "noise", "recursion"))
+            by = "every claim" if name in READ.get(role, ()) else "pointing" if tells else "none"
+            found[by].append(f"`{name}`")
+        rows.append([role, *(", ".join(names) for names in found.values())])
+    return table(["role", "taken in by its equations", 'by its bounds, of "pointing as it flies" alone', "left out"], rows)
+
+
+def required_table() -> str:
+    """The metrics that requirements may bound, by the method that decides them."""
+    flown = make_meter(1, 1.0, "axis", (1.0, 1.0), rigid_body.EXTRAS, wheels=True).units
+    shown = {
+        "flight, campaign": [*flown, LOST, CONE],
+        "proof": BOUNDS,
+        "budget": [index.lower() for index in MEANINGS],
+        "margin": MARGINS,
+    }
+    return table(["method", "metrics"], [[by, ", ".join(f"`{name}`" for name in names)] for by, names in shown.items()])
+
+
+def counts_text() -> str:
+    """How many laws, parts, scenarios, commands and publications there are, with their pages."""
+    others = sum(len(parts(role)) for role in PACKAGES if role != "law")
+    known = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    return (
+        f"{len(catalogue())} [laws](docs/laws.md) of attitude and {len(catalogue(POINT))} of station keeping, "
+        f"{others} other [parts](docs/parts.md), {len(builtin_names())} scenarios,\n"
+        f"{len(known)} [commands](docs/commands.md), and {len(PAPERS)} [publications](docs/publications.md) made again."
+    )
+
+
 def metrics_table(measures: Mapping[str, Measure]) -> str:
     """The metrics that a comparison shows, by their headings and by their names in files."""
     rows = [[m.heading, f"`{name}`", m.unit or "1", m.meaning] for name, m in measures.items()]
@@ -129,8 +176,9 @@ def commands_table() -> str:
 
 
 TABLES = {
-    "laws": lambda: laws_table("rigid-body", "docs/laws/"),
-    "laws of station keeping": lambda: laws_table(POINT, "docs/laws/"),
+    "claims": claims_table,
+    "counts": counts_text,
+    "requirement metrics": required_table,
     "metrics": lambda: metrics_table(rigid_body.MEASURES),
     "metrics of station keeping": lambda: metrics_table(libration_point.MEASURES),
     "commands": commands_table,

@@ -15,7 +15,6 @@ from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import _numbers as numbers_apart
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.noise import find_radii
 from starhold.certification.openness import envelope_of, named, pushes
 from starhold.certification.proofs import checked
 from starhold.certification.subject import described, make_subject
@@ -24,7 +23,7 @@ from starhold.parts.catalogue import find
 from starhold.parts.part import Fitted
 from starhold.scenario.building import build
 from tests.certification.loops import certified
-from tests.kernel.certificates import flying
+from tests.kernel.certificates import flying, radii_of
 
 SENSORS = {"sensor gyro", "sensor star-tracker", "estimator mekf"}
 
@@ -87,7 +86,7 @@ def test_a_bias_that_the_estimator_takes_out_is_no_error():
 
 def noise_claim(loop):
     found = Loop(make_subject(loop))
-    numbers, _ = find_radii(found, "points")
+    numbers, _ = radii_of(found)
     return found.claim("points", found.words, None, **numbers)
 
 

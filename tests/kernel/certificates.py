@@ -8,11 +8,13 @@ from functools import cache
 import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
-from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations
+from starhold.certification.evidence.finding import NotFoundError, certificate, evidence, obligations, read
 from starhold.certification.evidence.noise import find_radii
-from starhold.certification.evidence.pointing import POINTS, Pushed
+from starhold.certification.evidence.pointing import Pushed
+from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.openness import Pushes
 from starhold.certification.subject import make_subject
+from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build
 
@@ -63,6 +65,13 @@ NOISY = {
 """The parts that noise comes with."""
 
 
+def radii_of(loop):
+    """The numbers that a claim tells of noise, and the evidence for them."""
+    words = [word for word in loop.words if word != OUTSIDE] + sign_words(loop.loop)
+    wired = read(loop.claim("points", words, None), loop.by_digest)
+    return find_radii(loop, AttitudeLoop(wired))
+
+
 @cache
 def flying(name):
     """What was found about a loop with a held torque, errors and torques from outside."""
@@ -72,7 +81,7 @@ def flying(name):
     given = sh.scenario({"spacecraft": {"inertia": inertia}, "part": NOISY.get(name, [])} | kept)
     loop = Loop(make_subject(build(given, given.laws[0])))
     outside, error, *start = told
-    assert Pushed(loop, Pushes(outside, command=error), find_radii(loop, POINTS)).find(*start), loop.failed
+    assert Pushed(loop, Pushes(outside, command=error), noisy=True).find(*start), loop.failed
     return loop
 
 

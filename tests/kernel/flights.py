@@ -55,6 +55,31 @@ class Surroundings(NamedTuple):
     momentum: float | None
     turned: float
     rated: float
+    noise: "Noise | None" = None
+
+
+class Noise:
+    """Errors of the attitude and the rate that a law is told, which noise drives, at one sample after the other, once they
+    have settled: by the matrices of a sample without a new measurement and with one."""
+
+    def __init__(self, carried, corrected, every, lanes, rng, begun=2500):
+        self.steps, self.rng, self.k = [corrected, *[carried] * (every - 1)], rng, 0
+        self.x = np.zeros((len(carried) - 6, lanes))
+        for _ in range(begun):
+            self.told()
+
+    def told(self):
+        self.k += 1
+        step, (size, lanes) = self.steps[self.k % len(self.steps)], self.x.shape
+        y = step @ np.concatenate([self.x, self.rng.normal(size=(step.shape[1] - size, lanes))])
+        self.x = y[:size]
+        return y[size : size + 3], y[size + 3 :]
+
+
+def turned_on(q, angles):
+    """Attitudes turned on by vectors of angles in the body's axes."""
+    size = np.linalg.norm(angles, axis=0)
+    return times(q, np.concatenate([[np.cos(size / 2)], np.sinc(size / 2 / np.pi) / 2 * angles]))
 
 
 class Around:
@@ -76,10 +101,12 @@ class Around:
 
     def command(self, law, q, w, t, unit):
         """What the law asks for, with what it is told."""
-        half = self.bounds.turned / 2
-        wrong = times(q, np.concatenate([[np.full(w.shape[1], np.cos(half))], np.sin(half) * unit]))
+        wrong, fast = turned_on(q, self.bounds.turned * unit), -self.bounds.rated * unit
+        if self.bounds.noise:
+            angles, rated = self.bounds.noise.told()
+            wrong, fast = turned_on(wrong, angles), fast + rated
         (r, _), (off, a) = self.target(q, t), self.target(wrong, t)
-        rate = w + r - off - self.bounds.rated * unit
+        rate = w + r - off + fast
         stored = self.kept - self.J @ (w + r)
         total = stored + self.J @ (rate + off) if self.bounds.momentum is not None else self.kept
         return law(wrong, rate, -self.told * np.sign(unit), off, a, total)

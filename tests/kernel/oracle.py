@@ -5,9 +5,10 @@ import math
 from fractions import Fraction
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import least_squares
 
-from tests.kernel.flights import Fleet, Surroundings, cross, turn
+from tests.kernel.flights import Fleet, Noise, Surroundings, cross, turn
 
 STEP = 1e-6
 PLAIN = {
@@ -193,18 +194,20 @@ class Oracle:
     def state(self, q, w, V0, level):
         if self.lyapunov(q, w) <= V0:
             return False
-        before, kept = None, not {"outside torque", "moving target"} & set(self.words)
+        torques, size = [], 0.0
         for _ in range(3):
             *others, H = self.environment()
             u, T, h = self.law(q, w, *others, H)
-            # With nothing from outside a momentum that does not work is constant in the target's axes.
-            T = T + kept * np.cross(w, H)
-            if before is not None and not np.allclose(T, before, rtol=1e-6, atol=1e-9 * (np.abs(u).max() + np.abs(T).max())):
-                return False
-            before = T
+            torques.append((T, T + np.cross(w, H)))
+            size = max(size, np.abs(u).max() + np.abs(T).max())
             if not self.limits(u, h):
                 return False
-        slope, rate = self.slope(q, w, before)
+        # With nothing from outside a momentum that does no work is constant in the target's axes, if no law undoes that.
+        ways = list(zip(*torques, strict=True))[: 1 if {"outside torque", "moving target"} & set(self.words) else 2]
+        alike = [own[0] for own in ways if np.allclose(own, own[0], rtol=1e-6, atol=1e-9 * size)]
+        if not alike:
+            return False
+        slope, rate = self.slope(q, w, alike[0])
         # Differences are rounded.
         return slope <= 1e-7 * (abs(self.lyapunov(q, w)) + abs(V0)) * rate / STEP * 1e-2
 
@@ -299,8 +302,7 @@ class Oracle:
         n, zero = self.numbers, np.zeros(3)
         V0, level = self.lyapunov(np.eye(4)[0], zero), n["level"]
         if "share" in n:
-            most = self.largest_errors(500, int(min(n["samples"], 2500)))
-            radii = np.array([[n["noise.attitude"]], [n["noise.rate"]]])
+            most, radii = self.largest_errors(500, int(min(n["samples"], 2500))), self.radii()
             if (most > radii).any(axis=0).mean() > n["share"] + 4 * math.sqrt(n["share"] / 500):
                 return False
 
@@ -313,7 +315,8 @@ class Oracle:
         fleet.around = Surroundings(
             [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
             n.get("momentum") if "wheels" in self.words else None,
-            *(n.get(f"error.{told}", 0.0) + n.get(f"noise.{told}", 0.0) for told in ("attitude", "rate")),
+            *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
+            self.noise(2 * tries, self.rng) if "share" in n else None,
         )  # fmt: skip
         states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
         states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]
@@ -336,17 +339,35 @@ class Oracle:
         names += [name for name in zero if name.startswith("noise")]
         return np.array([run(program, zero | {name: 1.0} if name in zero else zero) for name in names]).T
 
+    def noise(self, lanes, rng):
+        """Errors that noise drives in many lanes."""
+        every, corrected = int(self.numbers["every"]), self.errors("errors corrected")
+        carried = self.errors("errors carried") if every > 1 else corrected
+        return Noise(carried, corrected, every, lanes, rng)
+
+    def radii(self):
+        """Which errors of attitude and rate, and which rates and turns that they cause, are told to be rare."""
+        n = self.numbers
+        return np.array([n["noise.attitude"], n["noise.rate"], *map(number, self.claim["evidence"]["swayed"])])[:, None]
+
+    def held(self):
+        """The motion of (w, q) near rest over a period, and by how much torques that are held drive it."""
+        (C, K), zero = self.linear(), np.zeros((3, 3))
+        N = np.linalg.inv(self.J)
+        drift = np.block([[zero, zero, N], [np.eye(3) / 2, zero, zero], [np.zeros((3, 9))]])
+        Phi = expm(drift * self.numbers["period"])[:6]
+        return Phi[:, :6] - Phi[:, 6:] @ np.hstack([C, K]), Phi[:, 6:], C, K
+
     def largest_errors(self, lanes, samples, begun=2500):
-        """The largest errors of attitude and rate in spans of so many samples, once the errors have settled."""
-        every, most = int(self.numbers["every"]), np.zeros((2, lanes))
-        corrected = self.errors("errors corrected")
-        carried, size = self.errors("errors carried") if every > 1 else corrected, len(corrected) - 6
-        x, rng = np.zeros((size, lanes)), np.random.default_rng(2)
+        """The largest errors of attitude and rate in spans of so many samples, once they have settled, and the largest rates
+        and turns that they cause in the linear motion."""
+        noise, (A, B, C, K) = self.noise(lanes, np.random.default_rng(2)), self.held()
+        x, most = np.zeros((6, lanes)), np.zeros((4, lanes))
         for k in range(-begun, samples):
-            step = carried if (k + 1) % every else corrected
-            y = step @ np.concatenate([x, rng.normal(size=(step.shape[1] - size, lanes))])
-            x, told = y[:size], np.linalg.norm(y[size:].reshape(2, 3, lanes), axis=1)
-            most = np.maximum(most, told) if k >= 0 else most
+            told, rate = noise.told()
+            sizes = [np.linalg.norm(part, axis=0) for part in (told, rate, x[:3], x[3:])]
+            x = A @ x - B @ (C @ rate + K @ told / 2)
+            most = np.maximum(most, sizes) if k >= 0 else most
         return most
 
     def border(self, V0, rest):

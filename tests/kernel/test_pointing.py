@@ -13,10 +13,11 @@ from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Chain
 from starhold.kernel.check import check
-from starhold.kernel.held import STATE, Held, Region, least_form
+from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, root, up
 from starhold.kernel.polynomials import Poly, most, total
+from starhold.kernel.regions import AT_REST, STATE, Region, least_form
 from starhold.kernel.theorems.pointing import periods
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
 from tests.kernel.flights import Fleet, along, feedback, moved, turn
@@ -90,14 +91,16 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     sizes = np.array([float(region.sizes[name]) for name in STATE])
     assert (np.abs(x).max(axis=1) <= sizes).all()
     assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
-    Q, H, _, rest = held.fall(region)
-    Q, H, felt, (A, pushes) = floats(Q), floats(H), floats(held.felt), held.linear(region)
+    Q, H, F, pushed, rest = held.fall(region)
+    Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(region, AT_REST)
+    # What F has beside the push is of its growth in a period.
+    grown, A = float(pushed / (tube.held + tube.pushed)), held.near.A
     V = oracle.lyapunov(q, w)
     assert ((x * (H @ x)).sum(0) * (1 + 1e-9) >= V).all()
-    for unit in (fleet.push(0, q, w), fleet.directions(), along(felt @ x)):
+    for unit in (fleet.push(0, q, w), fleet.directions(), along(F[:3] @ x)):
         later, rate = after_a_period(fleet, q, w, unit, 1.2 * slope)
-        grown = 3 * push + 1.25 * slope * np.linalg.norm(w, axis=0)
-        most = fleet.h * (grown * np.linalg.norm(felt @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
+        size = 3 * push + 1.25 * slope * np.linalg.norm(w, axis=0)
+        most = fleet.h * (grown * size * np.linalg.norm(F @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
         assert (oracle.lyapunov(later, rate) - V <= most).all()
         y = np.concatenate([rate, later[1:]])
         assert (np.abs(y) <= np.array([[float(tube.sizes[name])] for name in STATE])).all()
@@ -186,7 +189,7 @@ def wide_entry(numbers, told):
     held = held_loop("calm")
     chain = Chain(held, "", 0.0)
     told["levels"] = [told["levels"][0] | {"end": str(Fraction(numbers["level"]) / 2)}]
-    numbers["end.angle"], numbers["end.rate"] = chain.tighten(held.region(Fraction(told["levels"][0]["end"])))
+    numbers["end.angle"], numbers["end.rate"] = chain.tighten(held.region(Fraction(told["levels"][0]["end"])), AT_REST)
     told["ellipsoids"] = [one | {"reach": "1000001/1000000"} for one in chain.ellipsoids]
     numbers["settling"] = 15.0
 

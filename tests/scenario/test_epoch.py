@@ -296,7 +296,7 @@ def test_schemas_and_the_studio_know_the_one_place():
 def _epochs_told(scenario):
     """The rows of the page's settings that hold an epoch, each with its table."""
     page = settings(scenario)
-    return re.findall(r"<h3>([^<]*)</h3>(?:(?!</section>).)*<td>epoch</td><td>([^<]*)</td>", page)
+    return re.findall(r"<h3>([^<]*)</h3>(?:(?!</section>).)*<td>epoch</td><td>([^<]*)</td>", page, re.DOTALL)
 
 
 def test_the_page_tells_the_epoch_once_and_where_it_is_the_default():

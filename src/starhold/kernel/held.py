@@ -8,54 +8,50 @@ Docs/kernel.md, 10.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from math import prod
+from itertools import product
+from typing import NamedTuple
 
 from .loops import AXES, NONE, AttitudeLoop, slopes
-from .numbers import (
-    RefusedError,
-    Rows,
-    beside,
-    definite,
-    demand,
-    inverse,
-    norm,
-    plus,
-    reach,
-    root,
-    scalar,
-    times,
-    transpose,
-    up,
-)  # fmt: skip
+from .numbers import Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, dot, minus, most, poly, var, variables
+from .regions import (
+    ANGLE,
+    RATE,
+    SPEED,
+    STATE,
+    TURN,
+    Radii,
+    Region,
+    Sizes,
+    felt,
+    first,
+    growing,
+    least_form,
+    lengths,
+    named,
+    settled,
+    stretch,
+    with_momentum,
+)  # fmt: skip
 
-STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
-RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
-Sizes = dict[str, Fraction]
-
-
-@dataclass(frozen=True)
-class Region:
-    """A set of states at samples: x.X^-1 x <= 1 for x = (w, q1, q2, q3), q0 >= least, and |x_i| at most the sizes."""
-
-    X: Rows
-    sizes: Sizes
-    least: Fraction
-
-    def within(self, X: Rows) -> Region:
-        """Return the part that lies in an ellipsoid too."""
-        sizes = {name: min(self.sizes[name], root(X[i][i])) for i, name in enumerate(STATE)}
-        return Region(X, self.sizes | sizes, self.least)
+WEIGHT = Fraction(8)
+HALF_ROOT = Fraction(7072, 10000)
+"""At least the root of 1/2."""
+AROUND = [
+    *([c * HALF_ROOT for c in signs] for signs in product((-1, 1), repeat=3)),
+    *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
+]
+"""The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
 @dataclass(frozen=True)
 class Tube:
     """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
     drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
-    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time."""
+    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time.
+    Of what is held, `uneven` has not what errors that noise drives add linearly."""
 
     sizes: Sizes
     drift: list[Fraction]
@@ -63,11 +59,22 @@ class Tube:
     held: Fraction
     pushed: Fraction
     stale: Fraction
+    uneven: Fraction
 
     @property
     def push(self) -> Fraction:
         """Return the bound of all together, in the mean."""
         return self.held + self.pushed + self.stale
+
+
+class Near(NamedTuple):
+    """A loop near its target: the law's torque and the acceleration as matrices on (w, q), and A and B such that samples are
+    followed by Ax + Bu, with a torque u that is held beside the law's."""
+
+    torque: Rows
+    rates: Rows
+    A: Rows
+    B: Rows
 
 
 class Held:
@@ -78,10 +85,10 @@ class Held:
         self.loop, self.h = loop, numbers["period"]
         self.constant = {name: numbers[name] for name in ("outside", "error")}
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
-        self.turned, self.rated = (
-            sum((numbers.get(f"{kind}.{name}") or Fraction(0) for kind in ("error", "noise")), Fraction(0))
-            for name in ("attitude", "rate")
+        self.noise, errors = (
+            [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")
         )
+        self.turned, self.rated = (x + y for x, y in zip(self.noise, errors, strict=True))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
         names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}
@@ -101,6 +108,7 @@ class Held:
         left = [p + q for p, q in zip(minus(asked, self.more), minus(self.beside, turning), strict=True)]
         # What does not, by the first that it has of what comes from outside.
         self.rigid = {x: [first(p, x) for p in left] for x in ("e", "a", "h", "r")}
+        self.near = near_target(loop, self.h)
         self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
@@ -111,7 +119,24 @@ class Held:
         for _ in range(3):
             self.rates.append(loop.slopes_along(self.rates[-1], acceleration))
         mean = self.rates[0] + self.h / 2 * self.rates[1] + self.h * self.h / 6 * self.rates[2]
-        self.mean = mean.at({f"u{k + 1}": p for k, p in enumerate(self.pull)})
+        held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
+        self.mean = mean.at(held)
+        # What the law's torque has beside that near its target.
+        on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
+        self.unlike = [p.at(on) for p in minus(loop.u, linear)]
+        # What wheels' momentum makes of the rates, beside what the law's torque does about it.
+        self.turning = [with_momentum(p - g) for p, g in zip(self.more, self.gyroscopic, strict=True)]
+        # The acceleration at samples, what V' has of the rates, and that linearly.
+        rates = apply(self.near.rates, x)
+        self.odd = [p.at(on) for p in minus(self.pull, rates)]
+        self.speeding = [(p - g - own).at(on) for p, g, own in zip(self.pull, self.bend, rates, strict=True)]
+        parts = zip(self.u, self.more, linear, self.gyroscopic, self.turning, strict=True)
+        self.left = [(p + more - own - g - turning).at(on) for p, more, own, g, turning in parts]
+        steep = [self.rates[0].slope(name).at(held).at(on) for name in STATE[RATE]]
+        self.curvature = {name: [self.rates[0].slope(name).slope(other) for other in ("q0", *STATE)] for name in STATE[RATE]}
+        at = dict.fromkeys((*STATE, "v", *self.others), 0)
+        self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in steep]
+        self.steep = minus(steep, apply(self.steepness, x))
         self.s = -V.terms.get(("q0",), Fraction(0))
         self.G = [[V.slope(i).slope(k).at(dict.fromkeys(STATE, 0)).number / 2 for k in STATE] for i in STATE]
         demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
@@ -137,23 +162,29 @@ class Held:
         turn = root(1 - least * least) if least > 0 else Fraction(1)
         X = [[c * x for x in row] for row in inverse(self.under)]
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
-        sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in STATE[TURN]}
+        sizes |= lengths(X)
+        sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)}
         return Region(X, sizes | self.others, least)
 
-    def misread(self, region: Region) -> Fraction:
-        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told."""
+    def misread(self, region: Region) -> tuple[Fraction, Fraction]:
+        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
+        far from there and what errors that noise drives add linearly on target."""
         if not self.turned + self.rated:
-            return Fraction(0)
+            return Fraction(0), Fraction(0)
         e, r, a, _ = (self.size(letter) for letter in "erah")
         J = [[poly(x).number for x in row] for row in self.loop.J]
         wrong = {"q": self.turned / 2, "w": self.rated + self.turned * r, "r": self.turned * r, "a": self.turned * a}
         wrong |= {"h": stretch(J) * self.rated, "e": 2 * e}
-        sizes = {name: x + wrong[name[0]] for name, x in region.sizes.items()}
-        columns = {letter: [name for name in sizes if name[0] == letter] for letter in wrong}
-        slopes = {
-            k: [[most(p.slope(name), sizes) for name in own] for p in self.loop.u] for k, own in columns.items() if own
-        }
-        return sum((stretch(rows) * wrong[letter] for letter, rows in slopes.items()), Fraction(0))
+        sizes = {name: x + wrong[name[-1] if name in (SPEED, ANGLE) else name[0]] for name, x in region.sizes.items()}
+        full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
+        all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
+        # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
+        away, (turned, rated) = sizes[ANGLE], self.noise
+        near = sizes | {"v": away * away}
+        linear = {"q": turned / 2, "w": rated}
+        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
+        less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
+        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
 
     def size(self, letter: str) -> Fraction:
         """Return a bound of the norm of a vector from outside."""
@@ -162,55 +193,78 @@ class Held:
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds of the torque from outside and of the error of the command at rates, to which the target's adds."""
-        turning = norm(sizes[name] for name in STATE[RATE]) + self.size("r")
-        outside, error = (x + self.per_rate[name] * turning for name, x in self.constant.items())
+        outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside, "both": outside + error}
 
     def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
         """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
         nothing on, what is told at once."""
         e, r, a, H = (self.size(letter) for letter in "erah")
-        w, outside = norm(sizes[name] for name in STATE[RATE]), self.pushed(sizes)["outside"]
+        w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
         change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
         return sum((felt(parts, letter, sizes) * x for letter, x in change.items()), Fraction(0))
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
-        sizes, held = region.sizes, {f"u{k + 1}": most(p, region.sizes) for k, p in enumerate(self.pull)}
-        steady = self.misread(region)
-        steady += sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
+        sizes = region.sizes
+        near = sizes | {"v": 1 - region.least}
+        # In an ellipsoid c.x is no more than the root of c.Xc.
+        even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
+        odd = [most(p, near) for p in self.odd]
+        held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
+        steady, uneven = self.misread(region)
+        rigid = sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
+        steady, uneven = steady + rigid, uneven + rigid
         widths = [norm(row) for row in self.N]
 
+        def within(wide: list[Fraction]) -> Sizes:
+            drift = norm(x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True))
+            return sizes | named(STATE[RATE], wide) | {SPEED: sizes[SPEED] + drift}
+
         def reached(wide: list[Fraction]) -> list[Fraction]:
-            within = sizes | named(STATE[RATE], wide)
-            push = steady + self.pushed(within)["both"] + self.stale(within, self.beside)
+            own = within(wide)
+            push = steady + self.pushed(own)["both"] + self.stale(own, self.beside)
             columns = zip(STATE[RATE], held.values(), widths, self.bend, strict=True)
-            return [sizes[x] + self.h * (u + push * n + most(g, within)) for x, u, n, g in columns]
+            return [sizes[x] + self.h * (u + push * n + most(g, own)) for x, u, n, g in columns]
 
         wide = settled(reached, [sizes[name] for name in STATE[RATE]])
-        turned = self.h / 2 * norm(wide)
-        far = {name: min(sizes[name] + turned, Fraction(1)) for name in STATE[TURN]}
+        far = within(wide)
+        turned = self.h / 2 * far[SPEED]
+        far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | held
         drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
-        within = sizes | {"q0": Fraction(1)} | named(STATE[RATE], wide) | far | held
-        return Tube(within, drift, turned, steady, self.pushed(within)["both"], self.stale(within, self.beside))
+        return Tube(far, drift, turned, steady, self.pushed(far)["both"], self.stale(far, self.beside), uneven)
 
-    def fall(self, region: Region) -> tuple[Rows, Rows, Fraction, Fraction]:
-        """Return Q, H, p and r such that V changes in a period by h (p |felt x| + r - x.Qx) at most, and V <= x.Hx."""
-        h, tube = self.h, self.tube(region)
+    def fall(self, region: Region) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
+        """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
+        h, tube, L = self.h, self.tube(region), self.rates[0]
+        near = region.sizes | {"v": 1 - region.least}
         bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
-        pushed = [tube.push * norm(row) for row in self.N]
+        push = tube.held + tube.pushed
+        demand(push > 0, "nothing pushes")
         # How far pushes take the rates from where they go without.
+        pushed = [tube.push * norm(row) for row in self.N]
         away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(bent, d), strict=True)])
-        slope = {name: most(self.rates[0].slope(name), tube.sizes) for name in ("q0", *STATE)}
-        rest, push = h**3 / 24 * most(self.rates[3], tube.sizes), tube.held + tube.pushed
+        slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
+        moved = [*tube.drift, *[tube.turned] * 3]
         # What changes of momentum do to V, which is less than what their torques do to the body.
-        rest += self.stale(tube.sizes, [self.worked])
-        rest += push / 2 * norm(reach(self.felt, [*tube.drift, *[tube.turned] * 3]))
-        rest += reach([[slope[name] for name in STATE[RATE]]], away)[0] / 2
+        rest = h**3 / 24 * most(self.rates[3], tube.sizes) + self.stale(tube.sizes, [self.worked])
+        # What pushes do to V grows with what the state does in the period: linearly, and what is left.
+        drift = self.astray(region, tube)
+        turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
+        rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
+        # So does what V' has of the rates, which pushes change.
+        for name, d, p in zip(STATE[RATE], away, self.steep, strict=True):
+            curved = [most(p, tube.sizes) for p in self.curvature[name]]
+            rest += d / 2 * (most(p, near) + reach([curved], [tube.turned, *moved])[0])
         rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
+        onward = self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0))
+        growing = [[h / 2 * y for y in row] for row in times(self.felt, onward)]
+        growing += [[norm(away) / (2 * push) * y for y in row] for row in self.steepness]
+        # |a| + |b| + |c| <= sqrt(1 + 2/w) |(a, wb, wc)| with w = sqrt(WEIGHT).
+        F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        return least_form(-self.mean, region), over, push, rest
+        return least_form(-self.mean, region), over, F, push * root(1 + 2 / WEIGHT), rest
 
     def swing(self, region: Region) -> Fraction:
         """Return a bound of |V'| between samples."""
@@ -220,90 +274,61 @@ class Held:
             reach(self.felt, [sizes[name] for name in STATE])
         )
 
-    def linear(self, region: Region) -> tuple[Rows, list[tuple[Rows, Fraction]]]:
-        """Return A and pairs B, b such that samples in the region are followed by x+ = Ax + the sum of B v, |v| <= b, of
-        what is not linear and what comes from outside."""
-        h, N, tube, u = self.h, self.N, self.tube(region), self.u
-        rest = self.loop.on_target | self.loop.still
-        linear = beside(*(slopes(u, letter, rest) for letter in "wq"))
-        A = over_period([[-x for x in row] for row in times(N, linear)], h)
-        wide, turn = (norm(tube.sizes[name] for name in STATE[part]) for part in (RATE, TURN))
+    def astray(self, region: Region, tube: Tube) -> list[Fraction]:
+        """Return how far the rates are in a period from where the acceleration that is linear in the sample takes them."""
+        sizes = region.sizes | {"v": 1 - region.least}
+        left = [most(p, sizes) for p in self.speeding]
+        bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
+        columns = zip(left, reach(bent, tube.drift), self.N, strict=True)
+        return [self.h * (a + b + tube.push * norm(n)) for a, b, n in columns]
+
+    def corners(self) -> list[Rows]:
+        """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
+        if not self.loop.wheels:
+            return [self.near.A]
+        h, (A, B), found = self.h, self.near[2:], list[Rows]()
+        # A torque that grows from nothing on.
+        grown = [[h * h / 2 * x for x in row] for row in self.N] + [[h**3 / 12 * x for x in row] for row in self.N]
+        for corner in AROUND:
+            at = {f"h{k + 1}": x * self.size("h") for k, x in enumerate(corner)}
+            asked, turning = (
+                [[c * p.slope(name).at(at).number for name in STATE[RATE]] for p in parts]
+                for c, parts in ((1, self.turning), (-1, [with_momentum(p) for p in self.gyroscopic]))
+            )
+            more = plus(times(B, beside(asked, scalar(0))), times(grown, times(turning, self.near.rates)))
+            found.append(plus(A, more))
+        return found
+
+    def linear(self, region: Region, swayed: Radii) -> list[tuple[Rows, Fraction]]:
+        """Return pairs B, b such that samples in the region, less what noise adds linearly, at most `swayed`, are
+        followed by x+ = Ax + the sum of B v, |v| <= b, with A between those of `corners`."""
+        h, N, tube = self.h, self.N, self.tube(region)
+        wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
-        x, near = [var(name) for name in STATE], region.sizes | {"v": turn * turn}
-        parts = zip(u, self.more, apply(linear, x), self.gyroscopic, strict=True)
-        unlike = [p + more - own - g for p, more, own, g in parts]
-        bent = [[most(g.slope(name), tube.sizes) for name in STATE[RATE]] for g in self.gyroscopic]
-        odd = norm(most(p.at({"q0": 1 - var("v")}), near) for p in unlike)
+        near = region.sizes | {"v": turn * turn}
+        odd = norm(most(p, near) for p in self.left)
+        odd += felt(self.turning, "w", near) * swayed[0]
         # Rates drift from nothing on, too.
-        mean = tube.pushed + tube.stale + odd + stretch(bent) * norm(tube.drift) / 2
+        mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * norm(self.astray(region, tube)) / 2
         uneven = 2 * mean - tube.pushed - odd
-        return A, [
-            ([[h * a for a in row] for row in N] + [[h * h / 4 * a for a in row] for row in N], tube.held + mean),
+        return [
+            (self.near.B, tube.uneven + mean),
             (scalar(0) + N, h * h / 8 * uneven),
             (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))),
         ]
 
 
+def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
+    """Return the linear loop with its torque held for h, where nothing comes from outside."""
+    at = loop.on_target | loop.still | {f"{letter}{k + 1}": 0 for letter in "erah" for k in AXES}
+    torque = beside(*(slopes(loop.u, letter, at) for letter in "wq"))
+    N = [[poly(p).number for p in row] for row in loop.J_inverse]
+    rates = times(N, torque)
+    A = over_period([[-x for x in row] for row in rates], h)
+    return Near(torque, rates, A, [[h * x for x in row] for row in N] + [[h * h / 4 * x for x in row] for row in N])
+
+
 def over_period(held: Rows, h: Fraction) -> Rows:
     """Return the linear motion of (w, q) over a period in which the acceleration -held (w, q) does not change."""
     return plus(beside(scalar(1), scalar(0)), held, -h) + plus(beside(scalar(h / 2), scalar(1)), held, -h * h / 4)
-
-
-def least_form(p: Poly, region: Region) -> Rows:
-    """Return the matrix of a form that p is not below: two factors of x are taken out of every monomial, what is left lies
-    in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
-    sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
-    middle, radius = scalar(0, 6), scalar(0, 6)
-    for m, c in p.terms.items():
-        own, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
-        demand(set(own[-2:]) <= set(place) and len(own) > 1, "the torque is not zero at rest on target")
-        # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
-        *left, i, k = own
-        high = c * prod(sizes[name] for name in left)
-        even = all(left.count(name) % 2 == 0 for name in left) and (power == 0 or region.least >= 0)
-        low = -high if not even else Fraction(0) if left else high * region.least**power
-        ends = up(-min(low, high)), up(max(low, high))
-        for a, b in ((place[i], place[k]), (place[k], place[i])):
-            middle[a][b] += (ends[1] - ends[0]) / 4
-            radius[a][b] += (ends[1] + ends[0]) / 4
-    for i, row in enumerate(radius):
-        middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
-    return middle
-
-
-def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
-    """Return how much parts change at most with a vector, in norms."""
-    return stretch([[most(p.slope(f"{letter}{k + 1}"), sizes) for k in AXES] for p in parts])
-
-
-def first(p: Poly, letter: str) -> Poly:
-    """Return the terms of which the first variable but q0 has this letter."""
-    return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
-
-
-def growing(parts: list[Poly]) -> list[Poly]:
-    """Return what of polynomials vanishes with the state."""
-    return [Poly({m: c for m, c in p.terms.items() if set(m) & set(STATE)}) for p in parts]
-
-
-def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
-    """Return values by names."""
-    return dict(zip(names, values, strict=True))
-
-
-def stretch(rows: Rows) -> Fraction:
-    """Return a bound of how much longer a matrix makes a vector, of the sums of its rows and of its columns."""
-    across, down = (max(sum(map(abs, row), Fraction(0)) for row in own) for own in (rows, transpose(rows)))
-    return root(across * down)
-
-
-def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:
-    """Return bounds that a monotone change leaves bounds: what begins within them at no time leaves them."""
-    found = begun or [Fraction(0)] * 3
-    for _ in range(ITERATIONS):
-        further = change(found)
-        if all(x <= y for x, y in zip(further, found, strict=True)):
-            return found
-        found = [up(x + x / 2**20) for x in further]
-    raise RefusedError("the period is too long for the rates")

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from starhold.certification.wording import coverage, listed, statement, strongest, unclaimed
+from starhold.certification.wording import coverage, statement, strongest, unclaimed
 from starhold.report.campaign_units import plain_measure
 from starhold.report.commands import Cell, Column, Table
 from starhold.report.commands.verify import amount
@@ -67,14 +67,18 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
         limit = f"{'≤' if first.at_most else '≥'} {limit}" if limit else ""
         subject = "the motion is not lost" if first.metric == LOST else measure.heading
         cells = [Markup(f"{pill(one.verdict)} {escape(amount(one, one.number) or '')}") for one in same]
-        how = dict.fromkeys(
-            f"{one.evidence}{f'; leaving out {listed(one.left_out)}' if one.left_out else ''}" for one in same
-        )
+        how = dict.fromkeys(_evidence(one, flights[number].name) for number, one in zip(judged, same, strict=True))
         name = Markup(f'<small class="id">{escape(first.id)}</small> {escape(first.text or subject)}')
         rows.append([name, *cells, limit, "; ".join(how)])
     laws = [Column(flights[number].name if len(flights) > 1 else "verdict") for number in judged]
     table = Table([Column("requirement"), *laws, Column("limit"), Column("how it is known")], rows)
     return table_html(table, "told tight verdicts"), counts
+
+
+def _evidence(verdict: RequirementVerdict, law: str) -> str:
+    """Tell how a verdict is known, without the law's name, so that what is the same of several laws is told once."""
+    known = verdict.evidence.replace(f" of {law}", "")
+    return f"{known}; leaving out {', '.join(verdict.left_out)}" if verdict.left_out else known
 
 
 def _counted(given: Sequence[RequirementVerdict]) -> str:

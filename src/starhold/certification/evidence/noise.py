@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.finding import floats, read
+from starhold.certification.evidence.finding import floats
 from starhold.certification.openness import driven_errors, measures_noisy_field, samples_of
-from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, TOLD, linear
+from starhold.kernel.held import near_target
+from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.regions import RATE, TURN
+from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, driven, linear
 from starhold.parts.contract import DEVIATIONS
 
 linalg: Any = import_module("scipy.linalg")
@@ -27,41 +30,51 @@ WIDER, LEAST, MORE = 1e-6, 1e-30, 1.0 + 1e-9
 numbers are rounded."""
 
 
-def find_radii(loop: Loop, theorem: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
+SHARES = (0.05, 0.05, 0.05, 0.85)
+"""Of the times at which errors leave their radii, how many may be of the attitude and the rate that are told, and of the
+rate and the turn that they cause."""
+
+
+def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Find the numbers that a claim tells of noise, and the evidence for them; None without noise, or where it drives errors
-    without end."""
-    driven = driven_errors(loop.loop)
-    if driven is None:
+    or the loop without end."""
+    noise = driven_errors(loop.loop)
+    if noise is None:
         return None
-    claim, every = read(loop.claim(theorem, [], None), loop.by_digest), driven.recursion.every
-    carried, corrected = (tuple(map(floats, linear(claim, role))) for role in (CARRIED, CORRECTED))
+    near, every = near_target(wired, Fraction(loop.loop.period)), noise.recursion.every
+    carried, corrected = (tuple(map(floats, driven(near, *linear(wired.claim, role)))) for role in (CARRIED, CORRECTED))
     steps = [carried] * (every - 1) + [corrected]
-    size = 3 * driven.recursion.size
-    (whole, spread), shapes, widths = period(steps, size, 0.0 * np.eye(size)), list[Array](), [0.0, 0.0]
+    size = len(carried[0][0])
+    (whole, spread), shapes, widths = period(steps, size, 0.0 * np.eye(size)), list[Array](), [0.0] * 4
     if float(np.abs(np.linalg.eigvals(whole)).max()) >= 1.0 - 1e-9:
         return None
     more = np.diag(WIDER * np.diag(linalg.solve_discrete_lyapunov(whole, spread)) + LEAST)
     shape = linalg.solve_discrete_lyapunov(*period(steps, size, more))
     for A, B in steps:
         full = A @ shape @ A.T + B @ B.T
-        told = [full[k : k + 3, k : k + 3] for k in (size, size + 3)]
+        told = [full[k, k] for k in (slice(size, size + 3), slice(size + 3, size + 6), RATE, TURN)]
         widths = [max(width, float(np.linalg.eigvalsh(own)[-1])) for width, own in zip(widths, told, strict=True)]
         shape = full[:size, :size] + more
         shapes.append((shape + shape.T) / 2.0)
     deviations = [(width + LEAST) ** 0.5 * MORE for width in widths]
     samples = samples_of(loop.loop)
 
-    def missed(k: float) -> float:
+    def radius(width: float, share: float) -> float:
         # Less, for what noise of the magnetic field takes.
-        return log(2.0 * samples * 0.8 * (k + 1.0 / k)) - k * k / 2.0 - log(float(RARELY) * (1.0 - 1e-5))
+        rarely = log(float(RARELY) * (1.0 - 1e-5) * share / samples)
 
-    k = float(optimize.brentq(missed, 1.0, 12.0)) * MORE
-    numbers = {SHARE: RARELY, "samples": samples, "every": every}
-    numbers |= {f"noise.{name}": k * width for name, width in zip(TOLD, deviations, strict=True)}
+        def missed(k: float) -> float:
+            return log(0.8 * (k + 1.0 / k)) - k * k / 2.0 - rarely
+
+        return width * float(optimize.brentq(missed, 1.0, 12.0)) * MORE
+
+    radii = [radius(width, share) for width, share in zip(deviations, SHARES, strict=True)]
+    numbers = {SHARE: RARELY, "samples": samples, "every": every, "noise.attitude": radii[0], "noise.rate": radii[1]}
     numbers |= {BESIDE: DEVIATIONS} if measures_noisy_field(loop.loop) else {}
     evidence = {
         "covariances": [[[str(Fraction(x)) for x in row] for row in own.tolist()] for own in shapes],
         "deviations": [str(Fraction(x)) for x in deviations],
+        "swayed": [str(Fraction(x)) for x in radii[2:]],
     }
     return numbers, evidence
 

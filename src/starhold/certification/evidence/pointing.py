@@ -19,9 +19,10 @@ from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.openness import Pushes, driven_errors, pushes
 from starhold.certification.subject import above
-from starhold.kernel.held import RATE, STATE, TURN, Held, Region
-from starhold.kernel.loops import OUTSIDE, AttitudeLoop, slopes
+from starhold.kernel.held import Held, near_target
+from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
+from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Region, widened
 from starhold.kernel.theorems.pointing import image, periods, points
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
@@ -31,13 +32,19 @@ optimize: Any = import_module("scipy.optimize")
 Array = NDArray[np.float64]
 
 POINTS = "points"
-ANGLES = (175, 150, 120, 90, 60, 30, 10)
+ANGLES = (175, 150, 120, 90, 60, 45, 30, 20, 10)
 """From up to which turns (deg) motions are tried to be shown to come to the target."""
 LEAST = 1e-6
 """By how much (rad) a spring as stiff as the law gives to the least torque from outside that is told of."""
+HEED = 0.5
+"""How much the rates of an ellipsoid count beside its turns, until that makes no more of them smaller."""
+NEARLY = 1e-3
+"""By which share the linear motion is multiplied first, for what wheels' momentum makes of it."""
+NEARER = 0.25
+"""Of the largest turn that a set holds motions end within so much, or nothing is said of where."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
-MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 8.0, 20, 6, 2000
+MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 8.0, 20, 24, 2000
 """What is given away where numbers are rounded; by how much the last level is above its limit, and ellipsoids are larger
 than the least, for motions come into them after a finite time; by how much a level may be below the one before; how many
 levels and ellipsoids there are at most; at how many states of a set the torque is looked at."""
@@ -93,13 +100,13 @@ class Chain:
         held = self.held
         try:
             region = held.region(c)
-            exact, above, push, rest = held.fall(region)
+            exact, above, felt, push, rest = held.fall(region)
         except RefusedError:
             return None
-        Q, H, felt = floats(exact), floats(above), floats(held.felt)
+        Q, H, F = floats(exact), floats(above), floats(felt)
         if float(np.linalg.eigvalsh(Q)[0]) <= 0.0:
             return None
-        R = felt.T @ felt
+        R = F.T @ F
         largest = 1.0 / float(linalg.eigh(R, Q, eigvals_only=True)[-1])
 
         def floor(share: float) -> tuple[float, float, float]:
@@ -114,22 +121,28 @@ class Chain:
         t, b = Fraction(tau), Fraction(beta)
         return t, b, (push * push / (4 * t) + rest) / b
 
-    def tighten(self, region: Region) -> tuple[float, float]:
-        """Find the ellipsoids, and return the angle (rad) and the rate (rad/s) where motions end."""
-        angle, fastest = self.ends(region)
+    def tighten(self, region: Region, swayed: Radii) -> tuple[float, float]:
+        """Find the ellipsoids, and return the angle (rad) and the rate (rad/s) where motions end. swayed: what noise
+        adds."""
+        angle, fastest = self.ends(region, region.X)
+        heed = HEED
         for _ in range(ELLIPSOIDS):
-            A, pushes = self.held.linear(region)
-            found = smallest(floats(A), [floats(B) * float(b) for B, b in pushes])
+            pushes, corners = self.held.linear(region, swayed), self.held.corners()
+            own = [floats(B) * float(b) for B, b in pushes]
+            found = smallest(floats(self.held.near.A), np.array(list(map(floats, corners))), own, heed)
             if found is None:
                 break
             shape, shares = found
             X, a = [[Fraction(x) for x in row] for row in shape.tolist()], [Fraction(x) for x in shares]
-            rate = highest_ratio(image(X, a, A, pushes), X)
-            reach = highest_ratio(region.X, X)
-            inner = region.within(X)
-            end = self.ends(inner)
-            if rate >= 1.0 or end[0] > angle * 0.998:
-                break
+            rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
+            reach = highest_ratio(widened(region.X, swayed), X)
+            inner = region.within(X, swayed)
+            end = self.ends(inner, X, swayed)
+            if rate >= 1.0 or end[0] > angle * 0.99:
+                if not heed:
+                    break
+                heed = 0.0
+                continue
             self.ellipsoids.append(
                 {
                     "shape": [[str(x) for x in row] for row in X],
@@ -165,11 +178,15 @@ class Chain:
         size = np.linalg.norm(u, axis=0) if "limit.norm" in limits else np.abs(u).max(axis=0)
         return bool(size[inside].max(initial=0.0) > most)
 
-    def ends(self, region: Region) -> tuple[float, float]:
-        """Return the angle (rad) and the rate (rad/s) that motions of a region do not exceed, between samples either."""
-        X, drift = floats(region.X), float(norm(self.held.tube(region).drift))
-        fastest = (sqrt(float(np.linalg.eigvalsh(X[RATE, RATE])[-1])) + drift / 2.0) * MORE
-        sine = (sqrt(float(np.linalg.eigvalsh(X[TURN, TURN])[-1])) + float(self.held.h) / 4.0 * fastest) * MORE
+    def ends(self, region: Region, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
+        """Return the angle (rad) and the rate (rad/s) that motions of a region do not exceed, between samples either, which
+        at samples are no further than `swayed` from an ellipsoid."""
+        shape, drift = floats(X), float(norm(self.held.tube(region).drift))
+        wide, turned = (
+            sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
+        )
+        fastest = (wide + drift / 2.0) * MORE
+        sine = (turned + float(self.held.h) / 4.0 * fastest) * MORE
         half = sine
         for _ in range(60):
             half = sine + half**3 / 6.0
@@ -188,7 +205,7 @@ def find_pointed(loop: Loop) -> bool:
         own = pushes(loop.loop, loop.known.envelope(noisy))
         against = own._replace(outside=own.outside + float(loop.known.disturbance))
         try:
-            pushed = Pushed(loop, against, find_radii(loop, POINTS) if noisy else None)
+            pushed = Pushed(loop, against, noisy)
             if any(pushed.find(*one) for one in tried):
                 return True
         except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
@@ -200,20 +217,23 @@ def find_pointed(loop: Loop) -> bool:
 class Pushed:
     """A loop against torques that no law is told, and errors. RefusedError for a law that the theorem does not take."""
 
-    def __init__(self, loop: Loop, against: Pushes, noise: tuple[dict[str, Any], dict[str, Any]] | None = None) -> None:
+    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
         if OUTSIDE in loop.words and loop.is_told("measurement.external_torque"):
             words.append(OUTSIDE)
         else:
             outside = above(exact(outside) + loop.known.modelled_norm)
         self.loop, self.words = loop, words + sign_words(loop.loop)
-        self.stiffness = feedback(loop, self.words)
+        wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None), loop.by_digest))
+        self.stiffness = feedback(wired)
         demand(self.stiffness > 0.0, "the law does not turn the body to its target")
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, for their momentum has no limit")
         self.told: dict[str, Any] = {"period": loop.loop.period}
         self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
-        more, self.evidence = noise or ({}, {})
+        more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
+        wide, turned = self.evidence.get("swayed", ("0", "0"))
+        self.swayed = Fraction(wide), Fraction(turned)
         self.told |= loop.bounds(words) | more
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
@@ -261,11 +281,11 @@ class Pushed:
             loop.failed[POINTS] = "V does not fall on the set from which motions start"
             return False
         held, start = chain.held, Fraction(chain.level)
-        angle, fastest = chain.tighten(held.region(Fraction(chain.levels[-1]["end"])))
+        angle, fastest = chain.tighten(held.region(Fraction(chain.levels[-1]["end"])), self.swayed)
         told["level"] = chain.level
         told["highest"] = float(start + held.h / 2 * held.swing(held.region(start))) * MORE
         told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
-        if not isfinite(angle):
+        if not isfinite(angle) or angle > NEARER * told.get("angle", told.get("start.angle", 0.0)):
             loop.failed[POINTS] = "motions do not come near the target"
             return False
         claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids)
@@ -285,35 +305,45 @@ def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
     return True
 
 
-def feedback(loop: Loop, words: list[str]) -> float:
+def feedback(loop: AttitudeLoop) -> float:
     """Return the stiffness of the law near rest, a third of its trace."""
-    own = AttitudeLoop(read(loop.claim(POINTS, words, None), loop.by_digest))
-    at = own.on_target | own.still | {f"{letter}{k}": 0 for letter in "erah" for k in (1, 2, 3)}
-    return -float(sum(row[k] for k, row in enumerate(slopes(own.u, "q", at)))) / 3.0
+    return -float(sum(row[3 + k] for k, row in enumerate(near_target(loop, Fraction(0)).torque))) / 3.0
 
 
-def smallest(A: Array, pushes: list[Array]) -> tuple[Array, list[float]] | None:
-    """Return the matrix of the ellipsoid that pushes of size 1 do not leave and that turns least, and its shares."""
+def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tuple[Array, list[float]] | None:
+    """Return the matrix of the ellipsoid that pushes of size 1 do not leave, about the one that turns least, and its shares.
+    heed: how much rates count beside turns, in powers."""
     radius = float(np.abs(np.linalg.eigvals(A)).max())
     if radius >= 1.0:
         return None
 
     def shape(x: Array) -> tuple[float, Array, Array]:
-        shares = np.exp(x) / (1.0 + np.exp(x).sum()) * (1.0 - radius**2)
+        shares, more = np.exp(x[:-1]) / (1.0 + np.exp(x[:-1]).sum()) * (1.0 - radius**2), np.exp(x[-1])
         fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(A))
         fed += 1e-14 * np.diag(np.diag(fed))
-        X = linalg.solve_discrete_lyapunov(A / sqrt(1.0 - shares.sum()), fed)
-        return float(np.linalg.eigvalsh(X[TURN, TURN])[-1]), X, shares
+        kept = 1.0 - shares.sum()
+        if radius**2 * (1.0 + more) >= kept:
+            return inf, A, shares
+        found: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
+        own = (found + found.T) / 2.0
+        # So much larger that no corner leaves it.
+        room = own - corners @ own @ corners.transpose(0, 2, 1) / kept
+        if np.linalg.eigvalsh(room).min() <= 0.0:
+            return inf, A, shares
+        own = own * max(float(linalg.eigh(fed, one, eigvals_only=True)[-1]) for one in room)
+        wide, turned = (float(np.log(np.linalg.eigvalsh(own[k, k])[-1])) for k in (RATE, TURN))
+        return turned + heed * wide, own, shares
 
-    weight = np.log([np.linalg.norm(B, 2) / np.linalg.norm(pushes[0], 2) + 1e-12 for B in pushes])
+    def size(x: Array) -> float:
+        return shape(x)[0]
 
-    def turn(x: Array) -> float:
-        return float(np.log(shape(x)[0]))
-
+    sizes = [float(np.linalg.norm(B, 2)) for B in pushes]
+    weight = np.log(np.array([x / sizes[0] + 1e-12 for x in sizes] + [NEARLY]))
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
-    found = optimize.minimize(turn, weight, method="Nelder-Mead", options={"maxfev": 400, "initial_simplex": begun})
-    _, X, shares = shape(found.x)
-    return (X + X.T) / 2.0 * LARGER, [float(a) for a in shares]
+    options = {"maxfev": 400, "initial_simplex": begun}
+    found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
+    least, X, shares = shape(found.x)
+    return (X * LARGER, [float(a) for a in shares]) if isfinite(least) else None
 
 
 def highest_ratio(a: Rows, b: Rows) -> float:

@@ -226,7 +226,8 @@ class RecordedLoop:
 
     def is_told(self, name: str) -> bool:
         """Tell whether the law's program asks for an input."""
-        return name + ".0" in Program.read(self.by_digest[self.roles["law"]]).inputs
+        law = self.roles["law"]
+        return name + ".0" in Program.read(self.by_digest[law]).inputs
 
     def try_to_show(self, claim: dict[str, Any], scales: Mapping[str, float]) -> bool:
         """Add a claim if evidence for it is found."""

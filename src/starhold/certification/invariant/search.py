@@ -40,12 +40,12 @@ class Cell:
 
     @cached_property
     def sides(self) -> list[Poly]:
-        """What is not negative in it."""
+        """The polynomials that are not negative in it."""
         return [Poly(dict(surface)) * sign for surface, sign in self.own.signs.items() if sign]
 
     @cached_property
     def zero(self) -> list[Poly]:
-        """What vanishes in it, if it is a thin one."""
+        """The polynomials that vanish in it, if it is a thin one."""
         return [Poly(dict(surface)) for surface, sign in self.own.signs.items() if not sign]
 
     @property

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from fractions import Fraction
 from itertools import pairwise
 
-from ..numbers import Rows, demand, matrix, plus, rational, read_list, scalar, times, transpose, up
+from ..held import Near
+from ..numbers import Rows, beside, demand, matrix, plus, rational, read_list, scalar, times, transpose, up
 from ..polynomials import Poly, var
 from ..programs import Exactly, known, single
 from ..reading import Claim
-from ..rules import Definite, Exceeds
+from ..regions import RATE, STATE, TURN, Radii
+from ..rules import Definite, Exceeds, Obligation
 from ..sentences import Statement, below
-from .attitude import Proof
 
 SHARE, BESIDE = "share", "noise.beside"
 CARRIED, CORRECTED = "errors carried", "errors corrected"
@@ -22,29 +24,36 @@ MOST, TERMS = 64, 80
 """How many samples there may be from one measurement to the next; terms of the exponential series."""
 
 
-def within_radii(claim: Claim) -> Proof:
+def within_radii(claim: Claim, near: Near) -> Generator[tuple[str, Obligation], None, tuple[Statement, Radii]]:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
-    than noise.attitude and noise.rate, and other standard normal vectors no longer than noise.beside, but with a probability
-    of `share` at most."""
+    than noise.attitude and noise.rate, other standard normal vectors no longer than noise.beside, and the rate and the turn
+    that the errors cause in the linear loop no larger than those returned, but with a probability of `share` at most."""
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
-    carried = [linear(claim, CARRIED)] * (int(every) - 1) if every > 1 else []
-    steps = [*carried, linear(claim, CORRECTED)]
+    carried = [driven(near, *linear(claim, CARRIED))] * (int(every) - 1) if every > 1 else []
+    steps = [*carried, driven(near, *linear(claim, CORRECTED))]
     size = len(steps[0][0][0])
     demand(len(steps[-1][0][0]) == size, "the errors are not those of one estimate")
     shapes = [matrix(shape, size, size) for shape in read_list(claim.evidence["covariances"], int(every))]
-    widths = dict(zip(TOLD, map(rational, read_list(claim.evidence["deviations"], len(TOLD))), strict=True))
+    parts = {
+        "attitude": slice(size, size + 3),
+        "rate": slice(size + 3, size + 6),
+        "motion's rate": RATE,
+        "motion's turn": TURN,
+    }
+    widths = [rational(x) for x in read_list(claim.evidence["deviations"], len(parts))]
+    wide, turned = (rational(x) for x in read_list(claim.evidence["swayed"], 2))
+    radii = numbers["noise.attitude"], numbers["noise.rate"], wide, turned
     # The last sample before those of the list is like their last.
     for k, ((before, after), step) in enumerate(zip(pairwise([shapes[-1], *shapes]), steps, strict=True)):
         spread = covariance(before, *step)
         rest = plus(after, [row[:size] for row in spread[:size]], -1)
         yield f"covariance {k}", Definite(rest)
-        for i, (name, width) in enumerate(widths.items()):
-            part = slice(size + 3 * i, size + 3 * i + 3)
-            told = [row[part] for row in spread[part]]
-            yield f"deviation of the {name} {k}", Definite(plus(scalar(width * width), told, -1))
-    beside, missed = "", samples * sum(tail(numbers[f"noise.{name}"], width) for name, width in widths.items())
+        for width, (name, part) in zip(widths, parts.items(), strict=True):
+            own = [row[part] for row in spread[part]]
+            yield f"deviation of the {name} {k}", Definite(plus(scalar(width * width), own, -1))
+    beside, missed = "", samples * sum(map(tail, radii, widths))
     if BESIDE in numbers:
         missed += samples * tail(numbers[BESIDE], Fraction(1))
         beside = f", other noise up to {below(numbers[BESIDE])} deviations"
@@ -54,7 +63,21 @@ def within_radii(claim: Claim) -> Proof:
         f" noise{beside}: all this at {samples} samples on end with a probability of at least"
         f" {below(1 - share)}"
     )
-    return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate"))
+    return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate")), (wide, turned)
+
+
+def driven(near: Near, errors: Rows, noise: Rows) -> tuple[Rows, Rows]:
+    """Return A and B of the rates and the turn that errors cause near the target, the errors themselves and those told: from
+    Ax + Bn for these alone. The law is told q + e/2 and w + s."""
+    size = len(errors) - 6
+    turned, rated = ([row[part] for row in near.torque] for part in (TURN, RATE))
+
+    def torque(rows: Rows) -> Rows:
+        told, fast = rows[size : size + 3], rows[size + 3 :]
+        return plus(times(rated, fast), times(turned, told), Fraction(1, 2))
+
+    still = [[Fraction(0)] * len(STATE) for _ in errors]
+    return beside(near.A, times(near.B, torque(errors))) + beside(still, errors), times(near.B, torque(noise)) + noise
 
 
 def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:

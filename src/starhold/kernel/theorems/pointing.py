@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from ..held import RATE, TURN, Held
+from ..held import Held
 from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
+from ..regions import AT_REST, RATE, TURN, widened
 from ..rules import Definite, Exceeds
 from ..sentences import Statement, above, below, enumerated
 from .attitude import Proof, contents
@@ -26,12 +27,14 @@ def points(claim: Claim) -> Proof:
     noise.attitude and noise.rate beside."""
     loop = AttitudeLoop(claim)
     yield from loop.sound()
-    noise = (yield from within_radii(claim)) if SHARE in claim.numbers else Statement("", ())
     held, numbers, samples = Held(loop), claim.numbers, 0
+    noise, swayed = Statement("", ()), AT_REST
+    if SHARE in numbers:
+        noise, swayed = yield from within_radii(claim, held.near)
     c, h = numbers["level"], held.h
     start = yield from contents(loop, loop.lyapunov)
     region = held.region(c)
-    limited = yield from within_limits(loop, held.misread(region))
+    limited = yield from within_limits(loop, held.misread(region)[0])
     signs = {SHORTEST, HYSTERESIS} & claim.taken.content.keys()
     if any(claim.taken.get(word) for word in (SHORTEST, HYSTERESIS)):
         yield "the sign never changes", Exceeds(region.least, held.turned / 2)
@@ -41,31 +44,34 @@ def points(claim: Claim) -> Proof:
     for k, told in enumerate(levels):
         end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
         demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
-        Q, H, push, rest = held.fall(region)
+        Q, H, F, push, rest = held.fall(region)
         pushed = push * push / (4 * tau) + rest
-        fallen = plus(plus(Q, times(transpose(held.felt), held.felt), -tau), H, -beta)
+        fallen = plus(plus(Q, times(transpose(F), F), -tau), H, -beta)
         yield f"V falls by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
         c, region = end, held.region(end)
+    last, beside = region.X, AT_REST
     for k, told in enumerate(ellipsoids):
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        after = image(X, shares, *held.linear(region))
-        yield f"ellipsoid {k}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
-        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], region.X, -1))
+        pushed = held.linear(region, swayed)
+        for corner, A in enumerate(held.corners()):
+            after = image(X, shares, A, pushed)
+            yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
+        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(region.X, swayed), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
-        region = region.within(X)
+        region, last, beside = region.within(X, swayed), X, swayed
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
     tube = held.tube(region)
     # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.
-    near, slow = angle / 2 - angle**3 / 48 - h / 4 * fastest, fastest - norm(tube.drift) / 2
+    near, slow = angle / 2 - angle**3 / 48 - h / 4 * fastest - beside[1], fastest - norm(tube.drift) / 2 - beside[0]
     for name, most_of, part in (("angle", near, TURN), ("rate", slow, RATE)):
         demand(most_of > 0, f"the {name} is too small")
-        yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in region.X[part]], -1))
+        yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in last[part]], -1))
     yield "settling", Exceeds(numbers["settling"], h * samples)
 
     def most(name: str) -> str:

@@ -240,5 +240,6 @@ addEventListener("hashchange", () => { if (location.hash.slice(1) !== hash()) be
 for (const name of ["plots-seen", "plots-drawn"]) {
   document.addEventListener(name, () => fates.forEach((found, number) => { if (found.flies) send(number); }));
 }
-open(innerWidth >= 1200);
+// Tables of many laws need the room.
+open(innerWidth >= 1200 && report.laws.length < 5);
 begin();

@@ -1,0 +1,131 @@
+"""Sets of states of a loop with its torque held, and how large polynomials are there. Docs/kernel.md, 10."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from math import prod
+
+from .loops import AXES
+from .numbers import RefusedError, Rows, demand, norm, reach, root, scalar, transpose, up
+from .polynomials import Poly, most, var
+
+STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
+RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
+SPEED, ANGLE = "|w", "|q"
+"""Under which the sizes have those of |w| and |q|."""
+Sizes = dict[str, Fraction]
+Radii = tuple[Fraction, Fraction]
+"""Bounds of |w| and |q| of a motion."""
+AT_REST: Radii = (Fraction(0), Fraction(0))
+
+
+@dataclass(frozen=True)
+class Region:
+    """A set of states at samples: x.X^-1 x <= 1 for x = (w, q1, q2, q3), q0 >= least, and sizes of |x_i|, |w|, |q|."""
+
+    X: Rows
+    sizes: Sizes
+    least: Fraction
+
+    def within(self, X: Rows, swayed: Radii = AT_REST) -> Region:
+        """Return the part that lies no further than `swayed` from an ellipsoid."""
+        sizes = {name: root(X[i][i]) + swayed[i // 3] for i, name in enumerate(STATE)}
+        sizes |= {name: x + more for (name, x), more in zip(lengths(X).items(), swayed, strict=True)}
+        return Region(widened(X, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
+
+
+def least_form(p: Poly, region: Region) -> Rows:
+    """Return the matrix of a form that p is not below: two factors of x are taken out of every monomial, what is left lies
+    in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
+    sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
+    middle, radius = scalar(0, 6), scalar(0, 6)
+    for m, c in p.terms.items():
+        own, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
+        demand(set(own[-2:]) <= set(place) and len(own) > 1, "the torque is not zero at rest on target")
+        # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
+        *left, i, k = own
+        high = c * prod(sizes[name] for name in left)
+        even = all(left.count(name) % 2 == 0 for name in left) and (power == 0 or region.least >= 0)
+        low = -high if not even else Fraction(0) if left else high * region.least**power
+        ends = up(-min(low, high)), up(max(low, high))
+        for a, b in ((place[i], place[k]), (place[k], place[i])):
+            middle[a][b] += (ends[1] - ends[0]) / 4
+            radius[a][b] += (ends[1] + ends[0]) / 4
+    for i, row in enumerate(radius):
+        middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
+    return middle
+
+
+def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
+    """Return how much parts change at most with a vector, in norms."""
+    names = [name for name in sizes if name[0] == letter]
+    return stretched([[p.slope(name) for name in names] for p in parts], sizes) if names else Fraction(0)
+
+
+def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
+    """Return a bound of how much longer a matrix of polynomials makes a vector: |y x z| <= |y| |z|, and what is left by its
+    entries. Vectors from outside are no longer than each of their components may be."""
+    found = Fraction(0)
+    for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
+        names = [f"{letter}{k + 1}" for k in AXES]
+        c = rows[1][0].terms.get((names[2],))
+        if c is None:
+            continue
+        x, y, z = map(var, names)
+        turn = [[Poly({}), -z, y], [z, Poly({}), -x], [-y, x, Poly({})]]
+        rest = [[p - c * q for p, q in zip(a, b, strict=True)] for a, b in zip(rows, turn, strict=True)]
+        if not any((name,) in p.terms for row in rest for p in row for name in names):
+            rows = rest
+            found += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
+    return found + stretch([[most(p, sizes) for p in row] for row in rows])
+
+
+def lengths(X: Rows) -> Sizes:
+    """Return bounds of |w| and |q| where x.X^-1 x <= 1: no eigenvalue exceeds the largest sum of a row."""
+    parts = (([row[part] for row in X[part]], name) for part, name in ((RATE, SPEED), (TURN, ANGLE)))
+    return {name: root(max(sum(map(abs, row), Fraction(0)) for row in rows)) for rows, name in parts}
+
+
+def widened(X: Rows, swayed: Radii) -> Rows:
+    """Return the matrix of an ellipsoid that holds all that is no further than `swayed` from another one."""
+    near = [4 * swayed[i // 3] ** 2 for i in range(6)]
+    return [[2 * x + near[i] * (i == k) for k, x in enumerate(row)] for i, row in enumerate(X)] if any(near) else X
+
+
+def first(p: Poly, letter: str) -> Poly:
+    """Return the terms of which the first variable but q0 has this letter."""
+    return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
+
+
+def with_momentum(p: Poly) -> Poly:
+    """Return what of a polynomial is a product of wheels' momentum and a rate."""
+    return Poly({m: c for m, c in p.terms.items() if [name[0] for name in m] == ["h", "w"]})
+
+
+def growing(parts: list[Poly]) -> list[Poly]:
+    """Return what of polynomials vanishes with the state."""
+    return [Poly({m: c for m, c in p.terms.items() if set(m) & set(STATE)}) for p in parts]
+
+
+def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
+    """Return values by names."""
+    return dict(zip(names, values, strict=True))
+
+
+def stretch(rows: Rows) -> Fraction:
+    """Return a bound of how much longer a matrix makes a vector: of the sums of its rows and of its columns, or of all."""
+    across, down = (max(sum(map(abs, row), Fraction(0)) for row in own) for own in (rows, transpose(rows)))
+    return min(root(across * down), norm(x for row in rows for x in row))
+
+
+def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:
+    """Return bounds that a monotone change leaves bounds: what begins within them at no time leaves them."""
+    found = begun or [Fraction(0)] * 3
+    for _ in range(ITERATIONS):
+        further = change(found)
+        if all(x <= y for x, y in zip(further, found, strict=True)):
+            return found
+        found = [up(x + x / 2**20) for x in further]
+    raise RefusedError("the period is too long for the rates")

@@ -1,0 +1,75 @@
+"""A period of loops with wheels and a target that moves: no state is farther than what is shown of the period."""
+
+import numpy as np
+import pytest
+
+import starhold as sh
+from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.claims import floats
+from starhold.certification.evidence.pointing import Pushed
+from starhold.certification.openness import pushes
+from starhold.certification.subject import make_subject
+from starhold.kernel.numbers import Account
+from starhold.kernel.regions import AT_REST, STATE
+from starhold.scenario.building import build
+from tests.kernel.flights import Around, Surroundings, along
+from tests.kernel.oracle import Oracle, run
+from tests.tiers import leading
+
+LANES = 2000
+
+
+@pytest.mark.parametrize(("scenario", "law"), leading([("cubesat-nadir", "lyapunov"), ("wheels-orbital", "wheel")], 1))
+@pytest.mark.parametrize("share", [1e-5, 1e-3, 0.03])
+def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, law, share):
+    Account.left = 10**12
+    given = sh.load(scenario)
+    loop = Loop(make_subject(build(given, given.pick(law))))
+    own = Pushed(loop, pushes(loop.loop, loop.known.envelope(False)))
+    _, V, held, _ = own.leans[0]
+    oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.told))
+    n, h, rng = oracle.numbers, loop.loop.period, np.random.default_rng(3)
+    region = held.region(held.s * round(share * 2**30) / 2**30)
+    tube, inverse = held.tube(region), np.linalg.inv(oracle.J)
+    x = np.linalg.cholesky(floats(region.X)) @ along(rng.normal(size=(6, LANES)))
+    x *= rng.uniform(size=LANES) ** 0.2
+    w, q = x[:3], np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]])
+    told = [n.get(f"outside.{k}", 0.0) for k in range(3)]
+    bounds = Surroundings(told, n["target.rate"], n["target.acceleration"], n["momentum"], 0.0, 0.0)
+    Q, H, F, size, rest = held.fall(region)
+    Q, H, F = floats(Q), floats(H), floats(F)
+    corners = np.array([floats(A) for A in held.corners()])
+    linear = [(corners[9 + 2 * k] - corners[8 + 2 * k]) / (2 * 1.4144 * n["momentum"]) for k in range(3)]
+    grown = 0.0
+
+    def asked(q, w, *around):
+        return run(oracle.programs["law"], oracle.inputs(q, w, *around)[0])
+
+    for unit in (along(rng.normal(size=(3, LANES))), along(F[:3] @ x)):
+        around = Around(bounds, oracle.J, inverse, rng, LANES)
+        around.kept = n["momentum"] * rng.uniform(size=LANES) ** 0.3 * along(rng.normal(size=(3, LANES)))
+        momentum, turning = around.kept, np.linalg.norm(w, axis=0) + n["target.rate"]
+        error = n["error"] + n.get("error.per.rate", 0.0) * turning
+        command = around.command(asked, q, w, 0.0, unit) + error * unit
+        later, rate, turned = q, w, rng.uniform()
+        for part, sign in ((turned, 1.0), (1.0 - turned, -1.0)):
+            for k in range(4):
+                outside = sign * (n["outside"] + n.get("outside.per.rate", 0.0) * turning) * unit + around.told * np.sign(
+                    unit
+                )
+                later, rate = around.after(later, rate, h * k / 4, command, outside, part * h / 4)
+        y = np.concatenate([rate, later[1:]])
+        assert (np.abs(y) <= np.array([[float(tube.sizes[name])] for name in STATE])).all()
+        drift = np.abs(rate - w).max(axis=1) / np.array([float(one) for one in tube.drift])
+        assert 0.02 < drift.max() <= 1.0
+        change = oracle.lyapunov(later, rate) - oracle.lyapunov(q, w)
+        most = h * (float(size) * np.linalg.norm(F @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
+        assert (change <= most).all()
+        A = floats(held.near.A)[:, :, None] + sum(a[:, :, None] * b for a, b in zip(linear, momentum, strict=True))
+        left = y - np.einsum("ijk,jk->ik", A, x)
+        (B, b), *others = held.linear(region, AT_REST)
+        v = np.linalg.solve(floats(B)[:3], left[:3])
+        grown = max(grown, float(np.linalg.norm(v, axis=0).max()) / float(b))
+        beside = sum(float(one) * np.linalg.norm(floats(M), 2) for M, one in others)
+        assert np.linalg.norm(left[3:] - floats(B)[3:] @ v, axis=0).max() <= beside
+    assert 0.1 < grown <= 1.0
