@@ -55,8 +55,8 @@ OTHER_BODY = "it is known of attitudes alone"
 
 @dataclass(frozen=True)
 class Evidence:
-    """All evidence about a law of a scenario, each piece computed when it is first asked for, and only then. A text stands in
-    place of what there is none of, and tells why."""
+    """All evidence about a law of a scenario, each piece computed when it is first asked for, and only then. A text stands
+    in place of what there is none of, and tells why."""
 
     scenario: Scenario
     entry: LawEntry
