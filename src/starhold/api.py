@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from starhold.analysis.margins import Margins
     from starhold.analysis.ranking import Metrics
     from starhold.campaign.results import CampaignResult
+    from starhold.campaign.verify import Review
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
     from starhold.export.aem import Aem
@@ -332,6 +333,26 @@ def verify(scenario: reading.Scenario | str | Path, law: str | None = None) -> t
     the order of the file, with its number, limit and margin (SI), and what it rests on. Each method is used once, and only
     those that are asked for. InputError for any mistake in a requirement, before anything is flown."""
     return studied("verify", scenario, law)
+
+
+@shortly
+def review(
+    scenario: reading.Scenario | str | Path, law: str | None = None, folder: str | Path | None = None, force: bool = False
+) -> Review:
+    """Gather what a review of a law shows, the first law if not given: `verdicts` on what is required, and the `evidence`:
+    flight, linear loop, certificates, and the budget and the campaign that the scenario asks for, each computed once. With a
+    folder it is written there, as review.html and review.md. InputError for any mistake in a requirement or in [campaign],
+    before anything is flown, and for a folder that holds results, unless `force`, or cannot be written."""
+    from starhold.report.commands import command
+    from starhold.report.results import open_folder, write_result
+
+    declared = command("review")
+    subject = declared.prepare(reading.open_scenario(scenario), law)
+    into = None if folder is None else open_folder(Path(folder), force)
+    gathered: Review = declared.study(*subject)
+    if into is not None:
+        write_result(declared.present(*subject, gathered), "review", subject[0].name, into)
+    return gathered
 
 
 @shortly

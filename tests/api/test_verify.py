@@ -16,35 +16,8 @@ from starhold.studies import budget, compare, deciding
 from starhold.studies.verification import verdicts_of_flight
 from tests.missions import BASE, DETUMBLE, POINT
 from tests.refusals import complains, refused
+from tests.required import ALL, BETWEEN, ERROR, KEPT, MANY, OFF, PHASE, PROOF, SETTLES, STILL, TURN, turn
 from tests.running import starhold
-
-TURN = {
-    "name": "turn",
-    "spacecraft": {"inertia": [2, 3, 4], "torque_limit": "0.05 N m"},
-    "initial": {"angles": ["8 deg", "5 deg", "-6 deg"], "rate": ["0.05 deg/s", 0, 0]},
-    "sensor": {"rate_noise": 1e-6},
-    "simulation": {"duration": 400, "control_period": 0.5},
-    "settling": {"attitude_tolerance": "0.1 deg", "rate_tolerance": "0.01 deg/s"},
-    "campaign": {"runs": 60, "over": {"initial.rate": {"distribution": "shell", "high": "0.2 deg/s"}}},
-    "budget": {"runs": 2},
-    "law": [{"type": "pd", "k_rate": 0.3, "k_attitude": 0.03}],
-}
-SETTLES = {"id": "settles", "method": "flight", "metric": "settling_time", "at_most": "5 min"}
-STILL = {"id": "still", "method": "flight", "metric": "peak_attitude_error", "at_most": "20 arcsec", "after": "5 min"}
-OFF = {"id": "off", "method": "flight", "metric": "exclusion-cone", "at_least": "1 deg", "axis": [0, 0, 1]}
-OFF |= {"direction": [1, 0, 0]}
-BETWEEN = {"id": "between", "method": "flight", "metric": "peak_rate", "at_most": "1 deg/s", "window": [50, "2 min"]}
-PHASE = {"id": "phase", "method": "margin", "metric": "phase_margin", "at_least": "40 deg"}
-ERROR = {"id": "error", "method": "budget", "metric": "ape", "at_most": "1 mas"}
-MANY = {"id": "many", "method": "campaign", "metric": "settling_time", "at_most": "300 s", "share": 0.9}
-KEPT = {"id": "kept", "method": "campaign", "metric": "lost", "share": 0.9}
-PROOF = {"id": "proof", "method": "proof", "metric": "peak_attitude_error", "at_most": "1 deg", "after": "1 h"}
-ALL = [SETTLES, STILL, OFF, BETWEEN, PHASE, ERROR, MANY, KEPT, PROOF]
-
-
-def turn(*required, **changes):
-    """The small scenario with these requirements."""
-    return sh.scenario(TURN | {"requirement": list(required)} | changes)
 
 
 def verdict(*required, **changes):
@@ -117,15 +90,15 @@ def test_each_method_is_used_once_and_only_if_it_is_asked_for(monkeypatch):
         function = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, **more: used.append(name) or function(*given, **more))
 
-    for module, name in ((verify, "record"), (verify, "fly_campaign"), (deciding, "study"), (deciding, "linear_of")):
+    for module, name in ((verify, "fly_law"), (verify, "fly_campaign"), (budget, "study"), (verify, "linear_of")):
         counted(module, name)
     study = deciding.study_of("rigid-body")
     monkeypatch.setattr(type(study), "certify", lambda *given, **more: used.append("certify") or [])
     flown = [name for name in ("fly",) if counted(compare, name) is None]
     sh.verify(turn(*ALL, *(one | {"id": one["id"] + "-2"} for one in ALL)))
-    assert sorted(used) == sorted(["record", *flown, "fly_campaign", "study", "linear_of", "certify"])
+    assert sorted(used) == sorted(["fly_law", *flown, "fly_campaign", "study", "linear_of", "certify"])
     for method, names in {
-        "flight": ["record", "fly"],
+        "flight": ["fly_law", "fly"],
         "margin": ["linear_of"],
         "proof": ["certify"],
         "inspection": [],
@@ -246,7 +219,7 @@ def test_an_inspection_is_met_as_by_its_record(tmp_path):
     ],
 )
 def test_a_mistake_is_told_in_one_line_before_anything_is_flown(monkeypatch, required, line):
-    monkeypatch.setattr(verify, "record", None)
+    monkeypatch.setattr(verify, "fly_law", None)
     with refused(line):
         sh.verify(turn(*required))
 

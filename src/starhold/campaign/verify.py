@@ -1,19 +1,23 @@
-"""Whether a law keeps the requirements of its scenario: each method is used once, and only those that are wanted for."""
+"""Whether a law keeps the requirements of its scenario: each method is used once, and only those that are wanted for; and
+all that a review of it shows, by the same flights."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from starhold.campaign.campaign import Options, fly_campaign, with_campaign
+from starhold.campaign.campaign import Options, begin, fly_campaign, with_campaign
 from starhold.campaign.job import Job, Source
 from starhold.errors import InputError
 from starhold.scenario.building import build
-from starhold.studies.budget import check_budget
-from starhold.studies.compare import record
+from starhold.studies import budget as budgets
+from starhold.studies.body import study_of
+from starhold.studies.compare import fly_law
 from starhold.studies.deciding import (
     Verdicts,
     by_budget,
@@ -23,6 +27,7 @@ from starhold.studies.deciding import (
     check_proofs,
     refuse_other_bodies,
 )
+from starhold.studies.linear import linear_of
 from starhold.studies.requirements import LOST, tables_of
 from starhold.studies.verification import (
     RequirementVerdict,
@@ -35,55 +40,150 @@ from starhold.studies.verification import (
 )
 
 if TYPE_CHECKING:
+    from starhold.analysis.linear import Linear
+    from starhold.campaign.results import CampaignResult
+    from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.body import Issued
+    from starhold.studies.budget import Budget
+    from starhold.studies.flight import Flight
 
 Notice = Callable[[int, int, str], None]
+SILENT: Notice = lambda done, total, what: None  # noqa: E731
+OTHER_BODY = "it is known of attitudes alone"
 
 
-def study(
-    scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, what: None
-) -> tuple[RequirementVerdict, ...]:
+@dataclass(frozen=True)
+class Evidence:
+    """All evidence about a law of a scenario, each piece computed when it is first asked for, and only then. A text stands
+    in place of what there is none of, and tells why."""
+
+    scenario: Scenario
+    entry: LawEntry
+
+    @cached_property
+    def loop(self) -> ClosedLoop:
+        """Its loop."""
+        return build(self.scenario, self.entry)
+
+    @cached_property
+    def flight(self) -> Flight:
+        """One flight of the scenario as it stands."""
+        return fly_law(self.scenario, self.entry, self.loop)
+
+    @cached_property
+    def linear(self) -> Linear | str:
+        """The linear loop."""
+        if self.scenario.body != "rigid-body":
+            return OTHER_BODY
+        try:
+            return linear_of(self.scenario, self.entry)
+        except InputError as error:
+            return error.given
+
+    @cached_property
+    def budget(self) -> Budget | str:
+        """The pointing budget."""
+        if self.scenario.body != "rigid-body":
+            return OTHER_BODY
+        try:
+            return budgets.study(self.scenario, self.entry)
+        except InputError as error:
+            return error.given
+
+    @cached_property
+    def issued(self) -> Sequence[Issued] | str:
+        """The certificates, each with the loop that it speaks of."""
+        if self.scenario.supposed is not None:
+            return "the law takes the craft for another one"
+        return study_of(self.scenario.body).certify(self.scenario, self.entry, self.loop, pointing=True)
+
+    @cached_property
+    def campaign(self) -> CampaignResult:
+        """The campaign of the scenario's [campaign] table, whose folder is gone. InputError where there is none."""
+        with TemporaryDirectory(prefix="starhold-verify-") as folder:
+            return fly_campaign(self.scenario, Path(folder) / "campaign", self.entry.name, Options(search=False))
+
+    def verdicts(self, notice: Notice, more: Collection[str] = ()) -> tuple[RequirementVerdict, ...]:
+        """The verdicts on all requirements, by the methods that they ask for; and more methods whose evidence is wanted."""
+        scenario, entry = self.scenario, self.entry
+        methods: dict[str, Callable[[], Verdicts]] = {
+            "inspection": lambda: by_inspection(scenario),
+            "margin": lambda: by_margins(scenario, self.linear),
+            "flight": lambda: by_flight(scenario, entry, self.flight.recording),
+            "proof": lambda: by_proof(scenario, entry, self.loop, self.issued),
+            "budget": lambda: by_budget(scenario, self.budget),
+            "campaign": lambda: by_campaign(scenario, self.campaign),
+        }
+        wanted = [method for method in methods if method in more or tables_of(scenario, method)]
+        decided: Verdicts = {}
+        for done, method in enumerate(wanted):
+            notice(done, len(wanted), method)
+            decided |= methods[method]()
+        notice(len(wanted), len(wanted), "")
+        return in_order(scenario, decided)
+
+
+class Review(NamedTuple):
+    """The verdicts on what is required of a law, and the evidence that they and a review rest on."""
+
+    verdicts: tuple[RequirementVerdict, ...]
+    evidence: Evidence
+
+    @property
+    def has_budget(self) -> bool:
+        """Whether a pointing budget is asked for: by a [budget] table, or by a requirement."""
+        return _asks_budget(self.evidence.scenario)
+
+    @property
+    def has_campaign(self) -> bool:
+        """Whether there is a [campaign] table."""
+        return self.evidence.scenario.table.campaign is not None
+
+
+def study(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> tuple[RequirementVerdict, ...]:
     """Decide the requirements of a scenario for one of its laws, by the methods that they ask for: one flight, one campaign,
     one certificate, one budget and one linear loop do for all of them. `notice` hears the number of methods done, that of
     all and the next one. InputError for any mistake in a requirement, before anything is flown or proved."""
+    if not scenario.table.requirement:
+        raise InputError(scenario.where, "requirement", "none", "at least one [[requirement]] table")
     check(scenario, entry)
-    methods: dict[str, Callable[[], Verdicts]] = {
-        "inspection": lambda: by_inspection(scenario),
-        "margin": lambda: by_margins(scenario, entry),
-        "flight": lambda: by_flight(scenario, entry, record(scenario, build(scenario, entry))),
-        "proof": lambda: by_proof(scenario, entry),
-        "budget": lambda: by_budget(scenario, entry, lambda done, total, name: None),
-        "campaign": lambda: by_campaign(scenario, entry),
-    }
-    wanted = [method for method in methods if tables_of(scenario, method)]
-    decided: Verdicts = {}
-    for done, method in enumerate(wanted):
-        notice(done, len(wanted), method)
-        decided |= methods[method]()
-    notice(len(wanted), len(wanted), "")
-    return in_order(scenario, decided)
+    return Evidence(scenario, entry).verdicts(notice)
+
+
+def examine(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> Review:
+    """Gather what a review of a law shows: the verdicts, if anything is required, a flight, the linear loop, certificates,
+    and the budget and the campaign that the scenario asks for; each is computed once. InputError as `study` has it, and for
+    any mistake in the [campaign] table."""
+    check(scenario, entry)
+    more = ["margin", "flight", "proof", *(["budget"] if _asks_budget(scenario) else [])]
+    if scenario.table.campaign is not None:
+        begin(scenario, [entry.name])
+        more.append("campaign")
+    evidence = Evidence(scenario, entry)
+    return Review(evidence.verdicts(notice, more), evidence)
+
+
+def _asks_budget(scenario: Scenario) -> bool:
+    return "budget" in scenario.table.model_fields_set or bool(tables_of(scenario, "budget"))
 
 
 def check(scenario: Scenario, entry: LawEntry) -> None:
     """InputError for whatever is wrong with a requirement: a metric that its method does not measure, a limit in another
     unit, a mode that the law does not have, a campaign that the scenario lacks."""
-    if not scenario.table.requirement:
-        raise InputError(scenario.where, "requirement", "none", "at least one [[requirement]] table")
     refuse_other_bodies(scenario)
     if scenario.body == "rigid-body":
         check_proofs(scenario, entry)
-        check_budget(scenario)
+        budgets.check_budget(scenario)
     check_margins(scenario)
     check_flight(scenario, entry)
     if tables_of(scenario, "campaign"):
         Job(Source.of(scenario), with_campaign(scenario, {}).table.campaign).requirements(entry.name)
 
 
-def by_campaign(scenario: Scenario, entry: LawEntry) -> Verdicts:
-    """The verdicts of a scenario's campaign on one of its laws."""
+def by_campaign(scenario: Scenario, result: CampaignResult) -> Verdicts:
+    """The verdicts of a scenario's campaign on its only law."""
     tables = tables_of(scenario, "campaign")
-    with TemporaryDirectory(prefix="starhold-verify-") as folder:
-        result = fly_campaign(scenario, Path(folder) / "campaign", entry.name, Options(search=False))
     verdicts: Verdicts = {}
     judged = zip(tables.items(), result.requirements, result.laws[0].verdicts, strict=True)
     for (key, table), required, verdict in judged:

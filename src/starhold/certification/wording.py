@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
 from starhold.certification.certificate import FILE, Certificate, Claim, Obligation
+from starhold.certification.obligations import OBLIGATIONS
 from starhold.laws.catalogue import file_of, known_law
 
 HEADINGS = {
@@ -362,6 +363,13 @@ def evidence(obligation: Obligation) -> str:
         else:
             parts.append(f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {value}")
     return "; ".join(parts)
+
+
+def reasons(claim: Claim) -> list[str]:
+    """Why a claim is not proved, one line an obligation."""
+    return [
+        f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {evidence(o)}" for o in claim.obligations if o.outcome != "proved"
+    ]
 
 
 def _numbers(value: Any) -> str:

@@ -9,16 +9,15 @@ from rich.markup import escape
 from rich.table import Table
 
 from starhold.certification.assumptions import texts
-from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.obligations import OBLIGATIONS
+from starhold.certification.certificate import Certificate
 from starhold.certification.wording import (
     HEADINGS,
     coverage,
     eigenvalues,
-    evidence,
     grouped,
     methods,
     ranked,
+    reasons,
     statement,
     strongest,
     unclaimed,
@@ -116,13 +115,6 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
         last = max(begins, key=lambda kind: begins[kind][0].time)
         when = left_text(flight, place, last).partition(";")[0]
         yield "", "[yellow]left[/yellow]", f"nothing proved covers this flight {when}"
-
-
-def reasons(claim: Claim) -> list[str]:
-    """Why a claim is not proved, one line an obligation."""
-    return [
-        f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {evidence(o)}" for o in claim.obligations if o.outcome != "proved"
-    ]
 
 
 def assumptions(certificate: Certificate) -> str:

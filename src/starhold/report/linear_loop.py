@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -32,7 +32,7 @@ DEEPEST = 60.0
 WIDTH, HEIGHT, LEFT, BOTTOM = 430.0, 250.0, 52.0, 36.0
 
 
-class _Known(NamedTuple):
+class Known(NamedTuple):
     """A law's linear loop, its response and margins, by the law's number; `why` there is none."""
 
     number: int
@@ -42,16 +42,19 @@ class _Known(NamedTuple):
     margins: Sequence[Margins] = ()
     why: str = ""
 
+    @classmethod
+    def of(cls, number: int, name: str, linear: Linear) -> Self:
+        """Gather what is known of a linear loop."""
+        shown = response(linear)
+        return cls(number, name, linear, shown, margins(linear, shown))
+
 
 def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """The section as HTML; nothing where no law has a linear form."""
     known = [_know(scenario, number, flight.name) for number, flight in enumerate(flights)]
     if not any(one.linear for one in known):
         return ""
-    rows = [row for one in known for row in _rows(one)]
-    heads = ("gain margin|dB", "phase margin|deg", "delay margin|s", "crossover|rad/s", "peak of |1/(1 + L)||")
-    named = [Column(name, unit, ">") for name, _, unit in (head.rpartition("|") for head in heads)]
-    table = table_html(Table([Column("law"), Column("axis"), *named], rows))
+    table = table_html(margins_table(known))
     without = "".join(note(f"{one.name} has no linear form: {one.why}.") for one in known if one.linear is None)
     left = sorted({text for one in known if one.linear for text in one.linear.left_out})
     apart = f" Left out: {escape(', '.join(left))}." if left else ""
@@ -62,16 +65,22 @@ def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
     )
 
 
-def _know(scenario: Scenario, number: int, name: str) -> _Known:
+def margins_table(known: Sequence[Known]) -> Table:
+    """One row a law and an axis."""
+    heads = ("gain margin|dB", "phase margin|deg", "delay margin|s", "crossover|rad/s", "peak of |1/(1 + L)||")
+    named = [Column(name, unit, ">") for name, _, unit in (head.rpartition("|") for head in heads)]
+    return Table([Column("law"), Column("axis"), *named], [row for one in known for row in _rows(one)])
+
+
+def _know(scenario: Scenario, number: int, name: str) -> Known:
     try:
         linear = linear_of(scenario, scenario.pick(name))
     except InputError as error:
-        return _Known(number, name, why=error.given)
-    shown = response(linear)
-    return _Known(number, name, linear, shown, margins(linear, shown))
+        return Known(number, name, why=error.given)
+    return Known.of(number, name, linear)
 
 
-def _rows(one: _Known) -> list[list[Any]]:
+def _rows(one: Known) -> list[list[Any]]:
     rows: list[list[Any]] = []
     for about in one.margins:
         numbers = (math.degrees(about.phase), about.delay, about.crossover, about.sensitivity)
@@ -103,7 +112,7 @@ class _Panel(NamedTuple):
         return self.left + LEFT + across * (WIDTH - LEFT - 12.0), 8.0 + (1.0 - up) * (HEIGHT - BOTTOM - 8.0)
 
 
-def _plots(known: Sequence[_Known]) -> str:
+def _plots(known: Sequence[Known]) -> str:
     curves: list[tuple[int, str, Any, Any, Any]] = []
     for one in known:
         if one.shown is not None:

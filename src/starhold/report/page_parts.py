@@ -87,8 +87,8 @@ def beside(*boxes: str) -> str:
     return f'<div class="{"two" if len(there) > 1 else "one"}">{"".join(there)}</div>' if there else ""
 
 
-def plain_document(title: str, body: Iterable[str]) -> str:
-    """A page of these parts, those that are empty left out, with the style and the title of all pages."""
+def plain_document(title: str, body: Iterable[str], styles: Sequence[str] = ("uplot.css", "page.css")) -> str:
+    """A page of these parts, those that are empty left out, with its title and the styles of these names."""
     return "\n".join(
         [
             "<!DOCTYPE html>",
@@ -96,7 +96,7 @@ def plain_document(title: str, body: Iterable[str]) -> str:
             f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(title)} — starhold</title>",
-            f"<style>\n{_asset('uplot.css')}{_asset('page.css')}</style></head><body>",
+            f"<style>\n{''.join(map(_asset, styles))}</style></head><body>",
             *(part for part in body if part),
             "</body></html>\n",
         ]

@@ -34,7 +34,10 @@ SUMMARY, PAGE = "summary.json", "report.html"
 INDEX = "index.html"
 EXPORT = "export.json"
 STUDIED = tuple(
-    f"{name}.{kind}" for name in commands.names() if commands.command(name).suffix for kind in ("csv", "png", "xml")
+    f"{name}.{kind}"
+    for name, command in ((name, commands.command(name)) for name in commands.names())
+    if command.suffix
+    for kind in command.kinds
 )
 MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *STUDIED)
 """A folder with one of these holds results."""
@@ -160,6 +163,15 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
             result.certificate(hidden)
         if json.loads(written["Certificate"].read_text(encoding="utf-8"))["claims"]:
             _write_kernel(folder)
+    if result.document is not None:
+        from starhold.report.document import pages_of
+        from starhold.report.page_parts import versions
+
+        texts = pages_of(result.title, result.document, f"{versions()}.")
+        for what, kind, text in zip(("Page", "Markdown"), ("html", "md"), texts, strict=True):
+            written[what] = folder / f"{name}.{kind}"
+            with atomic_write(written[what]) as hidden:
+                hidden.write_text(text, encoding="utf-8", newline="\n")
     if result.xml is not None:
         written["For CI"] = folder / f"{name}.xml"
         with atomic_write(written["For CI"]) as hidden:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from starhold.analysis.margins import margins
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.wording import enumerated, sentence
 from starhold.errors import InputError
-from starhold.scenario.building import build
 from starhold.scenario.checking import show
 from starhold.studies.body import study_of
-from starhold.studies.budget import TOGETHER, study
-from starhold.studies.linear import linear_of
+from starhold.studies.budget import TOGETHER
 from starhold.studies.requirements import Requirement, at_most, read_requirements, tables_of
 from starhold.studies.verification import (
     RequirementVerdict,
@@ -27,10 +25,13 @@ from starhold.studies.verification import (
 )
 
 if TYPE_CHECKING:
+    from starhold.analysis.linear import Linear
     from starhold.certification.certificate import Claim
+    from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.scenario.requirement import RequirementTable
     from starhold.studies.body import Issued
+    from starhold.studies.budget import Budget
 
 Verdicts = dict[str, RequirementVerdict]
 POINTING = "pointing"
@@ -84,15 +85,13 @@ def check_proofs(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]
     return at_most(scenario, tables, {metric: unit for metric, (unit, _, _) in BOUNDS.items()})
 
 
-def by_proof(scenario: Scenario, entry: LawEntry) -> Verdicts:
+def by_proof(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, issued: Sequence[Issued] | str) -> Verdicts:
     """The verdicts that the claims about a law's loop give: met, or not decided, for what a claim does not bound may be
-    kept all the same."""
+    kept all the same. A text tells why there are no claims."""
     tables = tables_of(scenario, "proof")
-    if scenario.supposed is not None:
-        return {key: undecided(table, "the law takes the craft for another one") for key, table in tables.items()}
+    if isinstance(issued, str):
+        return {key: undecided(table, issued) for key, table in tables.items()}
     required = check_proofs(scenario, entry)
-    loop = build(scenario, entry)
-    issued = study_of(scenario.body).certify(scenario, entry, loop, pointing=True)
     # What flies from later on has certificates of its own, which begin where this flight is not looked at.
     begun = [one for one in issued if one.step == 0 and one.before is None]
     changes = [f"what changes at {event.step * loop.period:g} s" for event in loop.events][:1]
@@ -170,14 +169,12 @@ def check_margins(scenario: Scenario) -> tuple[Requirement, ...]:
     return read_requirements(tables_of(scenario, "margin"), OF_MARGINS, scenario.where)
 
 
-def by_margins(scenario: Scenario, entry: LawEntry) -> Verdicts:
-    """The verdicts that the margins of a law's linear loop give, of the worst axis each."""
+def by_margins(scenario: Scenario, linear: Linear | str) -> Verdicts:
+    """The verdicts that the margins of a linear loop give, of the worst axis each. A text tells why there is no loop."""
     tables, required = tables_of(scenario, "margin"), check_margins(scenario)
     pairs = list(zip(tables.items(), required, strict=True))
-    try:
-        linear = linear_of(scenario, entry)
-    except InputError as error:
-        return {key: undecided(table, error.given, **limits(table, one)) for (key, table), one in pairs}
+    if isinstance(linear, str):
+        return {key: undecided(table, linear, **limits(table, one)) for (key, table), one in pairs}
     axes = margins(linear) if linear.is_stable else []
     verdicts: Verdicts = {}
     for (key, table), one in pairs:
@@ -192,15 +189,13 @@ def by_margins(scenario: Scenario, entry: LawEntry) -> Verdicts:
 # --- by budget --------------------------------------------------------------------------------------------------------
 
 
-def by_budget(scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None]) -> Verdicts:
-    """The verdicts that the pointing budget of a law gives: the level of all sources together."""
+def by_budget(scenario: Scenario, budget: Budget | str) -> Verdicts:
+    """The verdicts that a pointing budget gives: the level of all sources together. A text tells why there is no budget."""
     tables = tables_of(scenario, "budget")
     units = {f"{table.metric}": "rad" for table in tables.values()}
     pairs: Any = zip(tables.items(), at_most(scenario, tables, units), strict=True)
-    try:
-        budget = study(scenario, entry, notice)
-    except InputError as error:
-        return {key: undecided(table, f"no budget: {error.given}", **limits(table, one)) for (key, table), one in pairs}
+    if isinstance(budget, str):
+        return {key: undecided(table, f"no budget: {budget}", **limits(table, one)) for (key, table), one in pairs}
     settings = budget.settings
     share = f"{100.0 * settings.confidence:.6g} % of errors from {settings.start:g} s on, {settings.runs} runs"
     faults = ("faults, which never come in a budget",) if scenario.table.fault else ()

@@ -57,6 +57,7 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
 
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     """A page of a study: its picture, what it shows, and its files."""
+    from starhold.report.document import block_html
     from starhold.report.results import write_result
     from starhold.report.tables import pill
 
@@ -64,7 +65,7 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     subject = command.prepare(scenario)
     result = command.result(subject, tell)
     files = write_result(result, name, scenario.name, folder) if command.suffix else {}
-    parts = [f"<h2>{escape(result.title)}</h2>", *map(_block, result.blocks)]
+    parts = [f"<h2>{escape(result.title)}</h2>", *map(block_html, result.blocks)]
     if "Picture" in files:
         drawn = base64.b64encode(files["Picture"].read_bytes()).decode()
         source = f"data:image/png;base64,{drawn}"
@@ -73,30 +74,6 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     parts += [f"<p>{'. '.join(links)}.</p>"] if files else []
     judged = any('class="outcome' in part for part in parts)
     return _document(scenario, folder, parts, pill(result.outcome.replace("undecided", "not decided")) if judged else "")
-
-
-def _block(block: commands.Block) -> str:
-    from starhold.report.tables import table_html
-
-    if isinstance(block, commands.Heading):
-        return f"<h2>{escape(block.name + block.rest)}</h2>"
-    if isinstance(block, str):
-        return f'<p style="white-space:pre-wrap">{escape(block)}</p>' if block else ""
-    return table_html(block._replace(rows=[[_marked(text) for text in row] for row in block.texts()]), "text tight")
-
-
-def _marked(text: str) -> str:
-    """The text of a cell, an outcome in it in its colour."""
-    from rich.text import Text
-
-    from starhold.report.tables import Markup, pill
-
-    read = Text.from_markup(text)
-    for span in read.spans:
-        before, word, after = read.plain[: span.start], read.plain[span.start : span.end], read.plain[span.end :]
-        if shown := pill(word):
-            return Markup(f"{escape(before)}{shown}{escape(after)}")
-    return read.plain
 
 
 def _export(scenario: Scenario, folder: Path, tell: Tell) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from starhold.report.document import Section
     from starhold.scenario.reading import LawEntry, Scenario
 
 
@@ -27,6 +28,7 @@ class Column(NamedTuple):
 class Cell(NamedTuple):
     """Words of a table with a look of their own. kind: "law", in the colour of the law of this number, or "name" where it
     names its row, with detail below it; an outcome, as "met" or "missed"; "best" of its column; "typed", to be copied;
+    "section", where it leads to that of a document which detail names;
     "share", with a bar of this share of the column below it; "shade", in the colour that detail names, the stronger the
     farther the number is from 0; else detail says what the words mean."""
 
@@ -78,8 +80,8 @@ Block: TypeAlias = Table | Heading | str
 class Result(NamedTuple):
     """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
     and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; xml is the text of NAME.xml; certificate writes one. outcome: whether all that is required is met, or
-    proved."""
+    summary.json; xml is the text of NAME.xml; certificate writes one; document is for NAME.html and NAME.md. outcome:
+    whether all that is required is met, or proved."""
 
     title: str
     blocks: Sequence[Block]
@@ -88,6 +90,7 @@ class Result(NamedTuple):
     summary: Mapping[str, Any] | None = None
     xml: str | None = None
     certificate: Callable[[Path], None] | None = None
+    document: Sequence[Section] | None = None
     outcome: Literal["met", "missed", "undecided"] = "met"
 
 
@@ -129,7 +132,8 @@ class Command(NamedTuple):
     with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
     whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
     command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
-    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq."""
+    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. kinds: how
+    the files NAME.* may end."""
 
     summary: str
     suffix: str
@@ -145,6 +149,7 @@ class Command(NamedTuple):
     listed: Callable[[], Sequence[Block]] | None = None
     read: Callable[..., tuple[Any, ...]] | None = None
     proofs: bool = False
+    kinds: tuple[str, ...] = ("csv", "png", "xml")
 
     def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
         """The arguments of `study`: the scenario changed as options say, and the law; or those that `read` gives."""

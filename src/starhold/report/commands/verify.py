@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.studies.verification import RequirementVerdict
 
+NUMBERS = (Column("number", "", ">"), Column("limit", "", ">"), Column("margin", "", ">"))
 STYLES = {"met": "green", "missed": "red", "not decided": "yellow"}
 
 
@@ -18,22 +19,23 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
     """One row a requirement, and below the table why one is not met."""
     from rich.markup import escape
 
-    head = [Column("requirement"), Column("number", "", ">"), Column("limit", "", ">"), Column("margin", "", ">")]
     rows: list[list[Any]] = []
     for one in verdicts:
         style = STYLES[one.verdict]
         shown = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
-        side = "≤ " if one.at_most else "≥ "
-        limit = amount(one, one.limit)
-        rows.append(
-            [escape(one.id), amount(one, one.number), limit and side + limit, amount(one, one.margin), one.method, shown]
-        )
-    blocks: list[Block] = ["", Table([*head, Column("method"), Column("verdict")], rows), ""]
+        rows.append([escape(one.id), *numbers(one), one.method, shown])
+    blocks: list[Block] = ["", Table([Column("requirement"), *NUMBERS, Column("method"), Column("verdict")], rows), ""]
     blocks += [f"{one.id}: {one.evidence}." for one in verdicts if one.verdict != "met"]
     outcomes = {one.verdict for one in verdicts}
     outcome = "missed" if "missed" in outcomes else "undecided" if "not decided" in outcomes else "met"
     title = f"{scenario.name}, {entry.name}: what is required"
     return Result(title, blocks, _matrix(verdicts), xml=junit(title, entry.name, verdicts), outcome=outcome)
+
+
+def numbers(one: RequirementVerdict) -> list[str | None]:
+    """Number, limit and margin, for reading."""
+    limit = amount(one, one.limit)
+    return [amount(one, one.number), limit and f"{'≤' if one.at_most else '≥'} {limit}", amount(one, one.margin)]
 
 
 def amount(one: RequirementVerdict, value: float | None) -> str | None:

@@ -1,0 +1,431 @@
+"""The document of a review: what is required, what is known of it and by what, and what is left open."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from starhold.certification.assumptions import WITHOUT, texts
+from starhold.certification.wording import (
+    HEADINGS,
+    coverage,
+    enumerated,
+    grouped,
+    left_out,
+    listed,
+    methods,
+    reasons,
+    sentence,
+    statement,
+    strongest,
+    unclaimed,
+)
+from starhold.report.commands import Cell, Column, Table
+from starhold.report.document import Figure, Listing, Piece, Section
+from starhold.report.text import lost_text, value_text
+
+if TYPE_CHECKING:
+    from starhold.campaign.verify import Review
+    from starhold.certification.certificate import Certificate
+    from starhold.report.campaign_tables import Section as Told
+
+MISSION, ASSUMPTIONS, REQUIREMENTS = "Mission and configuration", "Assumptions", "Requirements"
+POINTING, MARGINS, CAMPAIGN = "Pointing and momentum", "Margins", "Campaign"
+CERTIFICATES, CREDIBILITY, OPEN = "Certificates", "Credibility", "Open points"
+PLACES = {
+    "flight": POINTING,
+    "budget": POINTING,
+    "margin": MARGINS,
+    "campaign": CAMPAIGN,
+    "proof": CERTIFICATES,
+    "inspection": MISSION,
+    "": REQUIREMENTS,
+}
+"""The section in which the evidence of each method stands."""
+ATTITUDE = "rigid-body"
+DRIVERS = 8
+"""Drivers of each kind that are shown."""
+PICTURES = ("angle", "wheel-momentum")
+"""The figures of a flight that are shown, if it has them; else its first."""
+
+
+class Open(str):
+    """A sentence about what is left open."""
+
+
+class Listed(Open):
+    """One that stands in the list alone, for its section says the same otherwise."""
+
+
+Points: TypeAlias = list[tuple[str, str]]
+"""What is left open, with the section that says so."""
+
+
+def sections_of(review: Review) -> tuple[list[Section], Points]:
+    """Make the sections of the document; and tell what it leaves open."""
+    makers: dict[str, Callable[[Review], Iterator[Piece]]] = {
+        MISSION: _mission,
+        ASSUMPTIONS: _assumptions,
+        REQUIREMENTS: _requirements,
+        POINTING: _pointing,
+        MARGINS: _margins,
+        CAMPAIGN: _campaign,
+        CERTIFICATES: _certificates,
+    }
+    fresh = (MISSION, REQUIREMENTS)
+    sections = [Section(name, [*make(review)], name in fresh) for name, make in makers.items()]
+    sections.append(Section(CREDIBILITY, [*_credibility(review)]))
+    points = [(one.name, str(piece)) for one in sections for piece in one.pieces if isinstance(piece, Open)]
+    rows = [[str(number), Cell(name, "section", detail=name), _safe(text)] for number, (name, text) in enumerate(points, 1)]
+    columns = [Column("no."), Column("from"), Column("what is open")]
+    sections.append(Section(OPEN, [Table(columns, rows) if rows else "No point is open."]))
+    scenario = review.evidence.scenario
+    sections.append(Section("Scenario", ["The text that all of this is computed from.", Listing(scenario.text)], True))
+    shown = [one._replace(pieces=[piece for piece in one.pieces if not isinstance(piece, Listed)]) for one in sections]
+    return [Section("Outcome", [*_outcome(review, len(points))]), *shown], points
+
+
+def _safe(text: str) -> str:
+    """Words without marks of style."""
+    from rich.markup import escape
+
+    return escape(text)
+
+
+def _safe_rows(rows: Iterable[Sequence[Any]]) -> list[list[Any]]:
+    return [[_safe(value) if type(value) is str else value for value in row] for row in rows]
+
+
+def _table(names: str, rows: Iterable[Sequence[Any]], title: str = "") -> Table:
+    """A table of words; names: its headings, with strokes between them."""
+    return Table([*map(Column, names.split("|"))], _safe_rows(rows), title)
+
+
+def _outcome(review: Review, points: int) -> Iterator[Piece]:
+    scenario, judged = review.evidence.scenario, review.verdicts
+    counts = {word: sum(one.verdict == word for one in judged) for word in ("met", "missed", "not decided")}
+    said = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    if scenario.table.description:
+        yield f"{scenario.table.description}."
+    yield f"Required of the law {review.evidence.entry.name}: {said} of {len(judged)}." if judged else "Nothing is required."
+    limited = [one.id for one in judged if one.verdict == "met" and one.left_out]
+    if limited:
+        yield f"Met only without something that flies: {listed(limited)}."
+    yield f"{OPEN}: {points}, which have a section of their own." if points else "No point is open."
+
+
+# --- sections ---------------------------------------------------------------------------------------------------------
+
+
+def _mission(review: Review) -> Iterator[Piece]:
+    from starhold.campaign.again import hashes
+    from starhold.report.answer import facts
+
+    evidence = review.evidence
+    scenario, entry, flight = evidence.scenario, evidence.entry, evidence.flight
+    rows = [
+        ["scenario", f"{scenario.name} ({Path(scenario.where).name})"],
+        ["law", f"{entry.name}: {entry.law.card.title}"],
+        *([f"gain {name}", value_text(value, unit)] for name, (value, unit) in flight.gains.items()),
+        ["body", evidence.loop.body.card.title],
+        ["flight", facts(scenario, [flight])],
+    ]
+    yield _table("item|value", rows, "Configuration")
+    digests = {"text of the scenario": hashlib.sha256(scenario.text.encode()).hexdigest()}
+    digests |= hashes(scenario.text, scenario.where, scenario.folder)
+    digests |= {f"program of the law, {one.name}": one.law for one in _issued(review) if one.law}
+    digests |= {"runs of the campaign": evidence.campaign.digest} if review.has_campaign else {}
+    yield _table("what|SHA-256", digests.items(), "Digests")
+
+
+def _issued(review: Review) -> list[Certificate]:
+    issued = review.evidence.issued
+    return [] if isinstance(issued, str) else [one.certificate for one in issued]
+
+
+def _assumptions(review: Review) -> Iterator[Piece]:
+    evidence = review.evidence
+    needed: dict[str, list[str]] = {}
+    for one in _issued(review):
+        for claim in one.claims:
+            # What a claim leaves out stands with it.
+            for text in texts(name for name in claim.assumptions if not name.startswith(WITHOUT)):
+                needed.setdefault(text, []).append(f"{one.name}: {HEADINGS[claim.kind]}")
+    if needed:
+        yield _table("claims assume|needed by", [[a, "; ".join(dict.fromkeys(of))] for a, of in needed.items()], "Of claims")
+    parts = [("law", evidence.entry.name, evidence.entry.law), ("body", evidence.loop.body.name, evidence.loop.body)]
+    parts += [(fitted.part.role, fitted.called, fitted.part) for fitted in evidence.loop.parts]
+    rows = [[role, name, part.card.summary, "; ".join(part.card.assumptions)] for role, name, part in parts]
+    yield _table("role|part|model|valid for", rows, "Of models")
+    silent = [f"{role} {name}" for role, name, part in parts if not part.card.assumptions]
+    if silent:
+        yield Open(f"Limits of validity are not stated of {enumerated(silent)}.")
+
+
+def _requirements(review: Review) -> Iterator[Piece]:
+    from starhold.report.commands.verify import NUMBERS, numbers
+
+    if not review.verdicts:
+        yield Open("Nothing is required: the scenario has no [[requirement]] table.")
+        return
+    matrix: list[list[Any]] = []
+    rests: list[list[Any]] = []
+    derived = any(one.parent for one in review.verdicts)
+    for one in review.verdicts:
+        text = ": ".join(filter(None, (one.text, one.rationale)))
+        place = PLACES[one.method]
+        link = Cell(one.method or "what is derived", "section", detail=place)
+        matrix.append([one.id, *[one.parent] * derived, text, *numbers(one), link, Cell(one.verdict, one.verdict)])
+        rests.append([one.id, f"{one.evidence}.", "; ".join(one.left_out) or "nothing"])
+    columns = [Column("requirement"), *[Column("parent")] * derived, Column("text"), *NUMBERS]
+    yield Table([*columns, Column("known by"), Column("verdict")], _safe_rows(matrix))
+    yield _table("requirement|rests on|leaves out of the loop", rests, "Evidence")
+    for one in review.verdicts:
+        if one.verdict != "met":
+            yield Listed(f"{one.id} is {one.verdict}: {one.evidence.removeprefix(f'{one.verdict}. ')}.")
+        elif one.left_out:
+            yield Listed(f"{one.id} is {one.sentence}.")
+
+
+def _pointing(review: Review) -> Iterator[Piece]:
+    from starhold.report.body import report_of
+
+    evidence = review.evidence
+    scenario, flight = evidence.scenario, evidence.flight
+    known, row = flight.metric_set, flight.metrics
+    if flight.lost is not None:
+        yield Open(f"The motion is lost at {lost_text(flight)}.")
+    measures = [(metric, known.measures[metric]) for metric in known.columns({flight.name: row})]
+    rows = [[measure.heading, known.cell(metric, row), measure.unit, measure.meaning] for metric, measure in measures]
+    columns = [Column("metric"), Column("value", "", ">"), Column("unit"), Column("meaning")]
+    yield Table(columns, _safe_rows(rows), "One flight of the scenario")
+    pictures = report_of(scenario.body).picture([flight], scenario)
+    for name in [name for name in PICTURES if name in pictures] or list(pictures)[:1]:
+        yield Figure(f"One flight of {flight.name}: {name.replace('-', ' ')}", pictures[name])
+    if scenario.body == ATTITUDE:
+        yield from _budget(review)
+        yield from _momentum(review)
+
+
+def _budget(review: Review) -> Iterator[Piece]:
+    from starhold.report.commands import budget as command
+
+    evidence = review.evidence
+    if not review.has_budget:
+        yield Open("There is no pointing budget: the scenario has no [budget] table.")
+        return
+    budget = evidence.budget
+    if isinstance(budget, str):
+        yield Open(f"There is no pointing budget: {budget}.")
+        return
+    first, *rest = command.present(evidence.scenario, evidence.entry, budget).blocks[1:]
+    yield first._replace(title="Pointing budget") if isinstance(first, Table) else first
+    yield from rest
+    yield Figure("Pointing error by source", lambda: command.draw(budget, "Pointing error by source"))
+
+
+def _momentum(review: Review) -> Iterator[Piece]:
+    evidence = review.evidence
+    wheels, run = evidence.loop.wheels, evidence.flight.recording
+    if wheels is None or "wheel_momentum" not in run.arrays:
+        yield "There is no momentum budget, for there are no wheels."
+        return
+    peaks, rotors = np.nanmax(np.abs(run["wheel_momentum"]), axis=0), evidence.loop.rotors
+    rows: list[list[Any]] = []
+    for number, (begun, peak, limit) in enumerate(zip(rotors, peaks, wheels.momentum_limit, strict=True), 1):
+        margin = [limit, 100.0 * peak / limit, limit - peak] if math.isfinite(limit) else [None] * 3
+        rows.append([str(number), begun, peak, *margin])
+    heads = [Column(name, "N m s", ".4g") for name in ("at the start", "largest flown", "limit")]
+    yield Table(
+        [Column("wheel"), *heads, Column("share", "%", ".1f"), Column("left", "N m s", ".4g")],
+        rows,
+        "Momentum budget of the samples recorded",
+    )
+    spreads = evidence.campaign.laws[0].spreads if review.has_campaign else ()
+    worst = [one.quantiles[-1] for one in spreads if one.metric == "peak_wheel_momentum"]
+    yield from (f"Over all runs of the campaign no wheel stores more than {most:.4g} N m s." for most in worst)
+    for one in _issued(review):
+        claim = one.claim("wheels")
+        if claim is not None and claim.outcome == "proved" and "momentum" in claim.numbers:
+            yield f"Proved of {one.name}: {sentence(claim, one.subject)}."
+
+
+def _margins(review: Review) -> Iterator[Piece]:
+    evidence = review.evidence
+    if evidence.scenario.body != ATTITUDE:
+        yield "Margins are told of laws that turn a body."
+        return
+    linear = evidence.linear
+    if isinstance(linear, str):
+        yield Open(f"There are no margins: {linear}.")
+        return
+    # It needs much of SciPy.
+    from starhold.report.linear_loop import NOTE, Known, margins_table
+
+    table = margins_table([Known.of(0, evidence.entry.name, linear)])
+    yield table._replace(columns=table.columns[1:], rows=[row[1:] for row in table.rows])
+    yield NOTE
+    if linear.left_out:
+        yield f"Left out: {', '.join(linear.left_out)}."
+    if not linear.is_stable:
+        yield Open("The linear loop is not stable.")
+
+
+def _campaign(review: Review) -> Iterator[Piece]:
+    from starhold.report import campaign_tables as tables
+    from starhold.report.campaign_units import Wording, flown_text, headline
+
+    if not review.has_campaign:
+        yield Open("No campaign is flown, so nothing is known of other numbers: the scenario has no [campaign] table.")
+        return
+    result = review.evidence.campaign
+    law, words = result.laws[0], Wording.of(review.evidence.scenario.body, result)
+    yield f"{flown_text(result)[:1].upper()}{flown_text(result)[1:]}"
+    yield f"{law.law} {headline(law, result.sampling, words)}"
+    shown: list[Told | None] = [tables.verdicts(result, words), tables.runs(result), tables.metrics(result, words)]
+    shown += [tables.dispersions(result), *tables.indices(result, words)]
+    if law.drivers is not None:
+        shown.append(tables.drivers(law.drivers, words, DRIVERS)._replace(heading="What drives failures and metrics"))
+    for one in shown:
+        if one is not None and one.table.rows:
+            yield one.table._replace(rows=_safe_rows(one.table.rows), title=one.heading)
+        if one is not None and one.note:
+            yield one.note
+    if law.drivers is None:
+        yield Open("What drives failures was not looked for: nothing is drawn, or by a design that repeats its values.")
+
+
+def _certificates(review: Review) -> Iterator[Piece]:
+    issued = review.evidence.issued
+    if isinstance(issued, str):
+        yield Open(f"Nothing is certified: {issued}.")
+        return
+    from starhold.studies.body import study_of
+
+    rows: list[list[Any]] = []
+    points: list[Open] = []
+    covered: list[str] = []
+    for given in issued:
+        one = given.certificate
+        subject, name = one.subject, one.name
+        for claims in grouped(one).values():
+            for claim in claims:
+                absent = enumerated(left_out(claim)) if left_out(claim) else "nothing"
+                outcome = Cell(claim.outcome, claim.outcome)
+                rows.append(
+                    [name, HEADINGS[claim.kind], outcome, f"{statement(claim, subject)}. By {methods(claim)}.", absent]
+                )
+        points += [
+            Open(f"{name}, {HEADINGS[claim.kind]} is {claim.outcome}: {'; '.join(reasons(claim))}.")
+            for claim in one.claims
+            if claim.outcome != "proved"
+        ]
+        if not one.claims:
+            points.append(Open(f"{name}: nothing is claimed, so nothing is proved: {unclaimed(subject)}."))
+            continue
+        first = strongest(one.claims)[0]
+        covered += [f"{name}: {coverage(first, subject)} ({HEADINGS[first.kind]})."] if coverage(first, subject) else []
+        if first.outcome == "proved" and left_out(first):
+            points.append(Open(f"{name}: no proof about the motion takes in {enumerated(left_out(first))}."))
+        # Certificates of later phases begin where this flight is not looked at.
+        inside = study_of(review.evidence.scenario.body).start_inside(given) if given.step == 0 else {}
+        outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
+        if outside:
+            points.append(Open(f"{name}: the flight begins outside the sets of {listed(outside)}."))
+    if rows:
+        yield _table("certificate|claim|outcome|what is claimed|leaves out", rows)
+        yield from covered
+    yield from points
+
+
+# --- credibility ------------------------------------------------------------------------------------------------------
+
+
+def _credibility(review: Review) -> Iterator[Piece]:
+    """Tell what is known for each factor that NASA-STD-7009 names; a level is for people to assign."""
+    yield "The factors are those of NASA-STD-7009; no level is assigned, for that is left to people."
+    factors = _factors(review)
+    rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in factors.items()]
+    yield _table("factor|known|not stated", rows)
+    for name, (_, blanks) in factors.items():
+        yield from (Listed(f"{name}: not stated: {_lower(blank)}") for blank in blanks)
+
+
+def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
+    """List what the program knows for each factor, and what it does not."""
+    from starhold.report.campaign_units import counted
+    from starhold.report.page_parts import versions
+
+    evidence = review.evidence
+    scenario, tables = evidence.scenario, evidence.scenario.table
+    parts = [evidence.entry.law, evidence.loop.body, *(fitted.part for fitted in evidence.loop.parts)]
+    foreign = [part.name for part in parts if not _released(part.module)]
+    sources = dict.fromkeys(source for part in parts for source in part.card.sources)
+    claims = [claim for one in _issued(review) for claim in one.claims]
+    proved = sum(claim.outcome == "proved" for claim in claims)
+    reasons_given = sum(bool(one.rationale) for one in review.verdicts)
+    checked = [f"The kernel checked {proved} of {len(claims)} claims as proved."] if claims else []
+    models = f"{len(parts) - len(foreign)} of {len(parts)} models are those of this release."
+    verification = [f"Computed by {versions()}.", models, *checked]
+    open_models = [f"Who verified the models of others: {', '.join(foreign)}."] if foreign else []
+    open_models += ["Which tests of the release were run here."]
+    open_models += ["The error of the integration step: starhold run --check-step tells it."]
+    uncertainty: list[str] = []
+    unknown: list[str] = ["How uncertain the numbers are that are not drawn."]
+    robustness = [f"Flown with {counted(len(tables.fault), 'fault')}."] if getattr(tables, "fault", []) else []
+    frail: list[str] = []
+    if review.has_campaign:
+        result = evidence.campaign
+        drawn = ", ".join(result.over) or "nothing but noise"
+        uncertainty.append(f"{result.runs} runs, by {result.sampling} sampling, draw {drawn}.")
+        causes = result.laws[0].drivers
+        if causes is not None:
+            robustness.append(
+                f"{causes.failures} of {counted(causes.runs, 'run')} failed, and causes of it were looked for."
+            )
+    else:
+        unknown.insert(0, "The spread of results: there is no [campaign].")
+        frail.append("What makes requirements fail: there is no [campaign].")
+    if review.has_budget and not isinstance(evidence.budget, str):
+        uncertainty.append(f"A pointing budget of {counted(len(evidence.budget.rows) - 3, 'source')}.")
+    if not isinstance(evidence.linear, str) and evidence.linear.is_stable:
+        robustness.append("Margins of gain, phase and delay of the linear loop.")
+    elif scenario.body == ATTITUDE:
+        frail.append("Margins of a linear loop.")
+    if any(claim.kind == "inertia" and claim.outcome == "proved" for claim in claims):
+        robustness.append(f"Proved with {HEADINGS['inertia']}, see {CERTIFICATES}.")
+    pedigree = ["All inputs stand in one text, whose digest is told; units are checked as it is read."]
+    if review.verdicts:
+        pedigree.append(f"{reasons_given} of {len(review.verdicts)} requirements give a rationale.")
+    records = [one.id for one in review.verdicts if one.method == "inspection" and one.verdict == "met"]
+    pedigree += [f"Records of inspection: {', '.join(records)}."] if records else []
+    return {
+        "Verification": (verification, open_models),
+        "Validation": (
+            [f"The models are those of {len(sources)} publications: {'; '.join(sources)}."],
+            ["How the models compare with this spacecraft's hardware or telemetry."],
+        ),
+        "Input pedigree": (pedigree, ["Where the scenario's numbers come from, and who accepts the input data."]),
+        "Results uncertainty": (uncertainty, unknown),
+        "Results robustness": (robustness, frail),
+        "Use history": ([], ["For which missions these models were used before."]),
+        "M&S management": (
+            ["Release, text and results are fixed by the digests; the same text gives the same bits."],
+            ["Who controls changes of the scenario."],
+        ),
+        "People qualifications": ([], ["Who made and who reviewed this analysis, and their qualifications."]),
+    }
+
+
+def _released(module: Any) -> bool:
+    """Whether a model is one of starhold's own; a law made of modes is an object."""
+    return getattr(module, "__name__", type(module).__module__).startswith("starhold.")
+
+
+def _lower(text: str) -> str:
+    return f"{text[:1].lower()}{text[1:]}"
