@@ -14,7 +14,7 @@ from starhold.certification.certificate import EXACT, EXACT_SIGN, LYAPUNOV, SQUA
 from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import certificate, obligations
-from starhold.certification.evidence.pointing import find_pointed
+from starhold.certification.evidence.pointing import POINTS, find_pointed
 from starhold.certification.evidence.refuted import (
     AWAY,
     EXCEEDS,
@@ -64,6 +64,14 @@ def proved_claims(
     # What is refuted is what was asked for, where less may be proved.
     against = [claim for claim in claims if claim.outcome == "refuted"]
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
+
+
+def pointed(subject: Subject, like: Claim | None = None) -> tuple[Claim | None, str]:
+    """Return the claim of how near to the target a loop comes as it flies, or why no evidence was found. like: the claim of
+    another loop, to start as that one does, within the same limits."""
+    found = Loop(subject)
+    find_pointed(found, None if like is None or like.proof is None else like.proof.claim["numbers"])
+    return next(iter(checked(found)), None), found.failed.get(POINTS, "no proof was found")
 
 
 def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tuple[dict[str, Claim], dict[str, str]] | None:

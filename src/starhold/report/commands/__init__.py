@@ -129,7 +129,8 @@ class Command(NamedTuple):
     with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
     whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
     command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
-    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq."""
+    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. prove: the
+    study with what is proved of the pointing beside, where there is --proof."""
 
     summary: str
     suffix: str
@@ -145,6 +146,7 @@ class Command(NamedTuple):
     listed: Callable[[], Sequence[Block]] | None = None
     read: Callable[..., tuple[Any, ...]] | None = None
     proofs: bool = False
+    prove: Callable[..., Any] | None = None
 
     def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
         """The arguments of `study`: the scenario changed as options say, and the law; or those that `read` gives."""
@@ -156,16 +158,21 @@ class Command(NamedTuple):
             scenario = scenario.with_({self.options[name].key: number_or_text(value) for name, value in given.items()})
         return scenario, self.pick(scenario, *about[1:] or (None,))
 
-    def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None]) -> Result:
-        """Study the arguments that `prepare` gave, and present the result."""
+    def studying(self, proof: bool) -> Callable[..., Any]:
+        """What computes, with what is proved beside if that is asked for."""
+        return self.prove if proof and self.prove is not None else self.study
+
+    def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None], proof: bool = False) -> Result:
+        """Study the arguments that `prepare` gave, and present the result; proof: with what `prove` gives."""
+        study = self.studying(proof)
         if self.doing is None:
-            return self.present(*subject, self.study(*subject))
+            return self.present(*subject, study(*subject))
         doing = self.doing
 
         def notify(done: int, total: int, what: str) -> None:
             notice(done, total, doing.format(what) if what else "flown")
 
-        return self.present(*subject, self.study(*subject, notify))
+        return self.present(*subject, study(*subject, notify))
 
 
 def names() -> list[str]:
