@@ -1,10 +1,10 @@
 """Claims that the kernel has proved, as sentences, departures, trials and pages read them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from math import pi, sqrt
+from math import asin, pi, sqrt
 from typing import Any
 
 from flint import fmpq
@@ -115,6 +115,8 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
         shown = [Obligation(name, next(how for own, how in steps if own == name), "refuted", against)]
     else:
         told = _NUMBERS[label](numbers, loop)
+        if proved.statement.within:
+            told["funnel"] = _funnel(proved.statement.within, told["settling"], told["angle"])
     programs = {name: loop.by_digest[name] for name in given["programs"].values()}
     return Claim(
         label,
@@ -232,6 +234,13 @@ def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
         **{name: above(_exact(numbers[key])) for name, key in ends.items()},
     }
+
+
+def _funnel(within: Sequence[tuple[Fraction, Fraction]], settling: float, angle: float) -> list[tuple[float, float]]:
+    """Return times (s), each with the angle (rad) that motions do not exceed from then on, and the end last."""
+    # A little more, for floats tell the angle.
+    told = [(above(_exact(time)), 2.0 * asin(min(float(sine), 1.0)) * (1.0 + 1e-9)) for time, sine in within]
+    return [*((time, most) for time, most in told if time < settling and most > angle), (settling, angle)]
 
 
 def _exact(x: Fraction) -> Any:

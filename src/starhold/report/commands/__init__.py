@@ -159,7 +159,7 @@ class Command(NamedTuple):
         return scenario, self.pick(scenario, *about[1:] or (None,))
 
     def studying(self, proof: bool) -> Callable[..., Any]:
-        """What computes, with what is proved beside if that is asked for."""
+        """Return what computes, with what is proved beside if that is asked for."""
         return self.prove if proof and self.prove is not None else self.study
 
     def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None], proof: bool = False) -> Result:
