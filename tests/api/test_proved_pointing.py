@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import starhold as sh
+from starhold.report.attitude_plots import collect
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.studies.budget import TOGETHER
@@ -102,6 +103,25 @@ def test_a_loss_of_a_wheel_is_flown_within_what_is_proved_after_it():
     angle = np.squeeze(run["error_angle"].to_numpy())[run["time"].to_numpy() > failure.proof.settling]
     assert len(angle) > 100
     assert 0.0 < angle.max() < failure.proof.angle
+
+
+def plotted(**initial):
+    """The error angle of a flight (deg) with its times (s), and what its plot has of a bound."""
+    changes = {"initial": initial, "certify.disturbance": 1e-9, "simulation.duration": 300.0}
+    scenario = sh.scenario(HELD).with_(changes)
+    flights = sh.compare(scenario)
+    panel = collect(flights, 10_000, scenario).angle.panels[0]
+    return flights[0].recording["time"], panel.curves[0], panel.bounds
+
+
+def test_the_page_draws_the_bound_above_a_flight_that_begins_in_the_set_and_no_other():
+    times, flown, ((number, since, most),) = plotted(angles=["10 deg", 0, 0])
+    bound = most[np.searchsorted(since, times, side="right") - 1]
+    assert number == 0
+    assert since[0] == 0.0
+    assert np.count_nonzero(since < 300.0) > 3
+    assert (flown <= bound).all()
+    assert plotted(angles=["100 deg", 0, 0])[2] == ()
 
 
 def test_the_command_tells_the_proof_only_where_it_is_asked_for(held, tmp_path):

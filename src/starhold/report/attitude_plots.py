@@ -133,14 +133,13 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
         replace(positive("angle, deg", angles, within), source=("angle", degrees), bounds=tuple(funnels)),
         replace(sound(positive("rate, deg/s", speeds, slow), flights), source=("norm", "rate_error", degrees)),
     ]
-    dashed = "tolerance, and in a law's colour what is proved" if funnels else "tolerance"
-    return Plot("angle", "error angle and relative rate", panels, dashed)
+    return Plot("angle", "error angle and relative rate", panels, "tolerance, proved bound" if funnels else "tolerance")
 
 
 def funnel(flight: Flight) -> Curve | None:
     """Times (s) and the angles (rad) that the flight is proved not to exceed from each on, (2, n); None where nothing is
     proved of all of it."""
-    if len(flight.certificates) != 1 or flight.modes or flight.departures[0].get("pointing", True):
+    if flight.modes or [left.get("pointing") for left in flight.departures] != [()]:
         return None
     claim = flight.certificates[0].claim("pointing")
     return None if claim is None or claim.outcome != "proved" else np.array(claim.numbers["funnel"]).T

@@ -110,7 +110,7 @@ def _share(claim: Claim, other: Claim) -> float | None:
 
 
 def _told(claim: Claim) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What a claim is told of its loop."""
+    """Return what a claim is told of its loop."""
     proof: Any = claim.proof
     numbers, programs = proof.claim["numbers"], proof.claim["programs"]
     return {k: x for k, x in numbers.items() if k not in FOUND}, {k: x for k, x in programs.items() if k != "lyapunov"}
