@@ -313,18 +313,20 @@ def _read_run(run: xr.Dataset | str | Path) -> xr.Dataset:
 
 
 @shortly
-def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:
+def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
     """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not
-    given."""
-    return studied("failures", scenario, law)
+    given. proof: tell, too, how near to the target the loop is proved to stay after each, which takes seconds each."""
+    return studied("failures", scenario, law, proof=proof)
 
 
 @shortly
-def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> Budget:
+def budget(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> Budget:
     """Tell a law's pointing error by source: the first law if not given, at the times and windows of the [budget] table.
     Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
-    a DataFrame with every axis. InputError where nothing disturbs the loop, windows do not fit, or a motion is lost."""
-    return studied("budget", scenario, law)
+    a DataFrame with every axis. proof: prove how near to its target the loop stays, too, and each source's share of that,
+    which takes seconds each: `proof` of the result. InputError where nothing disturbs the loop, windows do not fit, or a
+    motion is lost."""
+    return studied("budget", scenario, law, proof=proof)
 
 
 @shortly
@@ -384,14 +386,14 @@ def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None)
 
 
 @shortly
-def studied(name: str, *about: Any, **options: Any) -> Any:
+def studied(name: str, *about: Any, proof: bool = False, **options: Any) -> Any:
     """Run the command of a name as a study: of a law of a scenario, or of its own subject, with its options."""
     from starhold.report.commands import command
 
     declared = command(name)
     if declared.read is None:
         about = (reading.open_scenario(about[0]), *about[1:])
-    return declared.study(*declared.prepare(*about, **options))
+    return declared.studying(proof)(*declared.prepare(*about, **options))
 
 
 @shortly
