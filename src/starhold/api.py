@@ -129,14 +129,8 @@ def campaign(
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
 
-    changes = {
-        "runs": runs,
-        "over": over,
-        "metrics": metrics,
-        "sampling": sampling,
-        "seed": seed,
-        "requirement": requirement,
-    }
+    changes: dict[str, Any] = {"runs": runs, "over": over, "metrics": metrics, "sampling": sampling}
+    changes |= {"seed": seed, "requirement": requirement}
     # Of any kind that can be gone through; a word or a table is refused by what reads it.
     plain = {
         key: list(value) if key in ("metrics", "requirement") and not isinstance(value, str | Mapping | None) else value
@@ -314,8 +308,8 @@ def _read_run(run: xr.Dataset | str | Path) -> xr.Dataset:
 
 @shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
-    """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, the first if not
-    given. proof: tell, too, how near to the target the loop is proved to stay after each, which takes seconds each."""
+    """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, or the first; proof:
+    how near to its target the loop is proved to stay after each, too, which takes seconds each."""
     return studied("failures", scenario, law, proof=proof)
 
 
@@ -332,29 +326,17 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None, proo
 @shortly
 def verify(scenario: reading.Scenario | str | Path, law: str | None = None) -> tuple[RequirementVerdict, ...]:
     """Tell which requirements of a scenario a law keeps, the first law if not given: a verdict for each [[requirement]], in
-    the order of the file, with its number, limit and margin (SI), and what it rests on. Each method is used once, and only
-    those that are asked for. InputError for any mistake in a requirement, before anything is flown."""
+    order, with number, limit and margin (SI), and what it rests on. InputError for any mistake, before anything is flown."""
     return studied("verify", scenario, law)
 
 
 @shortly
-def review(
-    scenario: reading.Scenario | str | Path, law: str | None = None, folder: str | Path | None = None, force: bool = False
-) -> Review:
-    """Gather what a review of a law shows, the first law if not given: `verdicts` on what is required, and the `evidence`:
-    flight, linear loop, certificates, and the budget and the campaign that the scenario asks for, each computed once. With a
-    folder it is written there, as review.html and review.md. InputError for any mistake in a requirement or in [campaign],
-    before anything is flown, and for a folder that holds results, unless `force`, or cannot be written."""
-    from starhold.report.commands import command
-    from starhold.report.results import open_folder, write_result
+def review(scenario: reading.Scenario | str | Path, law: str | None = None, folder: str | Path | None = None) -> Review:
+    """Gather what a review of a law shows, the first law if not given: `verdicts` and the `evidence` that they rest on; and
+    write it into a folder without results, if one is given, as review.html and review.md. InputError as of `verify`."""
+    from starhold.report.results import study_into
 
-    declared = command("review")
-    subject = declared.prepare(reading.open_scenario(scenario), law)
-    into = None if folder is None else open_folder(Path(folder), force)
-    gathered: Review = declared.study(*subject)
-    if into is not None:
-        write_result(declared.present(*subject, gathered), "review", subject[0].name, into)
-    return gathered
+    return study_into("review", (reading.open_scenario(scenario), law), None if folder is None else Path(folder))
 
 
 @shortly

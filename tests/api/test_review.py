@@ -90,8 +90,10 @@ def test_what_a_scenario_lacks_is_open(tmp_path):
     assert "has no \\[campaign\\] table" in points
     assert "There is no momentum budget" in text
     complains(starhold("review", "bare.toml", "-o", "pack", cwd=tmp_path), "results already there")
-    sh.review(tmp_path / "bare.toml", folder=tmp_path / "pack", force=True)
-    assert (tmp_path / "pack" / "review.md").read_text(encoding="utf-8") == text
+    with refused("results already there (review.html)"):
+        sh.review(tmp_path / "bare.toml", folder=tmp_path / "pack")
+    sh.review(tmp_path / "bare.toml", folder=tmp_path / "again")
+    assert (tmp_path / "again" / "review.md").read_text(encoding="utf-8") == text
 
 
 @pytest.mark.parametrize(

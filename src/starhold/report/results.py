@@ -181,6 +181,18 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
     return written
 
 
+def study_into(name: str, about: tuple[Any, ...], folder: Path | None) -> Any:
+    """Run the command of a name about something, and return what it computed, which is written into the folder, if there is
+    one. InputError, before anything is computed, where that holds results or cannot be written."""
+    declared = commands.command(name)
+    subject = declared.prepare(*about)
+    into = None if folder is None else open_folder(folder, force=False)
+    computed = declared.study(*subject)
+    if into is not None:
+        write_result(declared.present(*subject, computed), name, subject[0].name, into)
+    return computed
+
+
 def write_part(result: commands.Result, kind: str, path: Path) -> Path:
     """Write the numbers of a result ("csv") or its figure ("png"), which it has, and return the path."""
     from starhold.report.figures import save

@@ -16,7 +16,6 @@ from starhold.certification.wording import (
     coverage,
     enumerated,
     grouped,
-    left_out,
     listed,
     methods,
     reasons,
@@ -26,6 +25,7 @@ from starhold.certification.wording import (
     unclaimed,
 )
 from starhold.report.commands import Cell, Column, Table
+from starhold.report.credibility import factors_of
 from starhold.report.document import Figure, Listing, Piece, Section
 from starhold.report.text import lost_text, value_text
 
@@ -315,7 +315,7 @@ def _certificates(review: Review) -> Iterator[Piece]:
         subject, name = one.subject, one.name
         for claims in grouped(one).values():
             for claim in claims:
-                absent = enumerated(left_out(claim)) if left_out(claim) else "nothing"
+                absent = enumerated(claim.left_out) if claim.left_out else "nothing"
                 outcome = Cell(claim.outcome, claim.outcome)
                 rows.append(
                     [name, HEADINGS[claim.kind], outcome, f"{statement(claim, subject)}. By {methods(claim)}.", absent]
@@ -330,8 +330,8 @@ def _certificates(review: Review) -> Iterator[Piece]:
             continue
         first = strongest(one.claims)[0]
         covered += [f"{name}: {coverage(first, subject)} ({HEADINGS[first.kind]})."] if coverage(first, subject) else []
-        if first.outcome == "proved" and left_out(first):
-            points.append(Open(f"{name}: no proof about the motion takes in {enumerated(left_out(first))}."))
+        if first.outcome == "proved" and first.left_out:
+            points.append(Open(f"{name}: no proof about the motion takes in {enumerated(first.left_out)}."))
         # Certificates of later phases begin where this flight is not looked at.
         inside = study_of(review.evidence.scenario.body).start_inside(given) if given.step == 0 else {}
         outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
@@ -349,82 +349,11 @@ def _certificates(review: Review) -> Iterator[Piece]:
 def _credibility(review: Review) -> Iterator[Piece]:
     """Tell what is known for each factor that NASA-STD-7009 names; a level is for people to assign."""
     yield "The factors are those of NASA-STD-7009; no level is assigned, for that is left to people."
-    factors = _factors(review)
+    factors = factors_of(review, _issued(review))
     rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in factors.items()]
     yield _table("factor|known|not stated", rows)
     for name, (_, blanks) in factors.items():
         yield from (Listed(f"{name}: not stated: {_lower(blank)}") for blank in blanks)
-
-
-def _factors(review: Review) -> dict[str, tuple[list[str], list[str]]]:
-    """List what the program knows for each factor, and what it does not."""
-    from starhold.report.campaign_units import counted
-    from starhold.report.page_parts import versions
-
-    evidence = review.evidence
-    scenario, tables = evidence.scenario, evidence.scenario.table
-    parts = [evidence.entry.law, evidence.loop.body, *(fitted.part for fitted in evidence.loop.parts)]
-    foreign = [part.name for part in parts if not _released(part.module)]
-    sources = dict.fromkeys(source for part in parts for source in part.card.sources)
-    claims = [claim for one in _issued(review) for claim in one.claims]
-    proved = sum(claim.outcome == "proved" for claim in claims)
-    reasons_given = sum(bool(one.rationale) for one in review.verdicts)
-    checked = [f"The kernel checked {proved} of {len(claims)} claims as proved."] if claims else []
-    models = f"{len(parts) - len(foreign)} of {len(parts)} models are those of this release."
-    verification = [f"Computed by {versions()}.", models, *checked]
-    open_models = [f"Who verified the models of others: {', '.join(foreign)}."] if foreign else []
-    open_models += ["Which tests of the release were run here."]
-    open_models += ["The error of the integration step: starhold run --check-step tells it."]
-    uncertainty: list[str] = []
-    unknown: list[str] = ["How uncertain the numbers are that are not drawn."]
-    robustness = [f"Flown with {counted(len(tables.fault), 'fault')}."] if getattr(tables, "fault", []) else []
-    frail: list[str] = []
-    if review.has_campaign:
-        result = evidence.campaign
-        drawn = ", ".join(result.over) or "nothing but noise"
-        uncertainty.append(f"{result.runs} runs, by {result.sampling} sampling, draw {drawn}.")
-        causes = result.laws[0].drivers
-        if causes is not None:
-            robustness.append(
-                f"{causes.failures} of {counted(causes.runs, 'run')} failed, and causes of it were looked for."
-            )
-    else:
-        unknown.insert(0, "The spread of results: there is no [campaign].")
-        frail.append("What makes requirements fail: there is no [campaign].")
-    if review.has_budget and not isinstance(evidence.budget, str):
-        uncertainty.append(f"A pointing budget of {counted(len(evidence.budget.rows) - 3, 'source')}.")
-    if not isinstance(evidence.linear, str) and evidence.linear.is_stable:
-        robustness.append("Margins of gain, phase and delay of the linear loop.")
-    elif scenario.body == ATTITUDE:
-        frail.append("Margins of a linear loop.")
-    if any(claim.kind == "inertia" and claim.outcome == "proved" for claim in claims):
-        robustness.append(f"Proved with {HEADINGS['inertia']}, see {CERTIFICATES}.")
-    pedigree = ["All inputs stand in one text, whose digest is told; units are checked as it is read."]
-    if review.verdicts:
-        pedigree.append(f"{reasons_given} of {len(review.verdicts)} requirements give a rationale.")
-    records = [one.id for one in review.verdicts if one.method == "inspection" and one.verdict == "met"]
-    pedigree += [f"Records of inspection: {', '.join(records)}."] if records else []
-    return {
-        "Verification": (verification, open_models),
-        "Validation": (
-            [f"The models are those of {len(sources)} publications: {'; '.join(sources)}."],
-            ["How the models compare with this spacecraft's hardware or telemetry."],
-        ),
-        "Input pedigree": (pedigree, ["Where the scenario's numbers come from, and who accepts the input data."]),
-        "Results uncertainty": (uncertainty, unknown),
-        "Results robustness": (robustness, frail),
-        "Use history": ([], ["For which missions these models were used before."]),
-        "M&S management": (
-            ["Release, text and results are fixed by the digests; the same text gives the same bits."],
-            ["Who controls changes of the scenario."],
-        ),
-        "People qualifications": ([], ["Who made and who reviewed this analysis, and their qualifications."]),
-    }
-
-
-def _released(module: Any) -> bool:
-    """Whether a model is one of starhold's own; a law made of modes is an object."""
-    return getattr(module, "__name__", type(module).__module__).startswith("starhold.")
 
 
 def _lower(text: str) -> str:
