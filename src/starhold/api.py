@@ -129,14 +129,8 @@ def campaign(
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
 
-    changes = {
-        "runs": runs,
-        "over": over,
-        "metrics": metrics,
-        "sampling": sampling,
-        "seed": seed,
-        "requirement": requirement,
-    }
+    changes: dict[str, Any] = {"runs": runs, "over": over, "metrics": metrics, "sampling": sampling}
+    changes |= {"seed": seed, "requirement": requirement}
     # Of any kind that can be gone through; a word or a table is refused by what reads it.
     plain = {
         key: list(value) if key in ("metrics", "requirement") and not isinstance(value, str | Mapping | None) else value
@@ -313,17 +307,20 @@ def _read_run(run: xr.Dataset | str | Path) -> xr.Dataset:
 
 
 @shortly
-def failures(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Failure]:
-    """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, or the first."""
-    return studied("failures", scenario, law)
+def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
+    """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, or the first; proof:
+    how near to its target the loop is proved to stay after each, too, which takes seconds each."""
+    return studied("failures", scenario, law, proof=proof)
 
 
 @shortly
-def budget(scenario: reading.Scenario | str | Path, law: str | None = None) -> Budget:
+def budget(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> Budget:
     """Tell a law's pointing error by source: the first law if not given, at the times and windows of the [budget] table.
     Each source flies alone, and all together, in as many runs as the table says; `level(source, index)` is in rad, `table()`
-    a DataFrame with every axis. InputError where nothing disturbs the loop, windows do not fit, or a motion is lost."""
-    return studied("budget", scenario, law)
+    a DataFrame with every axis. proof: prove how near to its target the loop stays, too, and each source's share of that,
+    which takes seconds each: `proof` of the result. InputError where nothing disturbs the loop, windows do not fit, or a
+    motion is lost."""
+    return studied("budget", scenario, law, proof=proof)
 
 
 @shortly
@@ -371,14 +368,14 @@ def modal_roots(scenario: reading.Scenario | str | Path, law: str | None = None)
 
 
 @shortly
-def studied(name: str, *about: Any, **options: Any) -> Any:
+def studied(name: str, *about: Any, proof: bool = False, **options: Any) -> Any:
     """Run the command of a name as a study: of a law of a scenario, or of its own subject, with its options."""
     from starhold.report.commands import command
 
     declared = command(name)
     if declared.read is None:
         about = (reading.open_scenario(about[0]), *about[1:])
-    return declared.study(*declared.prepare(*about, **options))
+    return declared.studying(proof)(*declared.prepare(*about, **options))
 
 
 @shortly

@@ -1,6 +1,7 @@
 """What sentences say is no more than the numbers of their claims."""
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -85,3 +86,14 @@ def test_names_are_no_markup(capsys):
     assert "[/red]" in shown_there
     assert "\\ud800" in shown_there
     assert "\x1b[31m" not in shown_there
+
+
+@pytest.mark.parametrize(("ideal", "outcome"), [(("a", "b"), "proved"), (("a",), "undecided"), (("b",), "undecided")])
+def test_what_is_undecided_of_fewer_parts_does_not_count_beside_the_loop_that_flies(ideal, outcome):
+    def about(kind, found, absent):
+        return replace(claim(kind, found), assumptions=tuple(f"without:environment {name}" for name in absent))
+
+    claims = (about("pointing", "proved", ("a",)), about("convergence", "undecided", ideal))
+    assert Certificate("here", {}, claims).outcome == outcome
+    refuted = (*claims, about("torque-limit", "refuted", ("a", "b")))
+    assert Certificate("here", {}, refuted).outcome == "refuted"

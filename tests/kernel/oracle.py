@@ -2,40 +2,15 @@
 kernel. It looks at the equations at random states, and at no evidence."""
 
 import math
-from fractions import Fraction
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import least_squares
 
-from tests.kernel.flights import Fleet, Noise, Surroundings, cross, turn
+from tests.kernel.driven import Driven
+from tests.kernel.flights import Fleet, Surroundings, cross, turn
+from tests.kernel.programs import number, run
 
 STEP = 1e-6
-PLAIN = {
-    "plus": lambda a, b: a + b,
-    "minus": lambda a, b: a - b,
-    "product": lambda a, b: a * b,
-    "divide": lambda a, b: a / b,
-    "negative": lambda a: -a,
-    "sqrt": math.sqrt,
-    "less": lambda a, b: a < b,
-    "less_equal": lambda a, b: a <= b,
-    "select": lambda t, a, b: a if t else b,
-    "both": lambda a, b: a and b,
-    "either": lambda a, b: a or b,
-    "opposite": lambda a: not a,
-}
-
-
-def number(text):
-    return float.fromhex(text) if "x" in text else float(Fraction(text))
-
-
-def run(program, given):
-    values = [given[name] for name in program["inputs"]]
-    for name, *operands in program["steps"]:
-        values.append(number(operands[0]) if name == "constant" else PLAIN[name](*(values[k] for k in operands)))
-    return np.array([values[k] for k in program["outputs"]], dtype=float)
 
 
 def turned(rng, least=-1.0):
@@ -47,7 +22,7 @@ def turned(rng, least=-1.0):
             return q
 
 
-class Oracle:
+class Oracle(Driven):
     def __init__(self, content, claim, seed=0):
         self.claim, self.rng = claim, np.random.default_rng(seed)
         self.programs = {role: content["programs"][name] for role, name in claim["programs"].items()}
@@ -331,44 +306,6 @@ class Oracle:
             if k * n["period"] > n["settling"] and off.any():
                 return False
         return self.contents(V0, level)
-
-    def errors(self, role):
-        """The matrix by which a program multiplies errors and noise."""
-        program, zero = self.programs[role], dict.fromkeys(self.programs[role]["inputs"], 0.0)
-        names = [f"errors.{k // 3}.{k % 3}" for k in range(len(program["outputs"]) - 6)]
-        names += [name for name in zero if name.startswith("noise")]
-        return np.array([run(program, zero | {name: 1.0} if name in zero else zero) for name in names]).T
-
-    def noise(self, lanes, rng):
-        """Errors that noise drives in many lanes."""
-        every, corrected = int(self.numbers["every"]), self.errors("errors corrected")
-        carried = self.errors("errors carried") if every > 1 else corrected
-        return Noise(carried, corrected, every, lanes, rng)
-
-    def radii(self):
-        """Which errors of attitude and rate, and which rates and turns that they cause, are told to be rare."""
-        n = self.numbers
-        return np.array([n["noise.attitude"], n["noise.rate"], *map(number, self.claim["evidence"]["swayed"])])[:, None]
-
-    def held(self):
-        """The motion of (w, q) near rest over a period, and by how much torques that are held drive it."""
-        (C, K), zero = self.linear(), np.zeros((3, 3))
-        N = np.linalg.inv(self.J)
-        drift = np.block([[zero, zero, N], [np.eye(3) / 2, zero, zero], [np.zeros((3, 9))]])
-        Phi = expm(drift * self.numbers["period"])[:6]
-        return Phi[:, :6] - Phi[:, 6:] @ np.hstack([C, K]), Phi[:, 6:], C, K
-
-    def largest_errors(self, lanes, samples, begun=2500):
-        """The largest errors of attitude and rate in spans of so many samples, once they have settled, and the largest rates
-        and turns that they cause in the linear motion."""
-        noise, (A, B, C, K) = self.noise(lanes, np.random.default_rng(2)), self.held()
-        x, most = np.zeros((6, lanes)), np.zeros((4, lanes))
-        for k in range(-begun, samples):
-            told, rate = noise.told()
-            sizes = [np.linalg.norm(part, axis=0) for part in (told, rate, x[:3], x[3:])]
-            x = A @ x - B @ (C @ rate + K @ told / 2)
-            most = np.maximum(most, sizes) if k >= 0 else most
-        return most
 
     def border(self, V0, rest):
         """A state of the set's border, of which rest is the part of V that it has at rest."""

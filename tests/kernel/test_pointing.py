@@ -12,6 +12,7 @@ import pytest
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Chain
+from starhold.certification.proofs import checked
 from starhold.kernel.check import check
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
@@ -239,3 +240,18 @@ def test_no_flight_leaves_what_is_proved_and_some_come_near(name, reached):
         assert np.linalg.norm(rate, axis=0)[ended].max() <= n["end.rate"]
         assert V.lyapunov(attitude, rate).max() <= n["highest"]
     assert reached * n["end.angle"] <= worst <= n["end.angle"]
+
+
+@pytest.mark.parametrize("name", leading(["cubesat", "skew", "calm"]))
+def test_flights_from_the_set_stay_in_the_funnel_and_the_funnel_is_not_wide(name):
+    (claim,) = checked(flying(name))
+    times, angles = np.array(claim.numbers["funnel"]).T
+    assert (times[0], times[-1], angles[-1]) == (0.0, claim.numbers["settling"], claim.numbers["angle"])
+    assert (np.diff(times) > 0.0).all()
+    assert (np.diff(angles) < 0.0).all()
+    told = POINTING[name][1]
+    fleet, closest = fleet_of(name, *told[:2]), 0.0
+    for k, attitude, _ in fleet.fly(*fleet.at_rest(told[2]), int(1.2 * times[-1] / fleet.h)):
+        most = angles[np.searchsorted(times, k * fleet.h, side="right") - 1]
+        closest = max(closest, float(turn(attitude).max()) / most)
+    assert 0.7 < closest <= 1.0

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from starhold.algebra.vector import ZERO
-from starhold.certification.certificate import Claim
+from starhold.certification.certificate import WITHOUT, Claim
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
@@ -100,8 +100,6 @@ def _turning(span: Any) -> Unmet:
 
 UNLIMITED, WHEELS, FRICTIONLESS = "unlimited-torque", "unlimited-wheels", "frictionless-wheels"
 UNLIMITED_CONTROL, IN_THE_PLANE, LINEAR = "unlimited-control", "in-the-plane", "linear-motion"
-WITHOUT = "without:"
-"""Begins the identifier of the assumption that a part is not there, role and name."""
 HAS = "the loop has the "
 """Begins the words for a part that a claim leaves out, role and name."""
 # What keeps measurement and actuators from being ideal is a part, which is left out by name.

@@ -80,11 +80,18 @@ class Claim:
             return "refuted"
         return "proved" if found == {"proved"} else "undecided"
 
+    @property
+    def left_out(self) -> list[str]:
+        """The parts of the loop that it is not about, each as role and name."""
+        return [name.removeprefix(WITHOUT) for name in self.assumptions if name.startswith(WITHOUT)]
+
     def refutation(self) -> Obligation | None:
         """The first obligation that is refuted."""
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
+WITHOUT = "without:"
+"""Begins the identifier of the assumption that a part is not there, role and name."""
 BESIDE = ("sampling", "control-limit", "saturated-axis")
 """Kinds of claims about a control loop that say nothing of where its motion ends, and go with one that does."""
 
@@ -105,11 +112,14 @@ class Certificate:
 
     @property
     def outcome(self) -> Outcome:
-        """Refuted if a claim is, undecided if one is or none is made of where the motion ends."""
-        found = {claim.outcome for claim in self.claims}
+        """Refuted if a claim is, undecided if one is or none is made of where the motion ends; but what is undecided of a
+        loop of fewer parts does not count where it is proved how near to its target the loop comes."""
+        flown = [set(claim.left_out) for claim in self.claims if claim.kind == "pointing" and claim.outcome == "proved"]
+        decided = [c for c in self.claims if c.outcome != "undecided" or not any(own < set(c.left_out) for own in flown)]
+        found = {claim.outcome for claim in decided}
         if "refuted" in found:
             return "refuted"
-        ends = any(claim.kind not in BESIDE for claim in self.claims)
+        ends = any(claim.kind not in BESIDE for claim in decided)
         return "proved" if ends and found == {"proved"} else "undecided"
 
     @property

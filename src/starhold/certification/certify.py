@@ -15,7 +15,7 @@ from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED,
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.evidence.pointing import POINTS
 from starhold.certification.openness import named
-from starhold.certification.proofs import HELD_AND_PUSHED, proved_claims
+from starhold.certification.proofs import HELD_AND_PUSHED, pointed, proved_claims
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
@@ -29,7 +29,8 @@ class Wanted:
     rate: convergence from every attitude and rates up to this (rad/s; inf for any); turn: torque within its limit on every
     turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of a torque nobody models (N m);
     momentum: norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; pointing: how
-    near to the target the loop comes as it flies, which takes seconds, and is wanted with a disturbance in any case."""
+    near to the target the loop comes as it flies, which takes seconds, and is wanted with a disturbance in any case; alone:
+    nothing but that; like: that as the claim of another loop starts, within the same limits."""
 
     rate: float | None = None
     slew_angle: float | None = None
@@ -37,6 +38,8 @@ class Wanted:
     disturbance: float = 0.0
     momentum: float | None = None
     pointing: bool = False
+    alone: bool = False
+    like: Claim | None = None
 
 
 BEST = Wanted()
@@ -78,7 +81,10 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
     sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
     if loop.remembers and loop.law.lyapunov is not None:
         claims.append(undecided("convergence", EVERYWHERE, subject, "the law keeps a memory from call to call"))
-    if sound and not loop.remembers:
+    if sound and not loop.remembers and wanted.alone:
+        claim, reason = pointed(subject, wanted.like)
+        claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
+    elif sound and not loop.remembers:
         pointing = wanted.pointing or wanted.disturbance > 0.0
         told = wanted.slew_angle, wanted.rate, wanted.inertia_tolerance
         proved, failed = proved_claims(subject, *told, pointing)

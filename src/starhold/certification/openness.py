@@ -12,8 +12,7 @@ import numpy as np
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import Vector, apply, norm, scale
-from starhold.certification.assumptions import WITHOUT
-from starhold.certification.certificate import Claim
+from starhold.certification.certificate import WITHOUT, Claim
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, NO_ERRORS, Envelope, Errors, Noise, Push, Recursion
 from starhold.parts.craft import tensor

@@ -1,10 +1,10 @@
 """Claims that the kernel has proved, as sentences, departures, trials and pages read them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from math import pi, sqrt
+from math import asin, pi, sqrt
 from typing import Any
 
 from flint import fmpq
@@ -14,7 +14,7 @@ from starhold.certification.certificate import EXACT, EXACT_SIGN, LYAPUNOV, SQUA
 from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.finding import certificate, obligations
-from starhold.certification.evidence.pointing import find_pointed
+from starhold.certification.evidence.pointing import POINTS, find_pointed
 from starhold.certification.evidence.refuted import (
     AWAY,
     EXCEEDS,
@@ -66,6 +66,14 @@ def proved_claims(
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
 
 
+def pointed(subject: Subject, like: Claim | None = None) -> tuple[Claim | None, str]:
+    """Return the claim of how near to the target a loop comes as it flies, or why no evidence was found. like: the claim of
+    another loop, to start as that one does, within the same limits."""
+    found = Loop(subject)
+    find_pointed(found, None if like is None or like.proof is None else like.proof.claim["numbers"])
+    return next(iter(checked(found)), None), found.failed.get(POINTS, "no proof was found")
+
+
 def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tuple[dict[str, Claim], dict[str, str]] | None:
     """Return the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) end on
     target, where it is proved, and the one about torque held between samples, by their kinds, and why others were not found;
@@ -107,6 +115,8 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
         shown = [Obligation(name, next(how for own, how in steps if own == name), "refuted", against)]
     else:
         told = _NUMBERS[label](numbers, loop)
+        if proved.statement.within:
+            told["funnel"] = _funnel(proved.statement.within, told["settling"], told["angle"])
     programs = {name: loop.by_digest[name] for name in given["programs"].values()}
     return Claim(
         label,
@@ -224,6 +234,13 @@ def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
         **{name: above(_exact(numbers[key])) for name, key in ends.items()},
     }
+
+
+def _funnel(within: Sequence[tuple[Fraction, Fraction]], settling: float, angle: float) -> list[tuple[float, float]]:
+    """Return times (s), each with the angle (rad) that motions do not exceed from then on, and the end last."""
+    # A little more, for floats tell the angle.
+    told = [(above(_exact(time)), 2.0 * asin(min(float(sine), 1.0)) * (1.0 + 1e-9)) for time, sine in within]
+    return [*((time, most) for time, most in told if time < settling and most > angle), (settling, angle)]
 
 
 def _exact(x: Fraction) -> Any:

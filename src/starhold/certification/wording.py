@@ -7,7 +7,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import Any, cast
 
-from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS, WITHOUT
+from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
 from starhold.certification.certificate import FILE, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.laws.catalogue import file_of, known_law
@@ -54,7 +54,7 @@ def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
     """The claim in a sentence, whether or not it is proved, with the assumption about the loop's limits that decides it.
     Numbers that are refuted are rounded to say no less."""
     # What a loop has and a claim leaves out decides what the claim is worth.
-    absent = left_out(claim)
+    absent = claim.left_out
     return (f"without {enumerated(absent)}, " if absent else "") + statement(claim, subject)
 
 
@@ -64,27 +64,22 @@ def statement(claim: Claim, subject: Mapping[str, Any]) -> str:
     return _unbounded(claim, subject) + _SENTENCES[claim.kind](numbers, subject)
 
 
-def left_out(claim: Claim) -> list[str]:
-    """The parts of the loop that a claim is not about, each as role and name."""
-    return [name.removeprefix(WITHOUT) for name in claim.assumptions if name.startswith(WITHOUT)]
-
-
 def ranked(certificate: Certificate) -> list[Claim]:
     """The claims, those that leave out the fewest parts of the loop first."""
-    return sorted(certificate.claims, key=lambda claim: len(left_out(claim)))
+    return sorted(certificate.claims, key=lambda claim: len(claim.left_out))
 
 
 def strongest(claims: Sequence[Claim]) -> list[Claim]:
     """The claims, those about the motion before those about its linear form; of these the proved first, then those that
     leave out the fewest parts of the loop."""
-    return sorted(claims, key=lambda claim: (claim.kind == "sampling", claim.outcome != "proved", len(left_out(claim))))
+    return sorted(claims, key=lambda claim: (claim.kind == "sampling", claim.outcome != "proved", len(claim.left_out)))
 
 
 def grouped(certificate: Certificate) -> dict[str, list[Claim]]:
     """The claims as they are ranked, those that leave out the same parts under a text that says which."""
     groups: dict[str, list[Claim]] = {}
     for claim in ranked(certificate):
-        absent = left_out(claim)
+        absent = claim.left_out
         without = f"without {enumerated(absent)}" if absent else ""
         groups.setdefault(", ".join(filter(None, (coverage(claim, certificate.subject), without))), []).append(claim)
     return groups
@@ -92,7 +87,7 @@ def grouped(certificate: Certificate) -> dict[str, list[Claim]]:
 
 def coverage(claim: Claim, subject: Mapping[str, Any]) -> str:
     """How many of the loop's parts a claim takes in; empty where that is not told of the loop."""
-    count, absent = subject.get("parts"), len(left_out(claim))
+    count, absent = subject.get("parts"), len(claim.left_out)
     if not count:
         return ""
     if absent:

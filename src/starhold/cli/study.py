@@ -83,6 +83,7 @@ def command_of(name: str) -> Any:
                 raise InputError(name, f"--{key}", str(path), f"the name of a PNG file, such as {key}.png")
             if key == "output" and path.exists() and not force:
                 raise InputError(str(path), "", "a file that exists", "another name, or --force")
+        proof = given.pop("proof", False)
         about = [given.pop(key) for key in ("file", "law") if key in given]
         if about == [None] and declared.listed is not None:
             print_blocks(declared.listed())
@@ -94,7 +95,7 @@ def command_of(name: str) -> Any:
         if declared.suffix:
             folder = open_folder(output or Path("results") / f"{title}-{declared.suffix}", force)
         with _progress(declared) as notice:
-            result = declared.result(subject, notice)
+            result = declared.result(subject, notice, proof)
         print_blocks(result.blocks)
         written = write_result(result, name, title, folder) if declared.suffix else dict[str, Path]()
         for key, path in paths.items():
@@ -109,7 +110,7 @@ def command_of(name: str) -> Any:
     kinds = _parameters(declared)
     defaults: dict[str, Any] = {key: option.default for key, option in declared.options.items()}
     defaults |= {"file": inspect.Parameter.empty} if declared.listed is None else {}
-    defaults |= {"force": False, "allow_unstable": False, "rocq": False}
+    defaults |= {"proof": False, "force": False, "allow_unstable": False, "rocq": False}
     parameters = [
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=defaults.get(key))
         for key, kind in kinds.items()
@@ -133,6 +134,9 @@ def _parameters(declared: Command) -> dict[str, Any]:
         kind = Path if option.file else int if option.whole else str
         shown = typer.Option(*flags, metavar=metavar, help=option.help)
         kinds[key] = Annotated[kind if option.default else kind | None, shown]
+    if declared.prove is not None:
+        shown = typer.Option("--proof", help="prove how near to the target the loop stays, beside; this takes seconds")
+        kinds["proof"] = Annotated[bool, shown]
     if declared.suffix:
         subject = "SCENARIO" if declared.read is None else "SYSTEM"
         kinds["output"] = Annotated[Path | None, results_in(f"{subject}-{declared.suffix}")]

@@ -51,12 +51,14 @@ ASSUMPTIONS = {
 
 @dataclass(frozen=True)
 class Statement:
-    """A sentence, the identifiers of what it assumes, a label of what it is about, and whether it refutes such a claim."""
+    """A sentence, the identifiers of what it assumes, a label of what it is about, and whether it refutes such a claim.
+    within: times (s), and the sines of half the angles to the target that motions do not exceed from then on."""
 
     text: str
     assumptions: tuple[str, ...]
     label: str = ""
     refutes: bool = False
+    within: tuple[tuple[Fraction, Fraction], ...] = ()
 
     def written(self) -> str:
         """Return the sentence with its assumptions."""

@@ -125,13 +125,24 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
     degrees = 180.0 / np.pi
     angles = [thin(error_angle(flight.recording["attitude_error"]) * degrees, factor) for flight in flights]
     speeds = [thin(np.linalg.norm(flight.recording["rate_error"], axis=1) * degrees, factor) for flight in flights]
+    proved = [None if scenario.table.fault else funnel(flight) for flight in flights]
+    funnels = [(number, one[0], one[1] * degrees) for number, one in enumerate(proved) if one is not None]
     settling = scenario.table.settling
     within, slow = (settling.attitude_tolerance * degrees,), (settling.rate_tolerance * degrees,)
     panels = [
-        replace(positive("angle, deg", angles, within), source=("angle", degrees)),
+        replace(positive("angle, deg", angles, within), source=("angle", degrees), bounds=tuple(funnels)),
         replace(sound(positive("rate, deg/s", speeds, slow), flights), source=("norm", "rate_error", degrees)),
     ]
-    return Plot("angle", "error angle and relative rate", panels, "tolerance")
+    return Plot("angle", "error angle and relative rate", panels, "tolerance, proved bound" if funnels else "tolerance")
+
+
+def funnel(flight: Flight) -> Curve | None:
+    """Times (s) and the angles (rad) that the flight is proved not to exceed from each on, (2, n); None where nothing is
+    proved of all of it."""
+    if flight.modes or [left.get("pointing") for left in flight.departures] != [()]:
+        return None
+    claim = flight.certificates[0].claim("pointing")
+    return None if claim is None or claim.outcome != "proved" else np.array(claim.numbers["funnel"]).T
 
 
 def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:

@@ -1,4 +1,4 @@
-"""The factors by which NASA-STD-7009 tells the credibility of simulations: what the program knows, and what it does not."""
+"""The factors of credibility that NASA-STD-7009 names: what the program knows of each, and what it does not."""
 
 from __future__ import annotations
 

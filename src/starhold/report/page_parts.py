@@ -205,6 +205,7 @@ def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, 
         "levels": rounded(panel.levels),
         "span": None if panel.span is None else rounded(panel.span),
         "source": panel.source,
+        **({"bounds": [[number, *map(rounded, curves)] for number, *curves in panel.bounds]} if panel.bounds else {}),
     }
 
 

@@ -53,6 +53,8 @@ class Panel:
     """What a page makes the curves of when it flies again: ("column", recorded quantity, component, factor), ("norm",
     quantity, factor), ("angle", factor), ("turn", 0 roll, 1 pitch, 2 yaw) or ("acceleration", component, factor); nothing
     for curves that stay."""
+    bounds: tuple[tuple[int, Curve, Curve], ...] = ()
+    """Of flights, by their numbers, times and what is proved not to be exceeded from each on, dashed in their colours."""
 
     def decades(self) -> float:
         """The number of decades that a logarithmic panel spans."""

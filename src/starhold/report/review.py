@@ -16,7 +16,6 @@ from starhold.certification.wording import (
     coverage,
     enumerated,
     grouped,
-    left_out,
     listed,
     methods,
     reasons,
@@ -316,7 +315,7 @@ def _certificates(review: Review) -> Iterator[Piece]:
         subject, name = one.subject, one.name
         for claims in grouped(one).values():
             for claim in claims:
-                absent = enumerated(left_out(claim)) if left_out(claim) else "nothing"
+                absent = enumerated(claim.left_out) if claim.left_out else "nothing"
                 outcome = Cell(claim.outcome, claim.outcome)
                 rows.append(
                     [name, HEADINGS[claim.kind], outcome, f"{statement(claim, subject)}. By {methods(claim)}.", absent]
@@ -331,8 +330,8 @@ def _certificates(review: Review) -> Iterator[Piece]:
             continue
         first = strongest(one.claims)[0]
         covered += [f"{name}: {coverage(first, subject)} ({HEADINGS[first.kind]})."] if coverage(first, subject) else []
-        if first.outcome == "proved" and left_out(first):
-            points.append(Open(f"{name}: no proof about the motion takes in {enumerated(left_out(first))}."))
+        if first.outcome == "proved" and first.left_out:
+            points.append(Open(f"{name}: no proof about the motion takes in {enumerated(first.left_out)}."))
         # Certificates of later phases begin where this flight is not looked at.
         inside = study_of(review.evidence.scenario.body).start_inside(given) if given.step == 0 else {}
         outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.pointing import ProvedPointing
 
 LOOP, TOGETHER, COMBINED = "the loop itself", "all together", "root sum square"
 SMALL = math.radians(5.0)
@@ -95,6 +96,8 @@ class Budget:
     """The loop itself, each source, their root sum square, all together."""
     required: Mapping[str, float]
     """The largest level (rad) of an index that is allowed, by the index."""
+    proof: ProvedPointing | None = None
+    """What is proved of the pointing, and each source's share of that, where it was asked for."""
 
     @property
     def axis(self) -> str:
@@ -128,7 +131,9 @@ class Budget:
 
     def summary(self) -> dict[str, Any]:
         """All numbers as JSON has them: settings, and levels (rad) by source and index."""
+        proof = {} if self.proof is None else {"proof": asdict(self.proof)}
         return {
+            **proof,
             **asdict(self.settings),
             "axis": self.axis,
             "required": dict(self.required),
@@ -166,7 +171,7 @@ def study(
     `notice` hears the number done, that of all, and the flight that comes next. InputError where nothing disturbs the loop,
     the windows do not fit into the run, or a motion is lost."""
     required = {one.metric.upper(): one.bound for one in check_budget(scenario)}
-    scenario = scenario.about("rigid-body").with_({"fault": None, "campaign": None, "requirement": None})
+    scenario = faultless(scenario)
     disturbing, clock = sources(scenario), _Clock.of(scenario)
     if not disturbing:
         allowed = "noise, a torque, wheel friction or another source of error"
@@ -175,10 +180,7 @@ def study(
     flown: list[tuple[Array, Array | None]] = []
     for done, name in enumerate(names):
         notice(done, len(names), name)
-        away = [source for source in disturbing if name not in (source.name, TOGETHER)]
-        changes = {key: value for source in away for key, value in source.without.items()}
-        gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
-        loop = build(scenario.with_(changes), _without_effectors(entry, gone))
+        loop = without(scenario, entry, [source for source in disturbing if name not in (source.name, TOGETHER)])
         flown.append(_flown(scenario, loop, entry, clock, name))
     notice(len(names), len(names), "")
     largest = max(float(np.linalg.norm(errors, axis=-1).max()) for errors, _ in flown)
@@ -202,6 +204,18 @@ def study(
     }
     rows.insert(-1, Contribution(COMBINED, "combined", combined))
     return Budget(scenario.name, entry.name, clock.settings, tuple(rows), required)
+
+
+def faultless(scenario: Scenario) -> Scenario:
+    """The scenario as its budget flies it."""
+    return scenario.about("rigid-body").with_({"fault": None, "campaign": None, "requirement": None})
+
+
+def without(scenario: Scenario, entry: LawEntry, away: Sequence[Source]) -> ClosedLoop:
+    """The loop of a law without some sources."""
+    changes = {key: value for source in away for key, value in source.without.items()}
+    gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
+    return build(scenario.with_(changes), _without_effectors(entry, gone))
 
 
 def check_budget(scenario: Scenario) -> tuple[Requirement, ...]:

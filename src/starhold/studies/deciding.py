@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from starhold.analysis.margins import margins
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
-from starhold.certification.wording import enumerated, left_out, sentence
+from starhold.certification.wording import enumerated, sentence
 from starhold.errors import InputError
 from starhold.scenario.checking import show
 from starhold.studies.body import study_of
@@ -129,7 +129,7 @@ def _proved(
         why = _late(scenario, key, table, claim) if kind == POINTING else ""
         if why:
             continue
-        absent = [*([enumerated(left_out(claim))] if left_out(claim) else []), *changes]
+        absent = [*([enumerated(claim.left_out)] if claim.left_out else []), *changes]
         absent += [text for assumed, text in IDEAL.items() if assumed in claim.assumptions]
         number = claim.numbers.get(name)
         most = max((x for x in number if x is not None), default=None) if isinstance(number, list) else number

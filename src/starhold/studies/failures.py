@@ -24,6 +24,7 @@ from starhold.scenario.designing import written
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
 from starhold.studies.bodies.rigid_body import certify_law
+from starhold.studies.pointing import ProvedPointing, prove_pointing
 from starhold.synthesis.stability_degree import degree, scale
 
 Array: TypeAlias = NDArray[np.float64]
@@ -80,6 +81,8 @@ class Failure:
     flown: float | None = None
     orbit: float | None = None
     refused: str = ""
+    proof: ProvedPointing | None = None
+    """How near to the target the loop is proved to stay, where that was asked for and the loop flies."""
 
     @property
     def name(self) -> str:
@@ -93,13 +96,17 @@ class Failure:
 
 
 def study(
-    scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
+    scenario: Scenario,
+    entry: LawEntry,
+    notice: Callable[[int, int, str], None] = lambda done, total, name: None,
+    proof: bool = False,
 ) -> list[Failure]:
     """The intact set, then every single and every double loss, flown with a law of the scenario in place of its own faults.
 
     The loss comes at time 0 and is known at once: the torque is shared out among the wheels left and, where the law was
     designed for a degree of stability, its gains are designed for the torque left. `notice` hears the number done, that of
-    all, and the loss that comes next. InputError where the scenario has no wheels."""
+    all, and the loss that comes next. proof: prove how near to the target each loop stays, too.
+    InputError where the scenario has no wheels."""
     wheels = require_wheels(scenario)
     count = len(wheels.axes)
     losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
@@ -110,9 +117,16 @@ def study(
         failure = _left(wheels, lost, intact)
         notice(done, len(losses), failure.name)
         failure = replace(failure, eta_intact=eta)
-        failures.append(_flown(scenario, entry, failure) if failure.controllable else failure)
+        failures.append(_flown(scenario, entry, failure, proof) if failure.controllable else failure)
     notice(len(losses), len(losses), "")
     return failures
+
+
+def study_with_proof(
+    scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
+) -> list[Failure]:
+    """The failures of `study`, with how near to the target each loop is proved to stay, which takes seconds each."""
+    return study(scenario, entry, notice, proof=True)
 
 
 def directions_lacking(axes: Array) -> Array:
@@ -173,7 +187,7 @@ def _degree(scenario: Scenario, entry: LawEntry, gains: Any) -> float | None:
     return float(degree(*units.scaled(gains.k_attitude[0], gains.k_rate), units.ratios)) / units.t0
 
 
-def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
+def _flown(scenario: Scenario, entry: LawEntry, failure: Failure, proof: bool = False) -> Failure:
     table = scenario.table
     retune = _designed(entry) and 0.0 < failure.authority < math.inf
     faults = [
@@ -212,7 +226,16 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
         momentum_share=float(np.abs(filled).max()),
         flown=float(recording["time"][-1]),
         orbit=period,
+        proof=prove_pointing(scenario, _after(loop)) if proof else None,
     )
+
+
+def _after(loop: ClosedLoop) -> ClosedLoop:
+    """The loop that flies from the loss on, which its law knows of."""
+    if not loop.events:
+        return loop
+    last = loop.events[-1]
+    return replace(loop, events=(), craft=last.craft, gains=last.gains, parts=last.parts)
 
 
 def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[float, float] | None:

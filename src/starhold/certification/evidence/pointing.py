@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib import import_module
@@ -23,6 +24,7 @@ from starhold.kernel.held import Held, near_target
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
 from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Region, widened
+from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import image, periods, points
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
@@ -193,15 +195,22 @@ class Chain:
         return 2.0 * half * MORE if half < 1.0 else inf, fastest
 
 
-def find_pointed(loop: Loop) -> bool:
+def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
     """Find how near the loop comes to its target against what its parts do, and what is asked for beside, within its limits
-    if that is found: from the largest turns, at the rate of the loop's start or from rest."""
-    begun = loop.loop.without("sensor", "estimator")
-    shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
-    rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
-    tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
-    # Against more noise than can be shown, without it.
-    for noisy in [True] * (driven_errors(loop.loop) is not None) + [False]:
+    if that is found: from the largest turns, at the rate of the loop's start or from rest. like: the numbers of a claim, to
+    start as that one does, within the same limits, and with noise if it tells of noise."""
+    if like is None:
+        begun = loop.loop.without("sensor", "estimator")
+        shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
+        rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
+        tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
+        # Against more noise than can be shown, without it.
+        kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
+    else:
+        turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
+        tried = [(turn, rate, {name: x for name, x in loop.limits.items() if name in like})]
+        kinds = [SHARE in like]
+    for noisy in kinds:
         own = pushes(loop.loop, loop.known.envelope(noisy))
         against = own._replace(outside=own.outside + float(loop.known.disturbance))
         try:

@@ -10,7 +10,7 @@ from ..held import Held
 from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
-from ..regions import AT_REST, RATE, TURN, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, widened
 from ..rules import Definite, Exceeds
 from ..sentences import Statement, above, below, enumerated
 from .attitude import Proof, contents
@@ -41,6 +41,7 @@ def points(claim: Claim) -> Proof:
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(region))
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
+    within = [(Fraction(0), held.tube(region).sizes[ANGLE])]
     for k, told in enumerate(levels):
         end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
         demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
@@ -51,6 +52,7 @@ def points(claim: Claim) -> Proof:
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
         c, region = end, held.region(end)
+        within.append((h * samples, held.tube(region).sizes[ANGLE]))
     last, beside = region.X, AT_REST
     for k, told in enumerate(ellipsoids):
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
@@ -65,6 +67,7 @@ def points(claim: Claim) -> Proof:
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
         region, last, beside = region.within(X, swayed), X, swayed
+        within.append((h * samples, held.tube(region).sizes[ANGLE]))
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
     tube = held.tube(region)
     # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.
@@ -105,7 +108,7 @@ def points(claim: Claim) -> Proof:
     )
     sign = "sign-at-once" if signs else "quaternion-as-fed"
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
-    return Statement(text + said, tuple(dict.fromkeys((*assumptions, sign))), "pointing")
+    return Statement(text + said, tuple(dict.fromkeys((*assumptions, sign))), "pointing", within=tuple(within))
 
 
 def image(X: Rows, shares: Sequence[Fraction], A: Rows, pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:

@@ -115,7 +115,7 @@ function tinted(u) {
 }
 
 // Dashed levels, dotted lines where something happens, and the words above a panel.
-function guides(panel, plot) {
+function guides(panel, plot, chart) {
   return (u) => {
     const { ctx, bbox, scales: { x, y } } = u;
     const dot = devicePixelRatio, right = bbox.left + bbox.width;
@@ -135,6 +135,17 @@ function guides(panel, plot) {
     for (const level of panel.levels) {
       const high = u.valToPos(level, "y", true);
       line([bbox.left, high], [right, high], [6, 4]);
+    }
+    // What is proved is about the flight of the file.
+    for (const [number, times, most] of chart.live ? [] : panel.bounds || []) {
+      if (hidden.has(number)) continue;
+      ctx.strokeStyle = report.laws[number].colour;
+      times.forEach((time, k) => {
+        const [from, until] = [time, times[k + 1] ?? x.max].map((t) => u.valToPos(t, "x", true));
+        const [high, next] = [most[k], most[k + 1] ?? most[k]].map((angle) => u.valToPos(angle, "y", true));
+        line([from, high], [until, high], [6, 4]);
+        line([until, high], [until, next], [6, 4]);
+      });
     }
     ctx.font = `${11 * dot}px system-ui, sans-serif`;
     const inside = (report.marks || []).filter(([time]) => time >= x.min && time <= x.max);
@@ -239,7 +250,7 @@ function options(plot, panel, k, chart, size) {
       stroke: report.laws[number].colour, width: panel.widths[number], show: !hidden.has(number),
       points: { show: Boolean(plot.markers), size: 8, fill: report.laws[number].colour },
     }))],
-    hooks: { drawAxes: plot.split ? [] : [tinted], draw: [guides(panel, plot)] },
+    hooks: { drawAxes: plot.split ? [] : [tinted], draw: [guides(panel, plot, chart)] },
   };
 }
 

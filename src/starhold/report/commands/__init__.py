@@ -133,7 +133,7 @@ class Command(NamedTuple):
     whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
     command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
     a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. kinds: how
-    the files NAME.* may end."""
+    the files NAME.* may end. prove: the study with what is proved of the pointing beside, where there is --proof."""
 
     summary: str
     suffix: str
@@ -150,6 +150,7 @@ class Command(NamedTuple):
     read: Callable[..., tuple[Any, ...]] | None = None
     proofs: bool = False
     kinds: tuple[str, ...] = ("csv", "png", "xml")
+    prove: Callable[..., Any] | None = None
 
     def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
         """The arguments of `study`: the scenario changed as options say, and the law; or those that `read` gives."""
@@ -161,16 +162,21 @@ class Command(NamedTuple):
             scenario = scenario.with_({self.options[name].key: number_or_text(value) for name, value in given.items()})
         return scenario, self.pick(scenario, *about[1:] or (None,))
 
-    def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None]) -> Result:
-        """Study the arguments that `prepare` gave, and present the result."""
+    def studying(self, proof: bool) -> Callable[..., Any]:
+        """Return what computes, with what is proved beside if that is asked for."""
+        return self.prove if proof and self.prove is not None else self.study
+
+    def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None], proof: bool = False) -> Result:
+        """Study the arguments that `prepare` gave, and present the result; proof: with what `prove` gives."""
+        study = self.studying(proof)
         if self.doing is None:
-            return self.present(*subject, self.study(*subject))
+            return self.present(*subject, study(*subject))
         doing = self.doing
 
         def notify(done: int, total: int, what: str) -> None:
             notice(done, total, doing.format(what) if what else "flown")
 
-        return self.present(*subject, self.study(*subject, notify))
+        return self.present(*subject, study(*subject, notify))
 
 
 def names() -> list[str]:

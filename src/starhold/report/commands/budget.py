@@ -30,6 +30,12 @@ def present(scenario: Scenario, entry: LawEntry, budget: Budget) -> Result:
     heads = [Column(name.replace("deviation", "standard deviation"), "rad") for name in Figures._fields]
     numbers = Table([*map(Column, list(records[0])[: -len(heads)]), *heads], [list(row.values()) for row in records])
     sentences = [_setting_text(budget), *(f"{index}: {MEANINGS[index]}." for index in budget.indices)]
+    if budget.proof is not None:
+        sentences.append(budget.proof.sentence)
+    if budget.proof is not None and budget.proof.shares:
+        sentences.append(
+            "The column proved has this bound, and by how much it is lower without a source; — where it is the same."
+        )
     title = f"{budget.scenario}, {budget.law}: pointing error by source"
     blocks, summary = ["", _table(budget), *sentences], {budget.law: budget.summary()}
     outcome = "met" if budget.met else "missed"
@@ -56,12 +62,23 @@ def _table(budget: Budget) -> Table:
         rows.append(["required, at most", *(shown.get(index, "") for index in budget.indices)])
         ends.add(count)
     columns = [Column("source"), *(Column(index, unit, ".4g") for index, (unit, _) in units.items())]
+    if budget.proof is not None and budget.proof.angle is not None:
+        bounds = {**budget.proof.shares, TOGETHER: budget.proof.angle}
+        unit, size = _fitting(budget.proof.angle)
+        columns.append(Column("proved", unit, ".4g"))
+        for row in rows:
+            bound = bounds.get(row[0])
+            row.append(None if bound is None else bound / size)
     return Table(columns, rows, bold=bold, ends=ends)
 
 
 def _unit_of(budget: Budget, index: str) -> tuple[str, float]:
     """The unit that the levels of an index are shown in, and its size (rad)."""
-    largest = max(budget.level(row.name, index) for row in budget.rows)
+    return _fitting(max(budget.level(row.name, index) for row in budget.rows))
+
+
+def _fitting(largest: float) -> tuple[str, float]:
+    """The unit in which an angle (rad) is told, and its size (rad)."""
     return next((unit for unit in UNITS if largest >= LEAST * unit[1]), UNITS[-1])
 
 
@@ -109,4 +126,5 @@ COMMAND = Command(
         "runs": Option("budget.runs", "with random numbers of their own; else what the file says", whole=True),
     },
     unstable=True,
+    prove=later("studies.pointing.budget_with_proof"),
 )

@@ -25,6 +25,7 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
     sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in failures if failure.refused]
     if any(failure.certified is not None for failure in failures):
         sentences.append("certified: turns from rest on which no motor or wheel is proved to meet its limit.")
+    sentences += [f"lost {failure.name}: {failure.proof.sentence}" for failure in failures if failure.proof is not None]
     if not retuned:
         sentences.append("The gains are the same in all of them.")
     if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in failures):
@@ -39,7 +40,11 @@ def _numbers(failures: Sequence[Failure], entry: LawEntry) -> Table:
     """All numbers, with every gain."""
     gains = [Column(item.name, item.gain.unit) for item in entry.law.fields()]
     rows = [[*_cells(failure).values(), *((failure.gains or {}).get(gain.name) for gain in gains)] for failure in failures]
-    return Table([*_cells(failures[0]), *gains], rows)
+    columns = [*_cells(failures[0]), *gains]
+    if failures[0].proof is not None:
+        columns += _proof_cells(failures[0])
+        rows = [[*row, *_proof_cells(failure).values()] for row, failure in zip(rows, failures, strict=True)]
+    return Table(columns, rows)
 
 
 def _cells(failure: Failure) -> dict[Any, Any]:
@@ -70,13 +75,34 @@ def _cells(failure: Failure) -> dict[Any, Any]:
     }
 
 
+def _proof_cells(failure: Failure) -> dict[Column, Any]:
+    proof = failure.proof
+    return {
+        Column("proved angle", "rad"): proof and proof.angle,
+        Column("proved after", "s"): proof and proof.settling,
+        Column("proved share of orbits"): proof and proof.share,
+        Column("parts left out of the proof"): proof and "; ".join(proof.left_out),
+    }
+
+
 def _table(failures: Sequence[Failure], retuned: Sequence[str]) -> Table:
     designed = failures[0].eta is not None
     columns = [Column("lost"), Column("axes"), Column("cond.", "", ".3g")]
     columns += [Column("authority", "N m", ".4g"), Column("share", "%", ".1f"), *(Column(name, "", ">") for name in retuned)]
     columns += [Column("stability", "1/s, before → after", ">")] * designed
     columns += [Column("certified", "turn, °", ">"), Column("settling", "s", ".4g"), Column("wheel full", "min", ">")]
-    return Table(columns, [[failure.name, *_row(failure, retuned, designed)] for failure in failures])
+    rows = [[failure.name, *_row(failure, retuned, designed)] for failure in failures]
+    if failures[0].proof is not None:
+        columns.append(Column("proved", "within, °", ">"))
+        rows = [[*row, _proved(failure)] for row, failure in zip(rows, failures, strict=True)]
+    return Table(columns, rows)
+
+
+def _proved(failure: Failure) -> str | None:
+    from starhold.certification.wording import shown
+
+    angle = None if failure.proof is None else failure.proof.angle
+    return None if angle is None else shown(math.degrees(angle), up=True)
 
 
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[Any]:
@@ -147,4 +173,5 @@ COMMAND = Command(
     present,
     later("studies.failures.pick"),
     doing="lost: {}",
+    prove=later("studies.failures.study_with_proof"),
 )

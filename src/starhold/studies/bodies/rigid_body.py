@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
     from starhold.analysis.trial import Trial
+    from starhold.certification.certify import Wanted
     from starhold.certification.hand_over import Ends
     from starhold.loop.closed_loop import ClosedLoop, Event
     from starhold.scenario.reading import LawEntry, Scenario
@@ -129,13 +130,20 @@ def _differs(event: Event, issued: Issued) -> bool:
 def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing: bool = False) -> list[Issued]:
     """The certificates of one law of the scenario, with the claims that its [certify] table asks for: as it starts, and from
     each time on at which wheels, gains or craft are others and the law knows of it."""
-    from starhold.certification.certify import Wanted, certify
+    from starhold.certification.certify import certify
 
-    table = scenario.table.certify
-    wanted = Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum, pointing)
+    wanted = wanted_of(scenario, pointing)
     if mode_laws(loop.law, loop.gains):
         return certify_modes(loop, entry.name, wanted)
     return [Issued(certify(now, name, wanted), now, step) for name, now, step in _named(scenario, entry, loop)]
+
+
+def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
+    """The claims that the [certify] table of a scenario asks for; pointing: how near to the target, too."""
+    from starhold.certification.certify import Wanted
+
+    table = scenario.table.certify
+    return Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum, pointing)
 
 
 def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, ClosedLoop]:

@@ -1,0 +1,116 @@
+"""How near to its target a loop is proved to come, and each source's share of that bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from starhold.certification.certify import certify
+from starhold.certification.wording import left_out, sentence
+from starhold.laws.modes import mode_laws
+from starhold.studies.bodies.rigid_body import wanted_of
+from starhold.studies.budget import Budget, faultless, sources, study, without
+
+if TYPE_CHECKING:
+    from starhold.certification.certificate import Claim
+    from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import LawEntry, Scenario
+
+Notice: TypeAlias = Callable[[int, int, str], None]
+FOUND = ("level", "highest", "end.angle", "end.rate", "settling")
+"""The numbers of a claim that are found for the others."""
+
+
+@dataclass(frozen=True)
+class ProvedPointing:
+    """The bound that is proved of a loop's pointing.
+
+    text: the claim, or why there is none. angle: rad, at all times after `settling` (s); None where nothing is proved.
+    share: of orbits, None for all. left_out: parts that the claim is not about. starts_inside: whether the scenario's start
+    lies in the set from which motions are proved to come. shares: by how much (rad) the bound is lower without a source;
+    None for one that the claim does not feel, or without which no bound is found."""
+
+    text: str
+    angle: float | None = None
+    settling: float | None = None
+    share: float | None = None
+    left_out: tuple[str, ...] = ()
+    starts_inside: bool = False
+    shares: Mapping[str, float | None] = field(default_factory=dict[str, "float | None"])
+
+    @property
+    def sentence(self) -> str:
+        """All that is proved, in a sentence."""
+        if self.angle is None:
+            return f"Not proved to point: {self.text}."
+        whole = "" if self.left_out else "; no part is left out"
+        outside = "" if self.starts_inside else "; the flight begins outside of the set of this claim"
+        return f"Proved: {self.text}{whole}{outside}."
+
+
+def prove_pointing(
+    scenario: Scenario,
+    loop: ClosedLoop,
+    others: Mapping[str, Callable[[], ClosedLoop]] | None = None,
+    notice: Callable[[str], None] = lambda name: None,
+) -> ProvedPointing:
+    """Prove how near to its target a loop of a scenario comes. others: by the names of sources, what makes the loop that
+    has all but this one; `notice` hears which comes next."""
+    from starhold.analysis.departure import start_inside
+
+    if loop.nominal is not None:
+        return ProvedPointing("the law takes the craft for another one")
+    if mode_laws(loop.law, loop.gains):
+        return ProvedPointing("claims are about each mode by itself")
+    wanted = replace(wanted_of(scenario, True), alone=True)
+    certificate = certify(loop, "", wanted)
+    claim = certificate.claim("pointing")
+    if claim is None or claim.outcome != "proved":
+        reasons = [o.evidence["reason"] for one in certificate.claims for o in one.obligations if "reason" in o.evidence]
+        return ProvedPointing(next(iter(reasons), "no claim is made of such a loop"))
+    n, shares = claim.numbers, dict[str, float | None]()
+    for name, make in (others or {}).items():
+        notice(name)
+        other = certify(make(), "", replace(wanted, like=claim)).claim("pointing")
+        shares[name] = None if other is None else _share(claim, other)
+    return ProvedPointing(
+        sentence(claim, certificate.subject),
+        n["angle"],
+        n["settling"],
+        n["share"],
+        tuple(left_out(claim)),
+        start_inside(certificate, loop).get("pointing", False),
+        shares,
+    )
+
+
+def budget_with_proof(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, name: None) -> Budget:
+    """The budget of a law, and beside it what is proved of the pointing, with the share of each source, which takes seconds
+    each. `notice` hears the number done, that of all, and what comes next."""
+    budget, flown = study(scenario, entry, notice), faultless(scenario)
+    names = [source.name for source in sources(flown)]
+    others = {one.name: partial(without, flown, entry, [one]) for one in sources(flown)}
+
+    def tell(name: str) -> None:
+        notice(1 + names.index(name), len(names) + 1, f"the proof without {name}")
+
+    notice(0, len(names) + 1, "the proof")
+    proof = prove_pointing(flown, without(flown, entry, []), others, tell)
+    notice(len(names) + 1, len(names) + 1, "")
+    return replace(budget, proof=proof)
+
+
+def _share(claim: Claim, other: Claim) -> float | None:
+    if other.outcome != "proved" or _told(claim) == _told(other):
+        return None
+    # The claim against all sources holds against fewer, too.
+    return max(claim.numbers["angle"] - other.numbers["angle"], 0.0)
+
+
+def _told(claim: Claim) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return what a claim is told of its loop."""
+    proof: Any = claim.proof
+    numbers, programs = proof.claim["numbers"], proof.claim["programs"]
+    return {k: x for k, x in numbers.items() if k not in FOUND}, {k: x for k, x in programs.items() if k != "lyapunov"}

@@ -1,0 +1,49 @@
+"""Errors that noise drives, and the motion that they cause in the linear loop, of a claim as another reader has it."""
+
+import numpy as np
+from scipy.linalg import expm
+
+from tests.kernel.flights import Noise
+from tests.kernel.programs import number, run
+
+
+class Driven:
+    """What an oracle knows of them; it has numbers, programs and a claim, the inertia J, and linear()."""
+
+    def errors(self, role):
+        """The matrix by which a program multiplies errors and noise."""
+        program, zero = self.programs[role], dict.fromkeys(self.programs[role]["inputs"], 0.0)
+        names = [f"errors.{k // 3}.{k % 3}" for k in range(len(program["outputs"]) - 6)]
+        names += [name for name in zero if name.startswith("noise")]
+        return np.array([run(program, zero | {name: 1.0} if name in zero else zero) for name in names]).T
+
+    def noise(self, lanes, rng):
+        """Errors that noise drives in many lanes."""
+        every, corrected = int(self.numbers["every"]), self.errors("errors corrected")
+        carried = self.errors("errors carried") if every > 1 else corrected
+        return Noise(carried, corrected, every, lanes, rng)
+
+    def radii(self):
+        """Which errors of attitude and rate, and which rates and turns that they cause, are told to be rare."""
+        n = self.numbers
+        return np.array([n["noise.attitude"], n["noise.rate"], *map(number, self.claim["evidence"]["swayed"])])[:, None]
+
+    def held(self):
+        """The motion of (w, q) near rest over a period, and by how much torques that are held drive it."""
+        (C, K), zero = self.linear(), np.zeros((3, 3))
+        N = np.linalg.inv(self.J)
+        drift = np.block([[zero, zero, N], [np.eye(3) / 2, zero, zero], [np.zeros((3, 9))]])
+        Phi = expm(drift * self.numbers["period"])[:6]
+        return Phi[:, :6] - Phi[:, 6:] @ np.hstack([C, K]), Phi[:, 6:], C, K
+
+    def largest_errors(self, lanes, samples, begun=2500):
+        """The largest errors of attitude and rate in spans of so many samples, once they have settled, and the largest rates
+        and turns that they cause in the linear motion."""
+        noise, (A, B, C, K) = self.noise(lanes, np.random.default_rng(2)), self.held()
+        x, most = np.zeros((6, lanes)), np.zeros((4, lanes))
+        for k in range(-begun, samples):
+            told, rate = noise.told()
+            sizes = [np.linalg.norm(part, axis=0) for part in (told, rate, x[:3], x[3:])]
+            x = A @ x - B @ (C @ rate + K @ told / 2)
+            most = np.maximum(most, sizes) if k >= 0 else most
+        return most
