@@ -16,7 +16,7 @@
 
    Program of the law: sha256 851ab1c92f50234498ca20e7141e8ad0edc5898615f514d663a47b1df0e15661
 
-   Certificate: certificate.json, sha256 559cdee7d92d8fe70868160c964065cac89c1f3bb38bfae4b74eacbf2ad32516:
+   Certificate: certificate.json, sha256 131ed2f566024c5787b07713c4bbbec7ad9898b3aa8646f298e6436e1e360cf9:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
@@ -27,7 +27,7 @@
      entry of the inertia off by up to 100 % of sqrt(J_ii J_jj)
      proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
      every period up to 19.99 s
-     proved: pointing as it flies: within 0.02494° of the target after 2063 s at all times, from rest at up
+     proved: pointing as it flies: within 0.02499° of the target after 1954 s at all times, from rest at up
      to 10°, torque held for 0.1 s, with torques from outside of up to 3.486e-06 N m
    These claims assume: rigid body; exact measurement and ideal actuators; inertia exactly as given; no
    torque from outside; torque applied continuously; torque not limited; inertia within the tolerance;

@@ -14,7 +14,7 @@
 
    Program of the law: sha256 4f874e55fa16eec8b64cc78923eef683c9775f1cdd52baf71d83b3a67f9942c4
 
-   Certificate: certificate.json, sha256 4b04b39c809c9eaafdf3391aa69d34fed8d67edebf048a1144cb20a66134d757:
+   Certificate: certificate.json, sha256 6860158dceeacb39f0d70478149ac3ff65e928ed4f54a1fb0cd7080fe8576d4f:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
@@ -26,7 +26,7 @@
      rate it converges whatever the inertia of the body really is
      proved: torque held between samples: the linear loop is stable with the torque held for 0.1 s and for
      every period up to 13.62 s
-     proved: pointing as it flies: within 0.03957° of the target after 2137 s at all times, from up to 30°
+     proved: pointing as it flies: within 0.03964° of the target after 1748 s at all times, from up to 30°
      at up to 0.2449°/s, torque held for 0.1 s, with torques from outside of up to 4.628e-08 N m beside
      those that the law is told
    These claims assume: rigid body; exact measurement and ideal actuators; inertia exactly as given; no

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from starhold.certification.certify import certify
-from starhold.certification.wording import left_out, sentence
+from starhold.certification.wording import sentence
 from starhold.laws.modes import mode_laws
 from starhold.studies.bodies.rigid_body import wanted_of
 from starhold.studies.budget import Budget, faultless, sources, study, without
@@ -80,7 +80,7 @@ def prove_pointing(
         n["angle"],
         n["settling"],
         n["share"],
-        tuple(left_out(claim)),
+        tuple(claim.left_out),
         start_inside(certificate, loop).get("pointing", False),
         shares,
     )
