@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +14,7 @@ from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.studies.budget import TOGETHER
 from starhold.studies.failures import _flown, _left
-from starhold.studies.pointing import prove_pointing
+from starhold.studies.pointing import ProvedPointing, prove_pointing
 from tests.running import starhold
 
 HELD = {
@@ -96,7 +97,7 @@ def test_a_loss_of_a_wheel_is_flown_within_what_is_proved_after_it():
     """From the start of the file, which lies in the set, until long after the settling."""
     scenario = sh.scenario(WHEELED)
     left = _left(wheels_of(scenario), (1,), 1.0)
-    failure = _flown(scenario, scenario.pick(None), left, proof=True)
+    failure = _flown(scenario, scenario.pick(None), replace(left, proof=ProvedPointing("")))
     assert failure.proof.starts_inside
     fault = {"time": 0.0, "wheel": 1, "lost": True, "action": "both"}
     run = sh.simulate(scenario.with_({"fault": [fault], "simulation.duration": 3000.0}))
