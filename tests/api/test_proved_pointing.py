@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,11 +10,12 @@ import pytest
 
 import starhold as sh
 from starhold.report.attitude_plots import collect
+from starhold.report.commands.failures import present
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
 from starhold.studies.budget import TOGETHER
 from starhold.studies.failures import _flown, _left
-from starhold.studies.pointing import prove_pointing
+from starhold.studies.pointing import ProvedPointing, prove_pointing
 from tests.running import starhold
 
 HELD = {
@@ -96,13 +98,16 @@ def test_a_loss_of_a_wheel_is_flown_within_what_is_proved_after_it():
     """From the start of the file, which lies in the set, until long after the settling."""
     scenario = sh.scenario(WHEELED)
     left = _left(wheels_of(scenario), (1,), 1.0)
-    failure = _flown(scenario, scenario.pick(None), left, proof=True)
+    failure = _flown(scenario, scenario.pick(None), replace(left, proof=ProvedPointing(""), eta_intact=0.05))
     assert failure.proof.starts_inside
     fault = {"time": 0.0, "wheel": 1, "lost": True, "action": "both"}
     run = sh.simulate(scenario.with_({"fault": [fault], "simulation.duration": 3000.0}))
     angle = np.squeeze(run["error_angle"].to_numpy())[run["time"].to_numpy() > failure.proof.settling]
     assert len(angle) > 100
     assert 0.0 < angle.max() < failure.proof.angle
+    shown = present(scenario, scenario.pick(None), [failure])
+    assert f"lost 1: {failure.proof.sentence}" in shown.blocks
+    assert dict(zip(shown.numbers.heads(), shown.numbers.rows[0], strict=True))["proved angle (rad)"] == failure.proof.angle
 
 
 def plotted(**initial):

@@ -82,7 +82,7 @@ class Failure:
     orbit: float | None = None
     refused: str = ""
     proof: ProvedPointing | None = None
-    """How near to the target the loop is proved to stay, where that was asked for and the loop flies."""
+    """How near to the target the loop is proved to stay, where that was asked for."""
 
     @property
     def name(self) -> str:
@@ -116,8 +116,8 @@ def study(
     for done, lost in enumerate(losses):
         failure = _left(wheels, lost, intact)
         notice(done, len(losses), failure.name)
-        failure = replace(failure, eta_intact=eta)
-        failures.append(_flown(scenario, entry, failure, proof) if failure.controllable else failure)
+        failure = replace(failure, eta_intact=eta, proof=ProvedPointing("it does not fly") if proof else None)
+        failures.append(_flown(scenario, entry, failure) if failure.controllable else failure)
     notice(len(losses), len(losses), "")
     return failures
 
@@ -187,7 +187,7 @@ def _degree(scenario: Scenario, entry: LawEntry, gains: Any) -> float | None:
     return float(degree(*units.scaled(gains.k_attitude[0], gains.k_rate), units.ratios)) / units.t0
 
 
-def _flown(scenario: Scenario, entry: LawEntry, failure: Failure, proof: bool = False) -> Failure:
+def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     table = scenario.table
     retune = _designed(entry) and 0.0 < failure.authority < math.inf
     faults = [
@@ -226,7 +226,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure, proof: bool = 
         momentum_share=float(np.abs(filled).max()),
         flown=float(recording["time"][-1]),
         orbit=period,
-        proof=prove_pointing(scenario, _after(loop)) if proof else None,
+        proof=failure.proof and prove_pointing(scenario, _after(loop)),
     )
 
 

@@ -15,6 +15,7 @@ LEAST = 0.1
 """The largest level is no less in the unit that it is told in."""
 SMALL = 1e-4
 """Levels below this share of the largest of their panel are told as nothing."""
+SHARES = "The column proved has this bound, and by how much it is lower without a source; — where it is the same."
 INTERPRETED = {
     "mixed": "of all instants of all runs",
     "temporal": "of the instants of the worst run",
@@ -31,11 +32,7 @@ def present(scenario: Scenario, entry: LawEntry, budget: Budget) -> Result:
     numbers = Table([*map(Column, list(records[0])[: -len(heads)]), *heads], [list(row.values()) for row in records])
     sentences = [_setting_text(budget), *(f"{index}: {MEANINGS[index]}." for index in budget.indices)]
     if budget.proof is not None:
-        sentences.append(budget.proof.sentence)
-    if budget.proof is not None and budget.proof.shares:
-        sentences.append(
-            "The column proved has this bound, and by how much it is lower without a source; — where it is the same."
-        )
+        sentences += [budget.proof.sentence, *[SHARES] * (budget.proof.angle is not None)]
     title = f"{budget.scenario}, {budget.law}: pointing error by source"
     blocks, summary = ["", _table(budget), *sentences], {budget.law: budget.summary()}
     outcome = "met" if budget.met else "missed"

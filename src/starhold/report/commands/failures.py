@@ -25,7 +25,9 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
     sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in failures if failure.refused]
     if any(failure.certified is not None for failure in failures):
         sentences.append("certified: turns from rest on which no motor or wheel is proved to meet its limit.")
-    sentences += [f"lost {failure.name}: {failure.proof.sentence}" for failure in failures if failure.proof is not None]
+    sentences += [
+        f"lost {failure.name}: {failure.proof.sentence}" for failure in failures if failure.proof and failure.flown
+    ]
     if not retuned:
         sentences.append("The gains are the same in all of them.")
     if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in failures):
@@ -40,18 +42,18 @@ def _numbers(failures: Sequence[Failure], entry: LawEntry) -> Table:
     """All numbers, with every gain."""
     gains = [Column(item.name, item.gain.unit) for item in entry.law.fields()]
     rows = [[*_cells(failure).values(), *((failure.gains or {}).get(gain.name) for gain in gains)] for failure in failures]
-    columns = [*_cells(failures[0]), *gains]
-    if failures[0].proof is not None:
-        columns += _proof_cells(failures[0])
-        rows = [[*row, *_proof_cells(failure).values()] for row, failure in zip(rows, failures, strict=True)]
-    return Table(columns, rows)
+    return Table([*_cells(failures[0]), *gains], rows)
 
 
 def _cells(failure: Failure) -> dict[Any, Any]:
     from starhold.report.tables import cell
 
     known = failure.saturation
-    certified = failure.certified or (None, None)
+    certified, proof = failure.certified or (None, None), failure.proof
+    proved: dict[Any, Any] = {}
+    if proof is not None:
+        proved = {Column("proved angle", "rad"): proof.angle, Column("proved after", "s"): proof.settling}
+        proved |= {Column("proved share of orbits"): proof.share, Column("not in the proof"): "; ".join(proof.left_out)}
     return {
         Column("lost wheels"): failure.lost,
         Column("controllable axes"): 3 - len(failure.lacking),
@@ -72,16 +74,7 @@ def _cells(failure: Failure) -> dict[Any, Any]:
         Column("largest share of momentum limit"): failure.momentum_share,
         Column("time flown", "s"): failure.flown,
         Column("not flown because"): failure.refused,
-    }
-
-
-def _proof_cells(failure: Failure) -> dict[Column, Any]:
-    proof = failure.proof
-    return {
-        Column("proved angle", "rad"): proof and proof.angle,
-        Column("proved after", "s"): proof and proof.settling,
-        Column("proved share of orbits"): proof and proof.share,
-        Column("parts left out of the proof"): proof and "; ".join(proof.left_out),
+        **proved,
     }
 
 
@@ -91,18 +84,15 @@ def _table(failures: Sequence[Failure], retuned: Sequence[str]) -> Table:
     columns += [Column("authority", "N m", ".4g"), Column("share", "%", ".1f"), *(Column(name, "", ">") for name in retuned)]
     columns += [Column("stability", "1/s, before → after", ">")] * designed
     columns += [Column("certified", "turn, °", ">"), Column("settling", "s", ".4g"), Column("wheel full", "min", ">")]
-    rows = [[failure.name, *_row(failure, retuned, designed)] for failure in failures]
-    if failures[0].proof is not None:
-        columns.append(Column("proved", "within, °", ">"))
-        rows = [[*row, _proved(failure)] for row, failure in zip(rows, failures, strict=True)]
-    return Table(columns, rows)
+    columns += [Column("proved", "within, °", ">")] * (failures[0].proof is not None)
+    return Table(columns, [[failure.name, *_row(failure, retuned, designed), *_proved(failure)] for failure in failures])
 
 
-def _proved(failure: Failure) -> str | None:
+def _proved(failure: Failure) -> list[str | None]:
     from starhold.certification.wording import shown
 
-    angle = None if failure.proof is None else failure.proof.angle
-    return None if angle is None else shown(math.degrees(angle), up=True)
+    proof = failure.proof
+    return [] if proof is None else [None if proof.angle is None else shown(math.degrees(proof.angle), up=True)]
 
 
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[Any]:
