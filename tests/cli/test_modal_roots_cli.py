@@ -44,7 +44,7 @@ def test_a_run_shows_its_transient_against_the_limits(folder):
     assert row["limits_kept"] is True
     assert (folder / "out" / "transient.png").stat().st_size > 10_000
     page = (folder / "out" / "report.html").read_text()
-    assert ">The transient and its limits</h" in page
+    assert "<h3>transient</h3>" in page
     assert '"name":"transient"' in page
     assert "-3 to -0.001, 3000 values" in page
 
