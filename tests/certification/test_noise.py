@@ -1,5 +1,6 @@
 """Claims for a share of orbits: the parts whose noise they take in, what they are not about, flights that leave them."""
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -10,7 +11,7 @@ import pytest
 
 import starhold as sh
 from starhold.analysis.departure import departures
-from starhold.certification.certificate import Certificate
+from starhold.certification.certificate import Certificate, write
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import _numbers as numbers_apart
 from starhold.certification.comparison import differences
@@ -19,6 +20,7 @@ from starhold.certification.openness import envelope_of, named, pushes
 from starhold.certification.proofs import checked
 from starhold.certification.subject import described, make_subject
 from starhold.certification.wording import sentence
+from starhold.checker import check_file, passed
 from starhold.parts.catalogue import find
 from starhold.parts.part import Fitted
 from starhold.scenario.building import build
@@ -159,3 +161,15 @@ def test_a_claim_with_its_loops_own_pushes_is_about_that_loop():
     less = str(Fraction(against.outside) * Fraction(999, 1000))
     claim["numbers"]["outside"] = less
     assert list(numbers_apart(claim, own)) == ["outside is exceeded"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["lyapunov", "wheel"])
+def test_what_is_proved_of_a_cubesat_as_it_flies_is_checked(law, tmp_path):
+    given = sh.load("cubesat-nadir")
+    certificate = certify(build(given, given.pick(law)), law, Wanted(pointing=True))
+    assert certificate.outcome == "proved"
+    assert math.degrees(certificate.claim("pointing").numbers["angle"]) < 0.35
+    path = tmp_path / "certificate.json"
+    write([certificate], "cubesat-nadir", path)
+    assert passed(check_file(path))

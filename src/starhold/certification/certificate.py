@@ -112,10 +112,10 @@ class Certificate:
 
     @property
     def outcome(self) -> Outcome:
-        """Refuted if a claim is, undecided if one is or none is made of where the motion ends; but what is undecided of a
-        loop of fewer parts does not count where it is proved how near to its target the loop comes."""
-        flown = [set(claim.left_out) for claim in self.claims if claim.kind == "pointing" and claim.outcome == "proved"]
-        decided = [c for c in self.claims if c.outcome != "undecided" or not any(own < set(c.left_out) for own in flown)]
+        """Refuted if a claim is, undecided if one is or none is made of where the motion ends; but where it is proved how
+        near to its target the loop comes as it flies, what is undecided of an ideal one does not count."""
+        flown = any(claim.kind == "pointing" and claim.outcome == "proved" for claim in self.claims)
+        decided = [claim for claim in self.claims if claim.outcome != "undecided" or not flown]
         found = {claim.outcome for claim in decided}
         if "refuted" in found:
             return "refuted"

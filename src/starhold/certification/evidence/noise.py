@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import floats
+from starhold.certification.evidence.squares import rounded
 from starhold.certification.openness import driven_errors, measures_noisy_field, samples_of
 from starhold.kernel.held import near_target
 from starhold.kernel.loops import AttitudeLoop
@@ -25,9 +26,9 @@ Array = NDArray[np.float64]
 
 RARELY = Fraction(27, 10_000)
 """The share of orbits in which errors may leave their radii."""
-WIDER, LEAST, MORE = 1e-6, 1e-30, 1.0 + 1e-9
+WIDER, LEAST, MORE, DIGITS = 1e-6, 1e-30, 1.0 + 1e-9, 9
 """By which share of its variances the covariance is given away at each step, and the least that is; what is given away where
-numbers are rounded."""
+numbers are rounded; and to how many digits covariances are, for long numbers take long."""
 
 
 SHARES = (0.05, 0.05, 0.05, 0.85)
@@ -72,7 +73,7 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     numbers = {SHARE: RARELY, "samples": samples, "every": every, "noise.attitude": radii[0], "noise.rate": radii[1]}
     numbers |= {BESIDE: DEVIATIONS} if measures_noisy_field(loop.loop) else {}
     evidence = {
-        "covariances": [[[str(Fraction(x)) for x in row] for row in own.tolist()] for own in shapes],
+        "covariances": [[[str(rounded(x, DIGITS)) for x in row] for row in own.tolist()] for own in shapes],
         "deviations": [str(Fraction(x)) for x in deviations],
         "swayed": [str(Fraction(x)) for x in radii[2:]],
     }

@@ -18,6 +18,7 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
+from starhold.certification.evidence.squares import rounded
 from starhold.certification.openness import Pushes, driven_errors, pushes
 from starhold.certification.subject import above
 from starhold.kernel.held import Held, near_target
@@ -46,10 +47,11 @@ NEARER = 0.25
 """Of the largest turn that a set holds motions end within so much, or nothing is said of where."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
-MORE, FLOOR, LARGER, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 8.0, 20, 24, 2000
+MORE, FLOOR, LARGER, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 7, 8.0, 20, 24, 2000
 """What is given away where numbers are rounded; by how much the last level is above its limit, and ellipsoids are larger
-than the least, for motions come into them after a finite time; by how much a level may be below the one before; how many
-levels and ellipsoids there are at most; at how many states of a set the torque is looked at."""
+than the least, for motions come into them after a finite time; to how many digits their numbers are rounded; by how much a
+level may be below the one before; how many levels and ellipsoids there are at most; at how many states of a set the torque
+is looked at."""
 
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
@@ -135,7 +137,7 @@ class Chain:
             if found is None:
                 break
             shape, shares = found
-            X, a = [[Fraction(x) for x in row] for row in shape.tolist()], [Fraction(x) for x in shares]
+            X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
             rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
             reach = highest_ratio(widened(region.X, swayed), X)
             inner = region.within(X, swayed)
