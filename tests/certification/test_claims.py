@@ -178,3 +178,10 @@ def test_flights_try_every_kind_of_set():
         trial = fly_claims(LOOPS[name], certified(name), flights=512)
         assert trial.flights == 512
         assert trial.highest_share <= 1.0 + 1e-6
+
+
+def test_a_claim_whose_check_takes_too_much_work_is_not_made(monkeypatch):
+    monkeypatch.setattr("starhold.kernel.numbers.WORK", 8_000)
+    made = certify(LOOPS["pd-0"], "here")
+    assert {claim.outcome for claim in made.claims} == {"undecided"}
+    assert all("the check takes too much work" in str(claim.obligations) for claim in made.claims)
