@@ -10,16 +10,15 @@ from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.openness import pushes
 from starhold.certification.subject import make_subject
 from starhold.kernel.numbers import Account
-from starhold.kernel.regions import AT_REST, STATE
+from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
 from starhold.scenario.building import build
 from tests.kernel.flights import Around, Surroundings, along
 from tests.kernel.oracle import Oracle, run
-from tests.tiers import leading
 
 LANES = 2000
 
 
-@pytest.mark.parametrize(("scenario", "law"), leading([("cubesat-nadir", "lyapunov"), ("wheels-orbital", "wheel")], 1))
+@pytest.mark.parametrize(("scenario", "law"), [("cubesat-nadir", "lyapunov"), ("wheels-orbital", "wheel")])
 @pytest.mark.parametrize("share", [1e-5, 1e-3, 0.03])
 def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, law, share):
     Account.left = 10**12
@@ -66,10 +65,14 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
         most = h * (float(size) * np.linalg.norm(F @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
         assert (change <= most).all()
         A = floats(held.near.A)[:, :, None] + sum(a[:, :, None] * b for a, b in zip(linear, momentum, strict=True))
-        left = y - np.einsum("ijk,jk->ik", A, x)
-        (B, b), *others = held.linear(region, AT_REST)
-        v = np.linalg.solve(floats(B)[:3], left[:3])
-        grown = max(grown, float(np.linalg.norm(v, axis=0).max()) / float(b))
-        beside = sum(float(one) * np.linalg.norm(floats(M), 2) for M, one in others)
-        assert np.linalg.norm(left[3:] - floats(B)[3:] @ v, axis=0).max() <= beside
-    assert 0.1 < grown <= 1.0
+        # All of the motion in A of the momentum, or all of it what noise adds, which is in A without momentum.
+        whole, swayed = np.einsum("ijk,jk->ik", A, x), (region.sizes[SPEED], region.sizes[ANGLE])
+        for after, radii in ((whole, AT_REST), (floats(held.near.A) @ x, swayed)):
+            left, ((B, b), *others) = y - after, held.linear(region, radii)
+            v = np.linalg.solve(floats(B)[:3], left[:3])
+            used = float(np.linalg.norm(v, axis=0).max()) / float(b)
+            assert used <= 1.0
+            grown = max(grown, used)
+            beside = sum(float(one) * np.linalg.norm(floats(M), 2) for M, one in others)
+            assert np.linalg.norm(left[3:] - floats(B)[3:] @ v, axis=0).max() <= beside
+    assert grown > 0.1

@@ -253,9 +253,9 @@ class Held:
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
         rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
         # So does what V' has of the rates, which pushes change.
-        for name, d, p in zip(STATE[RATE], away, self.steep, strict=True):
+        for name, d, steep in zip(STATE[RATE], away, self.steep, strict=True):
             curved = [most(p, tube.sizes) for p in self.curvature[name]]
-            rest += d / 2 * (most(p, near) + reach([curved], [tube.turned, *moved])[0])
+            rest += d / 2 * (most(steep, near) + reach([curved], [tube.turned, *moved])[0])
         rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
         onward = self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0))
         growing = [[h / 2 * y for y in row] for row in times(self.felt, onward)]
@@ -309,8 +309,11 @@ class Held:
         near = region.sizes | {"v": turn * turn}
         odd = norm(most(p, near) for p in self.left)
         odd += felt(self.turning, "w", near) * swayed[0]
-        # Rates drift from nothing on, too.
-        mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * norm(self.astray(region, tube)) / 2
+        # Rates drift from nothing on, too; what noise adds is not in A.
+        parts = zip((RATE, TURN), swayed, strict=True)
+        swaying = h * sum((stretch([row[k] for row in self.near.rates]) * x for k, x in parts), Fraction(0))
+        drift = norm(self.astray(region, tube)) + swaying
+        mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * drift / 2
         uneven = 2 * mean - tube.pushed - odd
         return [
             (self.near.B, tube.uneven + mean),

@@ -110,7 +110,7 @@ def _share(claim: Claim, other: Claim) -> float | None:
 
 
 def _told(claim: Claim) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what a claim is told of its loop."""
+    """Return the numbers of a loop that its claim depends on."""
     proof: Any = claim.proof
     numbers, programs = proof.claim["numbers"], proof.claim["programs"]
     return {k: x for k, x in numbers.items() if k not in FOUND}, {k: x for k, x in programs.items() if k != "lyapunov"}

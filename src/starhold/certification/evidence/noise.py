@@ -32,8 +32,8 @@ numbers are rounded; and to how many digits covariances are, for long numbers ta
 
 
 SHARES = (0.05, 0.05, 0.05, 0.85)
-"""Of the times at which errors leave their radii, how many may be of the attitude and the rate that are told, and of the
-rate and the turn that they cause."""
+"""These shares of the probability are given to the radii of the attitude and the rate that are told, and of the rate and the
+turn that they cause."""
 
 
 def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[str, Any]] | None:

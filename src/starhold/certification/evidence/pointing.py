@@ -44,7 +44,7 @@ HEED = 0.5
 NEARLY = 1e-3
 """By which share the linear motion is multiplied first, for what wheels' momentum makes of it."""
 NEARER = 0.25
-"""Of the largest turn that a set holds motions end within so much, or nothing is said of where."""
+"""A claim is made only where motions end within this share of the largest turn that the set holds."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
 MORE, FLOOR, LARGER, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 7, 8.0, 20, 24, 2000

@@ -1,4 +1,4 @@
-"""Whether what is required of a law is met."""
+"""This command tells whether what is required of a law is met."""
 
 from __future__ import annotations
 
