@@ -31,7 +31,7 @@ class PageParts(NamedTuple):
     measured: str = ""
     """A section below the ranking."""
     folds: Mapping[str, str] = {}
-    """What else stands in the folds of these names."""
+    """The folds of these names hold this, too."""
     transient: float | None = None
     """The length of the transient (s) that the page can show by itself, None for none."""
     scripts: Sequence[str] = ()

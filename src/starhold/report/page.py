@@ -60,7 +60,7 @@ FOLDS = {
     "Linear loop": "margins, Bode and Nichols plots",
     "Numbers and settings": "gains, the spacecraft, what the key numbers mean",
 }
-"""What stands below the first screen, and a word on each."""
+"""These folds stand below the first screen, each with a word on what it holds."""
 
 
 def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | str:

@@ -54,7 +54,7 @@ class Panel:
     quantity, factor), ("angle", factor), ("turn", 0 roll, 1 pitch, 2 yaw) or ("acceleration", component, factor); nothing
     for curves that stay."""
     bounds: tuple[tuple[int, Curve, Curve], ...] = ()
-    """Of flights, by their numbers, times and what is proved not to be exceeded from each on, dashed in their colours."""
+    """Proved bounds by the numbers of their flights: times, and what is not exceeded from each on; drawn dashed."""
 
     def decades(self) -> float:
         """The number of decades that a logarithmic panel spans."""

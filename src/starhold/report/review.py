@@ -63,7 +63,7 @@ class Listed(Open):
 
 
 Points: TypeAlias = list[tuple[str, str]]
-"""What is left open, with the section that says so."""
+"""These points are left open, each with the section that says so."""
 
 
 def sections_of(review: Review) -> tuple[list[Section], Points]:

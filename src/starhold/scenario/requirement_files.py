@@ -25,7 +25,7 @@ ALIASES = {
     "object_text": "text",
     "reqif.text": "text",
 }
-"""What other tools call some of them, in lower case with underscores."""
+"""Other tools call some of them by these names, in lower case with underscores."""
 NUMBERS = ("at_most", "at_least", "after", "share", "confidence")
 LISTS = ("window", "axis", "direction")
 _COMMA = re.compile(r"(?<=\d),(?=\d)")
