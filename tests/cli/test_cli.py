@@ -28,10 +28,19 @@ def short(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
+def test_what_compare_prints_of_a_mission_fits_on_a_screen(tmp_path):
+    lines = starhold("compare", "cubesat-mission", "-o", "out", cwd=tmp_path, code=0).stdout.splitlines()
+    assert len(lines) <= 60
+    assert max(map(len, lines)) <= 120
+    assert {"settling", "overshoot"} <= set(lines[3].split()), "the table of metrics has laws as rows"
+
+
 def test_compare_writes_everything_and_prints_the_table(short):
     done = starhold("compare", "short.toml", "-o", "out", cwd=short, code=0)
     out = short / "out"
     assert "Report: out/report.html" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 120
     for name in ("lyapunov", "sliding", "mpc"):
         assert name in done.stdout
         run = xr.open_dataset(out / name / "run.nc", engine="h5netcdf")

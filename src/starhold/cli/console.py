@@ -2,7 +2,7 @@
 
 from rich.console import Console
 
-WIDE = 132
+WIDE = 120
 console = Console(highlight=False)
 if not console.is_terminal:
     # A file or a pipe has no width to keep to.

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry
     from starhold.studies.flight import Flight
 
-COLUMN = 11
+COLUMN = 9
 """Characters that a metric takes."""
 
 
@@ -87,7 +88,8 @@ def print_table(flights: Sequence[Flight]) -> None:
     measures = [metric_set.measures[metric] for metric in metrics]
     heads = [f"{measure.heading}\n[dim]{measure.unit}[/dim]" for measure in measures]
     cells = [[_cell(metric_set.cell(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
-    table = Table(title_justify="left", show_edge=False, pad_edge=False)
+    # No lines between thirteen columns: they would not fit into 120 characters.
+    table = Table(box=SIMPLE_HEAD, collapse_padding=True, show_edge=False, pad_edge=False)
     if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):
             table.add_column(head, justify="left" if head == "law" else "right")

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 from rich.table import Table
 
-from starhold.certification.assumptions import texts
+from starhold.certification.assumptions import HAS, texts
 from starhold.certification.certificate import Certificate
 from starhold.certification.wording import (
     HEADINGS,
     coverage,
     eigenvalues,
     grouped,
+    listed,
     methods,
     ranked,
     reasons,
@@ -26,9 +27,9 @@ from starhold.cli.console import console
 from starhold.cli.show import print_rows, printable
 from starhold.report.commands import Column
 from starhold.report.commands import Table as Rows
-from starhold.report.text import left_text
 
 if TYPE_CHECKING:
+    from starhold.analysis.departure import Departure
     from starhold.checker import Finding
     from starhold.studies.certificates import Tried
     from starhold.studies.flight import Flight
@@ -113,8 +114,18 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
     begins = {kind: left for kind, left in (flight.departures[place] if flight.departures else {}).items() if kind in proved}
     if begins and all(begins.values()):
         last = max(begins, key=lambda kind: begins[kind][0].time)
-        when = left_text(flight, place, last).partition(";")[0]
-        yield "", "[yellow]left[/yellow]", f"nothing proved covers this flight {when}"
+        yield "", "[yellow]left[/yellow]", _uncovered(flight, begins[last])
+
+
+def _uncovered(flight: Flight, left: Sequence[Departure]) -> str:
+    """From when on no claim covers a flight, and what happens then; parts that claims leave out are not named again."""
+    time = left[0].time
+    happens = [one.how for one in left if one.time == time]
+    events = [how for how in happens if not how.startswith(HAS)]
+    if len(events) < len(happens):
+        events.insert(0, "its loop has parts in no claim")
+    begin = "from the start" if time == 0.0 else f"from {flight.metric_set.moment(time, 4)} on"
+    return f"{begin} nothing proved covers this flight: {listed(events)}"
 
 
 def assumptions(certificate: Certificate) -> str:
