@@ -117,7 +117,7 @@ def test_a_flight_gives_its_verdicts_without_another(monkeypatch):
             monkeypatch.setattr(module, name, None, raising=False)
     found = verdicts_of_flight(scenario, flight)
     assert [one.verdict for one in found] == ["met"] * 4 + ["not decided"] * 6
-    assert {one.evidence for one in found[4:9]} == {"not decided here: starhold verify"}
+    assert {one.evidence for one in found[4:9]} == {"left to starhold verify"}
 
 
 # --- proofs -----------------------------------------------------------------------------------------------------------

@@ -31,12 +31,12 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The pages of a law with modes, and of two laws with sliders."""
+    """The pages of a law with modes, of two laws with sliders, and of five laws with requirements of their own."""
     folder = tmp_path_factory.mktemp("pages")
     given = {"mission": load("cubesat-mission"), "laws": parse(flown.text(), "short")}
-    return {
-        name: written(scenario.with_({"requirement": REQUIRED}), folder / f"{name}.html") for name, scenario in given.items()
-    }
+    required = {name: scenario.with_({"requirement": REQUIRED}) for name, scenario in given.items()}
+    whole = required | {"five": load("geostationary")}
+    return {name: written(scenario, folder / f"{name}.html") for name, scenario in whole.items()}
 
 
 def written(scenario: Scenario, path: Path) -> Path:
@@ -49,9 +49,11 @@ def boxes(browser: Browser, name: str) -> list[dict[str, Any]]:
     return browser.ask(f"({BOXES})({name!r})")
 
 
-@pytest.mark.parametrize("name", ["mission", "laws"])
+@pytest.mark.parametrize(("name", "verdicts"), [("mission", 3), ("laws", 6), ("five", 20)])
 @pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_the_first_screen_answers(browser: Browser, pages: dict[str, Path], name: str, size: tuple[int, int]) -> None:
+def test_the_first_screen_answers(
+    browser: Browser, pages: dict[str, Path], name: str, verdicts: int, size: tuple[int, int]
+) -> None:
     browser.complaints.clear()
     browser.open(pages[name], *size)
     browser.wait("charts.size > 0 && document.querySelector('#angle canvas') !== null")
@@ -70,9 +72,7 @@ def test_the_first_screen_answers(browser: Browser, pages: dict[str, Path], name
     assert (view["left"] >= plot["right"]) == (size is DESKTOP)
     assert (view["top"] >= plot["bottom"]) == (size is PHONE)
     assert browser.ask("document.documentElement.scrollWidth") <= size[0]
-    assert browser.ask('[...document.querySelectorAll("table.verdicts .outcome")].length') == 3 * (
-        2 if name == "laws" else 1
-    )
+    assert browser.ask('[...document.querySelectorAll("table.verdicts .outcome")].length') == verdicts
     assert browser.complaints == []
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Outcome: TypeAlias = Literal["met", "missed", "not decided"]
 WORST: tuple[Outcome, ...] = ("met", "not decided", "missed")
 """Outcomes, the worst last."""
-DEARER, ELSEWHERE = ("proof", "campaign", "budget", "margin"), "not decided here: starhold verify"
+DEARER, ELSEWHERE = ("proof", "campaign", "budget", "margin"), "left to starhold verify"
 """The methods for which one flight is not enough, and what is said of them where there is only that."""
 
 

@@ -382,6 +382,13 @@ if (report.transient) {
   }));
 }
 
+// Plot and body take what the rest of the first screen leaves.
+const lead = document.querySelector(".two, .one");
+const measureAbove = () => document.documentElement.style.setProperty("--above", `${lead.getBoundingClientRect().top + scrollY}px`);
+if (lead) {
+  measureAbove();
+  addEventListener("resize", measureAbove);
+}
 drawAll();
 dark.addEventListener("change", () => {
   readColours();
