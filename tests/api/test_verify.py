@@ -59,6 +59,12 @@ def test_a_mode_is_measured_each_time_that_it_flies():
     assert (never.verdict, never.number) == ("not decided", None)
 
 
+def test_a_gain_margin_is_asked_for_in_decibels():
+    asked = {"method": "margin", "metric": "gain_margin", "at_least": "6 dB"}
+    typed, plain = (sh.verify(turn(asked | {"at_least": least}))[0] for least in ("6 dB", 10 ** (6 / 20)))
+    assert (typed.number, typed.limit, typed.margin, typed.unit) == (plain.number, plain.limit, plain.margin, "1")
+
+
 def test_each_number_is_that_of_its_own_command():
     phase, error, many, kept, proof = sh.verify(turn(*ALL))[4:]
     assert phase.number == min(one.phase for one in sh.margins(turn()))

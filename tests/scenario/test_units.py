@@ -67,6 +67,8 @@ SAME = rows("""
 30° | 30 deg | rad
 3°/s | 3 deg/s | rad/s
 5 % | 0.05 | 1
+20 dB | 10 | 1
+-6 dB | 0.5011872336272722 | 1
 1 N m/(rad/s) | 1 N m s | N m s
 2 1/s | 2 rad/s | rad/s
 398600 km^3/s^2 | 3.986e14 m^3/s^2 | m^3/s^2
@@ -82,8 +84,8 @@ REFUSED = rows("""
 s | 9**9**9 s | 9 s**9**9 | 9 (s^9)^9 | 9 s^99 | 1 ((s)) | 1 s s s s s s s s s s | 1/3 s | 2*3 s | 0x10 s | nan s | inf | ٣ s
 s | 1 s^ | 1 (s | 1 s) | 1 s/ | 1 s//s | 1 __import__('os') | 1 degC | s | | 1 | 1 kg
 rad/s | 1 Hz | 1 kHz
-rad | 1 | 5 % | 1 1/s
-1 | 30 deg | 3 bit | 5 %^2
+rad | 1 | 5 % | 1 1/s | 6 dB
+1 | 30 deg | 3 bit | 5 %^2 | 6 dB^2
 """)
 REFUSED += [["s", f"{'1' * LONGEST} s"]]
 

@@ -18,11 +18,13 @@ _JOINT = re.compile(r"\s*[*·⋅/]\s*|\s+|[.-]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOGETHER = re.compile(r"(?P<force>[nuµμmkM]?N)m(?P<time>s?)|(?P<mass>k?g)m")
 """Units written together, as in mNm, Nms and kgm², which the library takes for something else."""
+DECIBEL = "dB"
 _SHARES = {"%": "percent", "percent": "percent", "ppm": "ppm"}
 
 
 def to_number(text: str, unit: str) -> float:
-    """The worth of a text such as "20 mN m" in a unit such as "N m". ValueError says what is allowed."""
+    """The worth of a text such as "20 mN m" in a unit such as "N m"; of "6 dB" the ratio of amplitudes, where the unit is
+    "1". ValueError says what is allowed."""
     text = text.strip()
     number = _NUMBER.match(text)
     if number is None or len(text) > LONGEST:
@@ -31,6 +33,8 @@ def to_number(text: str, unit: str) -> float:
     if given == unit and unit != "1":
         # The common case, spared the start-up of the units library.
         return value
+    if (given, unit) == (DECIBEL, "1"):
+        return 10.0 ** (value / 20.0)
     return _convert(value, _powers(given, unit), unit)
 
 

@@ -14,7 +14,7 @@ from starhold.errors import InputError
 from starhold.laws.modes import Modes
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest, show
-from starhold.scenario.units import apart, to_number
+from starhold.scenario.units import DECIBEL, apart, to_number
 from starhold.studies.body import study_of
 from starhold.studies.modes import stretches
 from starhold.studies.requirements import LOST, Requirement, cones_of, read_requirements, tables_of
@@ -79,6 +79,9 @@ def limits(table: RequirementTable, required: Requirement) -> dict[str, Any]:
     typed = table.at_most if required.at_most else table.at_least
     if isinstance(typed, str) and required.bound:
         number, unit = apart(typed)
+        if unit == DECIBEL:
+            # Margins of decibels are no differences of ratios: they are shown as ratios.
+            return fields
         fields |= {"typed_unit": unit, "scale": number / required.bound}
     return fields
 
