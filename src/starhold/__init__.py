@@ -4,6 +4,7 @@ import starhold as sh
 
 scenario = sh.load("three-laws")                 # or sh.scenario({...}), and scenario.with_({"law.lyapunov.k_rate": 0.1})
 run = sh.simulate(scenario, law="lyapunov")      # an xarray Dataset
+flight = sh.stepper(scenario)                    # a control period at a call: readings = flight.step(command)
 flights = sh.compare(scenario)                   # runs and metrics of every law
 numbers = sh.metrics(run)                        # settling time, overshoot, effort and all the others, in SI
 result = sh.campaign(scenario, runs=10_000, over={"initial.attitude": {"distribution": "rotations"}})    # and verdicts
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
         reproduce,
         review,
         simulate,
+        stepper,
+        steppers,
         sweep,
         to_pandas,
         verify,
@@ -79,6 +82,8 @@ __all__ = [
     "review",
     "scenario",
     "simulate",
+    "stepper",
+    "steppers",
     "sweep",
     "to_pandas",
     "verify",

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from starhold.algebra.quantity import Quantity
 from starhold.errors import InputError, shortly
 from starhold.scenario import reading
 from starhold.scenario.reading import make_scenario as make_scenario
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from starhold.export.folder import Exported
     from starhold.publications.reproduction import Reproduction
     from starhold.scenario.designing import Design
+    from starhold.simulation.stepper import Stepper
     from starhold.studies.budget import Budget
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
@@ -54,6 +54,26 @@ def simulate(
 
 
 @shortly
+def stepper(scenario: reading.Scenario | str | Path, law: str | None = None, *, record: bool = True) -> Stepper:
+    """A flight of a scenario that goes on by one control period at a call of `step(command)`, with commands from outside or,
+    where none is given, of the law, the first if `law` is None: then it has the bits of `simulate`. record: whether samples
+    are kept for `dataset()`."""
+    return steppers(scenario, None, law, record=record)
+
+
+@shortly
+def steppers(
+    scenario: reading.Scenario | str | Path, lanes: int | None, law: str | None = None, *, record: bool = False
+) -> Stepper:
+    """So many flights of a scenario side by side, each with random numbers of its own: what `stepper` tells and takes is an
+    array (lanes,) or (lanes, 3)."""
+    from starhold.simulation.stepper import Stepper
+
+    opened = reading.open_scenario(scenario)
+    return Stepper(studies.build(opened, opened.pick(law)), lanes, record)
+
+
+@shortly
 def metrics(run: xr.Dataset | Flight) -> Metrics:
     """The numbers that say how well a run went, a dictionary whose `units` has the unit (SI) of each; None where there is
     none: of what `simulate` returns or `run.nc` holds, by the tolerances of its scenario; of a Flight those that it has.
@@ -62,15 +82,7 @@ def metrics(run: xr.Dataset | Flight) -> Metrics:
     if not hasattr(run, "data_vars"):
         flight = cast("Flight", run)
         return flight.metric_set.measured(flight.metrics)
-    dataset = cast("xr.Dataset", run)
-    if not {"body", "control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
-        raise ValueError("not a run: a Dataset of `simulate`, or of a run.nc, is wanted")
-    arrays = {str(name): dataset[name].to_numpy() for name in ("time", *dataset.data_vars)}
-    columns = {
-        str(name): Quantity(values.attrs["units"], values.attrs["long_name"], *map(str, values.dims[1:]))
-        for name, values in dataset.data_vars.items()
-    }
-    recording = Recording(arrays, dict(dataset.attrs), columns, dataset["time"].attrs.get("units", "s"))
+    recording = Recording.of(cast("xr.Dataset", run))
     return studies.metric_set_of(recording).measured(studies.metrics_of(recording))
 
 
@@ -243,22 +255,11 @@ def export_aem(
     those of date (MOD_EARTH) are turned; any other name is what the inertial axes are called. The quaternions turn the frame
     to the body's axes, scalar last. InputError for a run without attitudes, a word that does not fit, and a file that cannot
     be written."""
-    from starhold.export.aem import from_date, write_aem
-    from starhold.parts.epoch import OF_DATE, OF_J2000, date_of
+    from starhold.export.aem import write_run
 
-    into, flown = Path(file), _read_run(run)
-    if "attitude" not in flown:
-        raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
-    times, attitudes = flown["time"].to_numpy(), flown["attitude"].to_numpy()
-    begun = flown.attrs.get("epoch", "2000-01-01T12:00:00") if epoch is None else epoch
-    if flown.attrs.get("frame") == OF_DATE and frame == OF_J2000:
-        attitudes = from_date(attitudes, date_of(flown.attrs["epoch"]))
-    try:
-        write_aem(
-            into, times, attitudes, epoch=begun, object_name=object_name, object_id=object_id, frame=frame, version=version
-        )
-    except ValueError as error:
-        raise InputError("export aem", "", str(error), "what a CCSDS message may hold") from None
+    into = Path(file)
+    about = {"object_name": object_name, "object_id": object_id, "frame": frame, "version": version}
+    write_run(_read_run(run), into, epoch, about)
     return into
 
 

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import conjugate, multiply
+from starhold.errors import InputError
 from starhold.files import atomic_write, read_text
-from starhold.parts.epoch import OF_J2000, Date, days_of, precession
+from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, days_of, precession
 
 Version = Literal["1.0", "2.0"]
 BODY = "SC_BODY"
@@ -49,6 +50,22 @@ class Aem(NamedTuple):
     object_name: str
     frame: str
     time_system: str
+
+
+def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) -> None:
+    """Write the attitudes of a run, a Dataset, as a message. epoch: UTC at its start, None for its own; about: further
+    arguments of `write_aem`. InputError for a run without attitudes, a word that does not fit, and a file that cannot be
+    written."""
+    if "attitude" not in run:
+        raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
+    times, attitudes = run["time"].to_numpy(), run["attitude"].to_numpy()
+    if run.attrs.get("frame") == OF_DATE and about["frame"] == OF_J2000:
+        attitudes = from_date(attitudes, date_of(run.attrs["epoch"]))
+    begun = run.attrs.get("epoch", "2000-01-01T12:00:00") if epoch is None else epoch
+    try:
+        write_aem(path, times, attitudes, epoch=begun, **about)
+    except ValueError as error:
+        raise InputError("export aem", "", str(error), "what a CCSDS message may hold") from None
 
 
 def write_aem(

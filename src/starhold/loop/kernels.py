@@ -7,7 +7,7 @@ One lane, any lane of a batch, plain Python, C and JavaScript agree bit for bit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -185,8 +185,11 @@ class Kernel:
         self._call = load(program, width)
 
     def __call__(self, memories: dict[str, Array], *counts: int) -> None:
-        pointers = [memories[memory.name].ctypes.data for memory in self.program.memories]
-        self._call(*pointers, *map(word, counts))
+        self.on(memories)(*map(word, counts))
+
+    def on(self, memories: dict[str, Array]) -> Callable[..., None]:
+        """The program on memories that stay where they are, which is called with counts and words alone."""
+        return partial(self._call, *(memories[memory.name].ctypes.data for memory in self.program.memories))
 
 
 _KERNELS: dict[Any, Kernel] = {}
@@ -270,6 +273,41 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
 
         repeat(blocks, block)
     return recorder.program("fly", "Flies many closed loops.")
+
+
+def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: bool) -> Program:
+    """One control step, or none if `count` is 0, of each lane of `blocks` blocks of lanes, recorded. The law decides or, if
+    `outside`, the command lies in `given`. What the law is told at the end lies in `told`, the step's sample in `record`.
+    Lane 0 is run number `run` and the others follow."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, record, told = (recorder.memory(name, lanes=True, writable=True) for name in ("carry", "record", "told"))
+        given = recorder.memory("given", lanes=True)
+        now, count, blocks, width = (recorder.input(name, "index") for name in ("now", "count", "blocks", "width"))
+        seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
+        arguments = Arguments(*numbers)
+        carried, size = len(numbers_of(carry)), len(carry.command)
+
+        def block(b: Any) -> None:
+            gains, nominal, craft, setup = arguments.bound(recorder, 0)
+            key = (seed, word_add(word_add(run, word_of(b * width)), recorder.lane()))
+            command = tuple(given[b * size + i] for i in range(size)) if outside else None
+
+            def turn(k: Any, carry: Any) -> Any:
+                updated = step.update(carry, now + k, key, gains, nominal, setup, command)
+                _put_row(record, b, step.sample(updated, now + k, setup))
+                return (step.check(_propagated(step, updated, craft, setup, substeps), now + k + 1, setup),)
+
+            end = repeat(count, turn, step.check(_state(carry, cells, b * carried), now, setup))[0]
+            _put(cells, b * carried, end)
+            _put_row(told, b, step.told(end, now + count, key, gains, nominal, setup)[:3])
+
+        repeat(blocks, block)
+    return recorder.program("fly", "Flies a step of closed loops.")
+
+
+def _put_row(cells: Cells, row: Any, values: Any) -> None:
+    _put(cells, row * len(flatten(values)), values)
 
 
 def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:

@@ -23,14 +23,28 @@ from starhold.parts.roles import Loads, Scene
 
 class Step(NamedTuple):
     """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied;
-    `slope` the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
+    `told` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` gives
+    the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
 
     measure: Callable[..., Any]
+    told: Callable[..., Told]
     update: Callable[..., Any]
     propagate: Callable[..., Any]
     check: Callable[..., Any]
     sample: Callable[..., Any]
     slope: Callable[..., Any]
+
+
+class Told(NamedTuple):
+    """What a law is given at a control instant: its measurement, the readings of the sensors and the estimate; and with what
+    the step goes on: the carry, the memories and the sign of the quaternion."""
+
+    measurement: Any
+    readings: Any
+    estimate: Any
+    carry: Any
+    memories: Any
+    h: Any
 
 
 def total(vectors: Any) -> Any:
@@ -59,17 +73,18 @@ def make_equations(parts: Composition) -> Step:
         return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
     def observed(carry, step, key, craft, setup):
-        """Return a function that gives the law's measurement towards a goal and the memories of sensors and estimator; and
-        the goal."""
+        """Return a function that gives the law's measurement towards a goal and the memories of sensors and estimator, the
+        goal, and the readings of the sensors."""
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
-        readings, kept = SimpleNamespace(), []
+        readings, kept, every = SimpleNamespace(), [], []
         known, shown = state, []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
             reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
             vars(readings).update(reading._asdict())
             known = known._replace(**{name: x for name, x in reading._asdict().items() if name in state._fields})
             kept.append(memory)
+            every.append(reading)
             if is_recorded(sensor):
                 shown.append(reading)
         estimate, estimator = memories.estimate, memories.estimator
@@ -100,14 +115,14 @@ def make_equations(parts: Composition) -> Step:
                 followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=estimator, estimate=estimate
             )
 
-        return show, goal
+        return show, goal, tuple(every)
 
     def measure(carry, step, key, craft, setup):
-        show, goal = observed(carry, step, key, craft, setup)
+        show, goal, _ = observed(carry, step, key, craft, setup)
         return show(goal)[0]
 
-    def update(carry, step, key, gains, craft, setup):
-        show, goal = observed(carry, step, key, craft, setup)
+    def told(carry, step, key, gains, craft, setup):
+        show, goal, readings = observed(carry, step, key, craft, setup)
         measurement, memories = show(goal)
         h = carry.h
         if by_mode:
@@ -118,8 +133,12 @@ def make_equations(parts: Composition) -> Step:
         if policy is not None:
             attitude, h = policy(measurement.attitude, h, setup.width)
             measurement = measurement._replace(attitude=attitude)
+        return Told(measurement, readings, memories.estimate, carry, memories, h)
+
+    def update(carry, step, key, gains, craft, setup, given=None):
+        measurement, _, _, carry, memories, h = told(carry, step, key, gains, craft, setup)
         command, memory = command_of(measurement, gains, craft, carry.memory)
-        command = limit(command, setup.limit)
+        command = limit(command if given is None else given, setup.limit)
         passed = command
         for actuator, params in zip(parts.actuators, setup.actuators, strict=True):
             if actuator.hook("command") is not None:
@@ -246,7 +265,7 @@ def make_equations(parts: Composition) -> Step:
         begun = _Begun(None, applied, carry.actuators)
         return slope((carry.state, carry.effectors, carry.actuators), begun, carry, craft, setup)
 
-    return Step(measure, update, propagate, check, sample, slope_of)
+    return Step(measure, told, update, propagate, check, sample, slope_of)
 
 
 class _Begun(NamedTuple):

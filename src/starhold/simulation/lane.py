@@ -56,6 +56,18 @@ class Recording:
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self.arrays[name]
 
+    @classmethod
+    def of(cls, dataset: xr.Dataset) -> Recording:
+        """The recording of a Dataset that `dataset` gave. ValueError for one that is no run."""
+        if not {"body", "control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
+            raise ValueError("not a run: a Dataset of `simulate`, or of a run.nc, is wanted")
+        arrays = {str(name): dataset[name].to_numpy() for name in ("time", *dataset.data_vars)}
+        columns = {
+            str(name): Quantity(values.attrs["units"], values.attrs["long_name"], *map(str, values.dims[1:]))
+            for name, values in dataset.data_vars.items()
+        }
+        return cls(arrays, dict(dataset.attrs), columns, dataset["time"].attrs.get("units", "s"))
+
     def until(self, time: float) -> Recording:
         """The recording up to a time, its first sample at least."""
         kept = max(1, int(np.searchsorted(self["time"], time * (1.0 + 1e-9), side="right")))

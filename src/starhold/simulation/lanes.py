@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -128,24 +129,40 @@ class RunningBatch:
         self.noted = self._packed(np.empty((0, self.lanes)) if noted is None else noted)
         self._ready: dict[tuple[int, int], Any] = {}
 
-    def _packed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Blocks (blocks, numbers, width) of rows (numbers, lanes); the last lane fills up the last block."""
-        blocks = aligned(self.count, len(rows), self.width)
-        padded = np.pad(rows, ((0, 0), (0, self.count * self.width - self.lanes)), mode="edge")
+    def room(self, numbers: int) -> NDArray[np.float64]:
+        """Blocks (blocks, numbers, width) of zeros."""
+        return aligned(self.count, numbers, self.width)
+
+    def fill(self, blocks: NDArray[np.float64], rows: NDArray[np.float64]) -> None:
+        """Put rows (numbers, lanes) into blocks; the last lane fills up the last block."""
+        short = self.count * self.width - self.lanes
+        padded = np.pad(rows, ((0, 0), (0, short)), mode="edge") if short else rows
         blocks[:] = padded.reshape(len(rows), self.count, self.width).swapaxes(0, 1)
+
+    def _packed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Blocks of rows (numbers, lanes)."""
+        blocks = self.room(len(rows))
+        self.fill(blocks, rows)
         return blocks
 
-    def _unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
+    def copy(self) -> Self:
+        """A batch that flies on by itself."""
+        other = copy(self)
+        other.x, other.noted, other._ready = self.room(self.x.shape[1]), self.room(self.noted.shape[1]), {}
+        other.x[:], other.noted[:] = self.x, self.noted
+        return other
+
+    def unpacked(self, blocks: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rows (numbers, lanes) of blocks (blocks, numbers, width)."""
         return np.ascontiguousarray(blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)[:, : self.lanes])
 
     def carries(self) -> NDArray[np.float64]:
         """The numbers that each lane carries now, (numbers, lanes)."""
-        return self._unpacked(self.x)
+        return self.unpacked(self.x)
 
     def notes(self) -> NDArray[np.float64]:
         """The numbers that have been noted of each lane, (numbers, lanes)."""
-        return self._unpacked(self.noted)
+        return self.unpacked(self.noted)
 
     def fly(
         self,
