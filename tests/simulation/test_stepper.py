@@ -6,10 +6,10 @@ import pytest
 import starhold as sh
 from starhold.algebra.structure import flatten
 from starhold.scenario.building import build
-from starhold.scenario.reading import builtin_names, load, parse
+from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from starhold.simulation.lane import simulate
 from starhold.simulation.stepper import Stepper
-from tests.simulation.test_faults import CASES
+from tests.simulation.loops import FAULT
 
 STEPS = 150
 
@@ -58,9 +58,9 @@ def test_the_bits_of_every_builtin_loop(name):
 
 
 def test_a_fault_comes_at_its_step_in_every_lane():
-    loop = build(scenario := parse(CASES["a wheel too"], "here"), scenario.laws[0])
-    step = loop.events[0].step
-    steps = step + 5
+    loop = build(scenario := parse(builtin_text("wheels-orbital") + FAULT, "here"), scenario.laws[0])
+    steps = loop.events[-1].step + 5
+    assert len(loop.events) == 2
     check_bits(loop, steps)
     many, single = Stepper(loop, lanes=3, record=True), Stepper(loop)
     for _ in range(steps):

@@ -277,11 +277,11 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
 
 def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: bool) -> Program:
     """One control step, or none if `count` is 0, of each lane of `blocks` blocks of lanes, recorded. The law decides or, if
-    `outside`, the command lies in `given`. What the law is told at the end lies in `told`, the step's sample in `record`.
+    `outside`, the command lies in `given`. What the law is told at the end lies in `sensed`, the step's sample in `record`.
     Lane 0 is run number `run` and the others follow."""
     recorder = Recorder()
     with recorder.recording():
-        cells, record, told = (recorder.memory(name, lanes=True, writable=True) for name in ("carry", "record", "told"))
+        cells, record, sensed = (recorder.memory(name, lanes=True, writable=True) for name in ("carry", "record", "sensed"))
         given = recorder.memory("given", lanes=True)
         now, count, blocks, width = (recorder.input(name, "index") for name in ("now", "count", "blocks", "width"))
         seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
@@ -300,7 +300,7 @@ def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: b
 
             end = repeat(count, turn, step.check(_state(carry, cells, b * carried), now, setup))[0]
             _put(cells, b * carried, end)
-            _put_row(told, b, step.told(end, now + count, key, gains, nominal, setup)[:3])
+            _put_row(sensed, b, step.sense(end, now + count, key, gains, nominal, setup)[:3])
 
         repeat(blocks, block)
     return recorder.program("fly", "Flies a step of closed loops.")

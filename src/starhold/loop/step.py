@@ -23,11 +23,11 @@ from starhold.parts.roles import Loads, Scene
 
 class Step(NamedTuple):
     """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied;
-    `told` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` gives
+    `sense` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` gives
     the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
 
     measure: Callable[..., Any]
-    told: Callable[..., Told]
+    sense: Callable[..., Sensed]
     update: Callable[..., Any]
     propagate: Callable[..., Any]
     check: Callable[..., Any]
@@ -35,8 +35,8 @@ class Step(NamedTuple):
     slope: Callable[..., Any]
 
 
-class Told(NamedTuple):
-    """What a law is given at a control instant: its measurement, the readings of the sensors and the estimate; and with what
+class Sensed(NamedTuple):
+    """A law is given this at a control instant: its measurement, the readings of the sensors and the estimate. With the rest
     the step goes on: the carry, the memories and the sign of the quaternion."""
 
     measurement: Any
@@ -121,7 +121,7 @@ def make_equations(parts: Composition) -> Step:
         show, goal, _ = observed(carry, step, key, craft, setup)
         return show(goal)[0]
 
-    def told(carry, step, key, gains, craft, setup):
+    def sense(carry, step, key, gains, craft, setup):
         show, goal, readings = observed(carry, step, key, craft, setup)
         measurement, memories = show(goal)
         h = carry.h
@@ -133,10 +133,10 @@ def make_equations(parts: Composition) -> Step:
         if policy is not None:
             attitude, h = policy(measurement.attitude, h, setup.width)
             measurement = measurement._replace(attitude=attitude)
-        return Told(measurement, readings, memories.estimate, carry, memories, h)
+        return Sensed(measurement, readings, memories.estimate, carry, memories, h)
 
     def update(carry, step, key, gains, craft, setup, given=None):
-        measurement, _, _, carry, memories, h = told(carry, step, key, gains, craft, setup)
+        measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup)
         command, memory = command_of(measurement, gains, craft, carry.memory)
         command = limit(command if given is None else given, setup.limit)
         passed = command
@@ -265,7 +265,7 @@ def make_equations(parts: Composition) -> Step:
         begun = _Begun(None, applied, carry.actuators)
         return slope((carry.state, carry.effectors, carry.actuators), begun, carry, craft, setup)
 
-    return Step(measure, told, update, propagate, check, sample, slope_of)
+    return Step(measure, sense, update, propagate, check, sample, slope_of)
 
 
 class _Begun(NamedTuple):

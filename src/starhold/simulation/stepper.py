@@ -26,7 +26,7 @@ LAST = 1 << 40
 
 @dataclass(frozen=True)
 class Readings:
-    """What the flight software is told at a control instant, in SI units: numbers, or arrays (lanes,) of many flights."""
+    """The flight software reads these numbers at a control instant, in SI units, or arrays (lanes,) of many flights."""
 
     time: float
     """Time since the start (s)."""
@@ -37,7 +37,7 @@ class Readings:
 
     @cached_property
     def measurement(self) -> Any:
-        """What the loop's own law is given: errors of attitude and rate, with the target's motion."""
+        """The loop's own law is given this: errors of attitude and rate, with the target's motion."""
         return self._part(0)
 
     @cached_property
@@ -71,8 +71,8 @@ class Stepper:
         self._step, self._like = make_step(loop.composition()), loop.carry()
         self._phases = loop.phases(LAST)
         first = self._phases[0]
-        told = self._step.told(self._like, 0, (loop.seed, loop.run), first.gains, first.nominal, first.setup)
-        self._told_like = tuple(told[:3])
+        sensed = self._step.sense(self._like, 0, (loop.seed, loop.run), first.gains, first.nominal, first.setup)
+        self._sensed_like = tuple(sensed[:3])
         self._names = tuple(fitted.called for fitted in loop.used("sensor"))
         self._sample = len(flatten(self._step.sample(self._like, 0, first.setup)))
         self._kernels: dict[tuple[int, bool], tuple[Kernel, Arguments]] = {}
@@ -102,7 +102,7 @@ class Stepper:
 
     def _hold(self, batch: RunningBatch) -> None:
         """Take over the numbers that flights carry, and make room for what kernels take and tell."""
-        room = {"record": self._sample, "told": len(flatten(self._told_like)), "given": len(self._like.command)}
+        room = {"record": self._sample, "sensed": len(flatten(self._sensed_like)), "given": len(self._like.command)}
         self._batch = batch
         self._memories = {name: batch.room(size) for name, size in room.items()} | {"carry": batch.x}
         self._calls: dict[tuple[int, bool], Any] = {}
@@ -191,7 +191,7 @@ class Stepper:
         batch = self._batch
         self._calls[key](self.steps, count, batch.count, batch.width, word(self.seed), word(self.run))
         self.steps += count
-        return Readings(self.time, self._read("told"), self._told_like, self._names)
+        return Readings(self.time, self._read("sensed"), self._sensed_like, self._names)
 
     def _made(self, phase: Phase, outside: bool) -> Any:
         """The kernel of a phase on the memories of this stepper."""
