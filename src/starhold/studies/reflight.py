@@ -21,7 +21,7 @@ from starhold.errors import InputError
 from starhold.laws.interface import Field
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Arguments, Numbers, make_step, numbers_of, one
+from starhold.loop.kernels import Arguments, Numbers, make_program, numbers_of, one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
 from starhold.scenario.making import changed, plain, variants
@@ -243,8 +243,7 @@ def _reflown(
             kept = []
     derive, places = _recorded(scenario, loop, {key: by_key[key] for key in kept}) if kept else (None, ())
     carry, phase = loop.carry(), loop.phases(steps)[0]
-    step = make_step(loop.composition())
-    program = one(step, carry, Numbers.of(phase), loop.substeps)
+    program = make_program(one, loop.composition(), carry, Numbers.of(phase), loop.substeps)
     lost = len(flatten(carry)) - 1
     return Reflown(
         entry.name,
