@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="Design, certify, fly and compare control laws for spacecraft.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -92,13 +91,15 @@ def _fly(
     nested: bool,
 ) -> list[Flight]:
     """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own."""
+    from starhold.scenario.reading import load
+
+    # Before what flies and prints is loaded, so that what is wrong with it is said at once.
+    scenario = load(file, allow_unstable)
     from starhold.cli.show import flying, print_outcome, print_results
     from starhold.report.results import open_folder, write_results, write_run
-    from starhold.scenario.reading import load
     from starhold.studies import compare as studies
     from starhold.studies.timing import Stopwatch
 
-    scenario = load(file, allow_unstable)
     entries = list(scenario.laws) if nested else [scenario.pick(law)]
     # All of them before the first flight, so that what is wrong with the last is said at once.
     loops = [studies.build(scenario, entry) for entry in entries]
