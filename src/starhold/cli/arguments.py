@@ -1,6 +1,6 @@
 """Arguments and exit codes that several commands share."""
 
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,7 +30,7 @@ Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove w
 CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with half the integration step: how much changes?")]
 
 
-class Drawn(str, Enum):
+class Drawn(StrEnum):
     """What a command draws once its table is printed."""
 
     NONE = "none"

@@ -137,7 +137,7 @@ def rerun(
         console.print(f"[red]Other bits than in the campaign, as another machine may compute: {names}[/red]", soft_wrap=True)
     else:
         console.print("The same bits as in the campaign.")
-    print_results(page, place)
+    print_results(page)
     if unpainted is not None:
         raise unpainted
     if flight.lost is not None:

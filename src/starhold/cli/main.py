@@ -144,7 +144,7 @@ def _fly(
             print_proved(flights)
         page = write_results(scenario, flights, folder, pictures is not Drawn.NONE)
         unpainted = painter.finish()
-    print_results(page, folder)
+    print_results(page)
     if unpainted is not None:
         raise unpainted
     return flights

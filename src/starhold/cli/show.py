@@ -67,9 +67,9 @@ def print_outcome(flights: Sequence[Flight]) -> None:
             console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False)
 
 
-def print_results(page: Path | None, folder: Path) -> None:
+def print_results(path: Path) -> None:
     """Print where to look: at the page, or into the folder where there is none."""
-    console.print(f"Results: {folder}" if page is None else f"Report: {page}", soft_wrap=True)
+    console.print(f"{'Results' if path.is_dir() else 'Report'}: {path}", soft_wrap=True)
 
 
 def _step_text(flight: Flight) -> str:

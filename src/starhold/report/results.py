@@ -223,14 +223,14 @@ def _write_kernel(folder: Path) -> None:
         hidden.write_bytes(kernel_bundle())
 
 
-def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, drawn: bool = True) -> Path | None:
-    """Summary, certificates and, if it is to be drawn, the page into an existing folder; returns the page's path. The runs
-    are written by `write_run`, and the pictures by a `Painter`."""
+def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, drawn: bool = True) -> Path:
+    """Summary, certificates and, if it is to be drawn, the page into an existing folder; returns the path of the page,
+    or the folder where there is none. The runs are written by `write_run`, and the pictures by a `Painter`."""
     write_summary(scenario.name, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
     if certificates := [certificate for flight in flights for certificate in flight.certificates]:
         write_proofs(certificates, scenario.name, folder)
     if not drawn:
-        return None
+        return folder
     from starhold.report.page import write_page
 
     with atomic_write(folder / PAGE) as hidden:

@@ -38,7 +38,7 @@ COMMON = {
     ("mA m^2", "A m^2"): 1e-3,
     ("nT", "T"): 1e-9,
 }
-"""The worth of units that most files have, as the library has it to the last bit: it takes longer to load than most flights."""
+"""The worth of units that most files have, as the library has it, to the last bit. That takes long to load."""
 
 
 def to_number(text: str, unit: str) -> float:

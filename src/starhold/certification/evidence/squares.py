@@ -202,14 +202,14 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.time_limit = False, LIMIT
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    A = sparse.csc_matrix(A)
+    matrix = sparse.csc_matrix(A)
 
     def solve() -> Any | None:
-        found = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, A, b, cones, settings).solve()
+        found = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, matrix, b, cones, settings).solve()
         return np.array(found.x) if "Solved" in str(found.status) or "Insufficient" in str(found.status) else None
 
-    numbers = tuple(x.tobytes() for x in (cost, A.data, A.indices, A.indptr, b))
-    return once((numbers, A.shape, equal, signed, *sides), solve)
+    numbers = tuple(x.tobytes() for x in (cost, matrix.data, matrix.indices, matrix.indptr, b))
+    return once((numbers, matrix.shape, equal, signed, *sides), solve)
 
 
 def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
