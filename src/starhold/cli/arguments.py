@@ -31,7 +31,7 @@ CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with ha
 
 
 class Drawn(StrEnum):
-    """What a command draws once its table is printed."""
+    """A choice of what is drawn once the table is printed."""
 
     NONE = "none"
     PAGE = "page"

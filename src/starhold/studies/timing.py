@@ -8,9 +8,13 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from threading import active_count
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+import numpy as np
+
+from starhold.analysis.cost import CALLS
 from starhold.studies.body import study_of
 from starhold.studies.compare import costing, timed
 
@@ -28,15 +32,15 @@ class Stopwatch:
         # A copy of a process with more threads than one may wait for locks that nobody opens.
         if not sys.platform.startswith("linux") or active_count() > 1:
             return
-        (asked, ask), (answered, answer) = os.pipe(), os.pipe()
+        (requests, request), (answers, answer) = os.pipe(), os.pipe()
         self._child = os.fork()
         if self._child == 0:
-            os.close(ask)
-            os.close(answered)
-            _serve(scenario, loops, os.fdopen(asked, "rb"), os.fdopen(answer, "wb"))
-        os.close(asked)
+            os.close(request)
+            os.close(answers)
+            _serve(scenario, loops, os.fdopen(requests, "rb"), os.fdopen(answer, "wb"))
+        os.close(requests)
         os.close(answer)
-        self._ask, self._answers = os.fdopen(ask, "wb"), os.fdopen(answered, "rb")
+        self._requests, self._answers = os.fdopen(request, "wb"), os.fdopen(answers, "rb")
 
     def __enter__(self) -> Stopwatch:
         return self
@@ -45,7 +49,7 @@ class Stopwatch:
         if self._child:
             os.kill(self._child, signal.SIGKILL)
             os.waitpid(self._child, 0)
-            for pipe in (self._answers, self._ask):
+            for pipe in (self._answers, self._requests):
                 with suppress(OSError):
                     pipe.close()
 
@@ -53,15 +57,18 @@ class Stopwatch:
         """Return the flight of the loop at this place, counted from 0, with the cost of a call of its law. Nothing else is
         to be computed meanwhile."""
         if self._child:
+            run = flight.recording
+            # No more than can be timed is sent.
+            begun = {name: values[:CALLS] if np.ndim(values) else values for name, values in run.arrays.items()}
             # Where it has died, what it died of is met here.
             with suppress(EOFError, OSError):
-                pickle.dump((place, flight.recording), self._ask)
-                self._ask.flush()
+                pickle.dump((place, replace(run, arrays=begun)), self._requests)
+                self._requests.flush()
                 return costing(flight, pickle.load(self._answers))
         return timed(self._scenario, self._loops[place], flight)
 
 
-def _serve(scenario: Scenario, loops: Sequence[Any], asked: BinaryIO, answer: BinaryIO) -> None:
+def _serve(scenario: Scenario, loops: Sequence[Any], requests: BinaryIO, answer: BinaryIO) -> None:
     """Time what is asked for until this process is ended."""
     # Ctrl-C and the like end the process that this is a copy of, and that ends this one.
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -71,7 +78,7 @@ def _serve(scenario: Scenario, loops: Sequence[Any], asked: BinaryIO, answer: Bi
         for loop in loops:
             study.compile_calls(loop)
         while True:
-            place, recording = pickle.load(asked)
+            place, recording = pickle.load(requests)
             pickle.dump(study.call_costs(loops[place], recording), answer)
             answer.flush()
     finally:
