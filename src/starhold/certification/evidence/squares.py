@@ -185,8 +185,9 @@ MOST_KNOWN = 256
 
 
 def once(key: Any, make: Callable[[], T]) -> T:
-    """Return what `make` gives for this key, which tells all that it depends on. Modes of a law often differ in nothing that
-    is proved, and limits of axes in their signs alone: what was found of one is kept for the next."""
+    """Return what `make` finds for this key, which tells all that it depends on. Modes of a law often differ in nothing that
+    is proved, and limits of axes in their signs alone: what was found of one is kept for the next. The kernel checks it each
+    time."""
     if key not in _KNOWN:
         if len(_KNOWN) >= MOST_KNOWN:
             _KNOWN.clear()
