@@ -192,14 +192,23 @@ class Kernel:
         return partial(self._call, *(memories[memory.name].ctypes.data for memory in self.program.memories))
 
 
+_PROGRAMS: dict[Any, Program] = {}
 _KERNELS: dict[Any, Kernel] = {}
+
+
+def make_program(kind: Callable[..., Program], parts: Composition, *arguments: Any) -> Program:
+    """The program kind(step, *arguments), recorded once; one serves all arguments of the same form."""
+    key = (kind, parts, form(arguments))
+    if key not in _PROGRAMS:
+        _PROGRAMS[key] = kind(make_step(parts), *arguments)
+    return _PROGRAMS[key]
 
 
 def make_kernel(kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any) -> Kernel:
     """The kernel of a program kind(step, *arguments); one serves all arguments of the same form."""
     key = (kind, parts, width, form(arguments))
     if key not in _KERNELS:
-        _KERNELS[key] = Kernel(kind(make_step(parts), *arguments), width)
+        _KERNELS[key] = Kernel(make_program(kind, parts, *arguments), width)
     return _KERNELS[key]
 
 

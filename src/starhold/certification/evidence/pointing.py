@@ -31,7 +31,6 @@ from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
 linalg: Any = import_module("scipy.linalg")
-optimize: Any = import_module("scipy.optimize")
 Array = NDArray[np.float64]
 
 POINTS = "points"
@@ -352,6 +351,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
     weight = np.log(np.array([x / sizes[0] + 1e-12 for x in sizes] + [NEARLY]))
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
     options = {"maxfev": 400, "initial_simplex": begun}
+    optimize: Any = import_module("scipy.optimize")
     found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
     least, X, shares = shape(found.x)
     return (X * LARGER, [float(a) for a in shares]) if isfinite(least) else None
