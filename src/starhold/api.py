@@ -303,7 +303,7 @@ def read_aem(file: str | Path) -> Aem:
 
 @shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
-    """Tell what is left after the loss of any one or two wheels, under a law, or the first; proof: how near to its target the
+    """Tell what is left after the loss of any one or two wheels, under a law, or the first; proof: how near its target the
     loop is proved to stay after each, too, which takes seconds each."""
     return studied("failures", scenario, law, proof=proof)
 
