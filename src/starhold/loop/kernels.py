@@ -7,7 +7,7 @@ One lane, any lane of a batch, plain Python, C and JavaScript agree bit for bit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -20,8 +20,9 @@ from starhold.algebra.words import number_of, whole_word, word_add, word_of
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
 from starhold.loop.step import Step, make_equations
 from starhold.trace.machine import load, word
-from starhold.trace.program import Program
+from starhold.trace.program import Loop, Program, Store
 from starhold.trace.recording import Cells, Recorder
+from starhold.trace.sharing import differing
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -157,8 +158,9 @@ def state_of(numbers: Any, like: Any) -> Any:
     return mapped(state, lambda leaf: Buffer([next(rest) for _ in range(leaf.size)]) if isinstance(leaf, Buffer) else leaf)
 
 
-def _state(like: Any, cells: Cells, base: Any) -> Any:
-    """The state that lies in memory from `base` on, as `numbers_of` orders it."""
+def _state(like: Any, cells: Cells, base: Any, known: dict[int, Any] | None = None) -> Any:
+    """The state that lies in memory from `base` on, as `numbers_of` orders it; known: its numbers that lie elsewhere, by
+    place."""
     place, start = 0, len(flatten(like))
 
     def leaf(value: Any) -> Any:
@@ -167,7 +169,7 @@ def _state(like: Any, cells: Cells, base: Any) -> Any:
             start += value.size
             return Buffer(cells, base + start - value.size, value.size)
         place += 1
-        return cells[base + place - 1]
+        return known[place - 1] if known and place - 1 in known else cells[base + place - 1]
 
     return mapped(like, leaf)
 
@@ -178,15 +180,20 @@ def _put(cells: Cells, base: Any, state: Any) -> None:
 
 
 class Kernel:
-    """A compiled program. Called with its memories by name, then counts and words in the order the program states."""
+    """A program, compiled when it is first called or made `ready`. Called with its memories by name, then counts and words
+    in the order the program states."""
 
     def __init__(self, program: Program, width: int) -> None:
-        self.program = program
-        self._call = load(program, width)
+        self.program, self._width = program, width
+
+    @cached_property
+    def ready(self) -> Callable[..., None]:
+        """The compiled program."""
+        return load(self.program, self._width)
 
     def __call__(self, memories: dict[str, Array], *counts: int) -> None:
         pointers = [memories[memory.name].ctypes.data for memory in self.program.memories]
-        self._call(*pointers, *map(word, counts))
+        self.ready(*pointers, *map(word, counts))
 
 
 _KERNELS: dict[Any, Kernel] = {}
@@ -236,13 +243,22 @@ def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
     return recorder.program("fly", "Flies a closed loop.")
 
 
-def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Observer | None, runs: Any = ()) -> Program:
+def many(
+    step: Step,
+    carry: Any,
+    numbers: Numbers,
+    substeps: int,
+    observer: Observer | None,
+    runs: Any = (),
+    alike: tuple[int, ...] = (),
+) -> Program:
     """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
     place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. The observer's notes lie
-    in `noted`."""
+    in `noted`. alike: places of numbers of the carry that are equal in all lanes; they lie in `common`, in this order."""
     recorder = Recorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
+        common = recorder.memory("common")
         seen = recorder.memory("noted", lanes=True, writable=True)
         first, count, blocks, width = (recorder.input(name, "index") for name in ("first", "count", "blocks", "width"))
         seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
@@ -254,7 +270,8 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
             along = word_add(word_add(run, word_of(b * width)), recorder.lane())
             key = (seed, along if isinstance(runs, tuple) else whole_word(own_run))
             base, place = b * len(numbers_of(carry)), b * len(flatten(first_noted))
-            state, noted = _state(carry, cells, base), _state(first_noted, seen, place)
+            known = {row: common[k] for k, row in enumerate(alike)}
+            state, noted = _state(carry, cells, base, known), _state(first_noted, seen, place)
 
             def turn(k: Any, carry: Any, noted: Any) -> Any:
                 now = first + k
@@ -270,6 +287,13 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
 
         repeat(blocks, block)
     return recorder.program("fly", "Flies many closed loops.")
+
+
+def stay_alike(program: Program, alike: tuple[int, ...]) -> tuple[int, ...]:
+    """The places among these at which the carry is equal in all lanes after a flight of `many`, too."""
+    names, (block,) = differing(program, program.main), [s for s in program.main.body if isinstance(s, Loop)]
+    ends = [s.value for s in block.body if isinstance(s, Store) and s.memory == "carry"]
+    return tuple(row for row in alike if ends[row] not in names)
 
 
 def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:

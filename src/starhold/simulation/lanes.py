@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten, leaves, mapped, places, rebuild, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Phase
-from starhold.loop.kernels import Arguments, Numbers, Observer, make_kernel, many, numbers_of
+from starhold.loop.kernels import Arguments, Kernel, Numbers, Observer, make_kernel, many, numbers_of, stay_alike
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
@@ -124,6 +124,8 @@ class RunningBatch:
         self.count = -(-self.lanes // width)
         self.like = loop.carry()
         self.rows = places(self.like)
+        bits = np.ascontiguousarray(carries[: len(flatten(self.like))]).view(np.int64)
+        self.alike = tuple(np.flatnonzero((bits == bits[:, :1]).all(axis=1)).tolist())
         self.x = self._packed(carries)
         self.noted = self._packed(np.empty((0, self.lanes)) if noted is None else noted)
         self._ready: dict[tuple[int, int], Any] = {}
@@ -157,7 +159,7 @@ class RunningBatch:
     ) -> None:
         """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer: in
         place of the batch's, with notes of the same shape."""
-        _, kernel, arguments, varying, turn = self.prepare(phase, observer)
+        _, kernel, alike, arguments, varying, turn = self.prepare(phase, observer)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first in (None, phase.first):
             rows = list(self.rows.state.rate)
@@ -166,6 +168,7 @@ class RunningBatch:
             part[:, rows] = turned.reshape(len(rows), len(piece), self.width).swapaxes(0, 1)
         memories = {
             "carry": part,
+            "common": np.ascontiguousarray(part[0, alike, 0]),
             "noted": self.noted[piece.start : piece.stop],
             "shared": arguments.shared,
             "own": varying[piece.start : piece.stop],
@@ -183,13 +186,24 @@ class RunningBatch:
         if key not in self._ready:
             numbers = Numbers.of(phase)
             arguments = Arguments(*numbers, () if observer is None else observer.numbers, self.runs)
-            more = (numbers, self.loop.substeps, observer, self.runs)
-            kernel = make_kernel(many, self.loop.composition(), self.width, self.like, *more)
             turn = self._turned(phase) if phase.jumps else None
+            if turn is not None:
+                self.alike = tuple(row for row in self.alike if row not in self.rows.state.rate)
+            kernel = self._kernel(numbers, observer)
             # The key's objects are kept, lest others get their ids.
             kept = (phase, observer)
-            self._ready[key] = (kept, kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
+            self._ready[key] = (kept, kernel, list(self.alike), arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[key]
+
+    def _kernel(self, numbers: Numbers, observer: Observer | None) -> Kernel:
+        """The kernel of these numbers; fewer numbers of the carry are `alike` from now on where lanes part in its flight."""
+        more = (self.like, numbers, self.loop.substeps, observer, self.runs)
+        while True:
+            kernel = make_kernel(many, self.loop.composition(), self.width, *more, self.alike)
+            stay = stay_alike(kernel.program, self.alike)
+            if stay == self.alike:
+                return kernel
+            self.alike = stay
 
     def _turned(self, phase: Phase) -> Any:
         """A function that gives the body's rates in the lanes of a piece at the start of a phase."""
