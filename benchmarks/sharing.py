@@ -16,6 +16,7 @@ import numpy as np
 
 import steps
 from common import header, interleaved, show
+from starhold.algebra.operations import INDEX
 from starhold.loop import kernels
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
@@ -23,7 +24,7 @@ from starhold.scenario.reading import load
 from starhold.simulation.lanes import RunningBatch, carry_columns
 from starhold.trace import llvm
 from starhold.trace.machine import widest
-from starhold.trace.program import Function, Program, Value, values
+from starhold.trace.program import Function, Loop, Op, Program, Value, statements
 from starhold.trace.sharing import differing
 
 PROBLEMS = {"three-laws": ("lyapunov", 3000), "cubesat-nadir": ("lyapunov", 300)}
@@ -32,8 +33,14 @@ LANES, REPEATS = 512, 15
 
 
 def everything(program: Program, function: Function) -> set[Value]:
-    """Return all values that can differ between lanes."""
-    return {name for name, kind in values(function) if kind in llvm.SPREAD}
+    """Return the names of all values but those that are read or counted for all lanes."""
+    names = differing(program, function)
+    for s in statements(function.body):
+        if isinstance(s, Op) and INDEX not in s.operation.takes:
+            names.add(s.ref)
+        elif isinstance(s, Loop):
+            names.update(name for slot in s.slots for name in (slot.name, slot.end))
+    return names
 
 
 def flown(loop: ClosedLoop, share: bool) -> tuple[RunningBatch, Any]:

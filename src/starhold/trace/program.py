@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, TypeAlias
 
-from starhold.algebra.operations import NUMBER, Operation
+from starhold.algebra.operations import Operation
 
 Value: TypeAlias = Any
 """The name of an earlier statement's result (a str), or a constant (a float, bool or int)."""
@@ -140,20 +140,6 @@ def reads(block: Block) -> Iterator[Value]:
             yield s.truth
         else:
             yield from (s.most, s.done, *(x for slot in s.slots for x in (slot.before, slot.after)))
-
-
-def values(function: Function) -> Iterator[tuple[str, str]]:
-    """Yield the names and kinds of what a function is given and computes."""
-    yield from function.params
-    for s in statements(function.body):
-        if isinstance(s, Op):
-            yield s.ref, s.operation.gives
-        elif isinstance(s, Load):
-            yield s.ref, NUMBER
-        elif isinstance(s, Call):
-            yield from s.refs
-        elif isinstance(s, Loop):
-            yield from ((name, slot.kind) for slot in s.slots for name in (slot.name, slot.end))
 
 
 def writes(block: Block) -> bool:
