@@ -22,7 +22,7 @@ from starhold.loop.step import Step, make_equations
 from starhold.trace.machine import load, word
 from starhold.trace.program import Loop, Program, Store
 from starhold.trace.recording import Cells, Recorder
-from starhold.trace.sharing import differing
+from starhold.trace.sharing import differing, split
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -191,11 +191,22 @@ class Kernel:
         """The compiled program."""
         return load(self.program, self._width)
 
+    @cached_property
+    def halves(self) -> tuple[Kernel, Kernel]:
+        """The kernels of what all lanes share, for `CHUNK` control steps at most, and of what is a lane's own; compiled."""
+        shared, lane = split(self.program, CHUNK)
+        halves = Kernel(shared, 1), Kernel(lane, self._width)
+        for half in halves:
+            half.ready  # noqa: B018
+        return halves
+
     def __call__(self, memories: dict[str, Array], *counts: int) -> None:
         pointers = [memories[memory.name].ctypes.data for memory in self.program.memories]
         self.ready(*pointers, *map(word, counts))
 
 
+CHUNK = 64
+"""Control steps for which the numbers that all lanes share are laid down before lanes fly them; they stay in the cache."""
 _KERNELS: dict[Any, Kernel] = {}
 
 
@@ -291,7 +302,7 @@ def many(
 
 def stay_alike(program: Program, alike: tuple[int, ...]) -> tuple[int, ...]:
     """The places among these at which the carry is equal in all lanes after a flight of `many`, too."""
-    names, (block,) = differing(program, program.main), [s for s in program.main.body if isinstance(s, Loop)]
+    names, (block,) = differing(program), [s for s in program.main.body if isinstance(s, Loop)]
     ends = [s.value for s in block.body if isinstance(s, Store) and s.memory == "carry"]
     return tuple(row for row in alike if ends[row] not in names)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten, leaves, mapped, places, rebuild, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Phase
-from starhold.loop.kernels import Arguments, Kernel, Numbers, Observer, make_kernel, many, numbers_of, stay_alike
+from starhold.loop.kernels import CHUNK, Arguments, Kernel, Numbers, Observer, make_kernel, many, numbers_of, stay_alike
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
@@ -166,18 +166,18 @@ class RunningBatch:
             rates = part[:, rows].swapaxes(0, 1).reshape(len(rows), -1)
             turned = np.array(turn(tuple(rates), piece))
             part[:, rows] = turned.reshape(len(rows), len(piece), self.width).swapaxes(0, 1)
-        memories = {
-            "carry": part,
-            "common": np.ascontiguousarray(part[0, alike, 0]),
-            "noted": self.noted[piece.start : piece.stop],
-            "shared": arguments.shared,
-            "own": varying[piece.start : piece.stop],
-            "tables": arguments.tables,
-        }
         begin = phase.first if first is None else first
-        steps = phase.last - phase.first if count is None else count
+        end = phase.last if count is None else begin + count
+        shared, lane = kernel.halves
+        memories = {memory.name: np.empty(memory.size or 0) for memory in lane.program.memories}
+        memories |= {"carry": part, "noted": self.noted[piece.start : piece.stop], "own": varying[piece.start : piece.stop]}
+        memories |= {"shared": arguments.shared, "tables": arguments.tables}
         run = self.first_run + piece.start * self.width
-        kernel(memories, begin, steps, len(piece), self.width, self.loop.seed, run)
+        # Without a step they are looked at all the same.
+        for step in range(begin, max(end, begin + 1), CHUNK):
+            memories["common"] = np.ascontiguousarray(part[0, alike, 0])
+            for half in (shared, lane):
+                half(memories, step, min(CHUNK, end - step), len(piece), self.width, self.loop.seed, run)
 
     def prepare(self, phase: Phase, observer: Observer | None = None) -> Any:
         """Compile the kernel of a phase once, before threads use it."""
@@ -190,6 +190,7 @@ class RunningBatch:
             if turn is not None:
                 self.alike = tuple(row for row in self.alike if row not in self.rows.state.rate)
             kernel = self._kernel(numbers, observer)
+            kernel.halves  # noqa: B018
             # The key's objects are kept, lest others get their ids.
             kept = (phase, observer)
             self._ready[key] = (kept, kernel, list(self.alike), arguments, self._packed(arguments.rows(self.lanes)), turn)

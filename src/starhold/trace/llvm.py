@@ -1,5 +1,4 @@
-"""A program is printed as LLVM's intermediate representation, for one lane or for W lanes in explicit vectors; what all
-lanes share stays a scalar, which is spread into a vector where one needs it.
+"""A program is printed as LLVM's intermediate representation, for one lane or for W lanes in explicit vectors.
 
 No operation is reassociated or contracted. Lanes go through loops together: a lane that is done keeps what its slots
 hold and writes nothing, by masks.
@@ -10,10 +9,7 @@ from typing import Any, ClassVar
 
 from starhold.algebra.operations import INDEX, NUMBER, STATIC, TRUTH, UNIFORM, WORD
 from starhold.trace.program import Branch, Call, Function, Load, Loop, Op, Program, Store, Value
-from starhold.trace.sharing import differing, spread
 
-SPREAD = (NUMBER, TRUTH, WORD)
-"""Kinds of values that may differ between lanes."""
 ATTRIBUTES = 'attributes #0 = { nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512" }'
 
 
@@ -72,8 +68,7 @@ class Llvm:
     def __init__(self, program: Program, width: int) -> None:
         if width > 1:
             check_apart(program)
-        self.program, self.types, self.single = program, Types(width, self.lane), Types(1, self.lane)
-        self.differing, self.spread = set[Value](), set[Value]()
+        self.program, self.types = program, Types(width, self.lane)
         self.lines: list[str] = []
         self.label = ""
         self.count = 0
@@ -85,13 +80,14 @@ class Llvm:
         return "\n".join(self.text) + "\n"
 
     def _declarations(self) -> list[str]:
-        declarations: list[str] = []
-        for t in (self.single, self.types)[self.types.width == 1 :]:
-            number, word = t.names[NUMBER], t.names[WORD]
-            declarations.append(f"declare {number} @llvm.sqrt.{t.suffix}({number})")
-            declarations.append(f"declare {word} @llvm.fshl.{t.words}({word}, {word}, {word})")
-            if t.width > 1:
-                declarations.append(f"declare void @llvm.masked.store.{t.suffix}.p0({number}, ptr, i32, {t.names[TRUTH]})")
+        t = self.types
+        number, word = t.names[NUMBER], t.names[WORD]
+        declarations = [
+            f"declare {number} @llvm.sqrt.{t.suffix}({number})",
+            f"declare {word} @llvm.fshl.{t.words}({word}, {word}, {word})",
+        ]
+        if t.width > 1:
+            declarations.append(f"declare void @llvm.masked.store.{t.suffix}.p0({number}, ptr, i32, {t.names[TRUTH]})")
         return declarations
 
     # Text of the parts.
@@ -108,27 +104,24 @@ class Llvm:
         self._put(f"{name} = {line}")
         return name
 
-    def _types(self, name: Value) -> Types:
-        """Return the types of a value: those of all lanes where it differs between them."""
-        return self.types if name in self.differing else self.single
+    def _value(self, value: Value, kind: str) -> str:
+        if isinstance(value, str):
+            return value if value.startswith("%") or " " in value else f"%{value}"
+        return self.types.constant(value, kind)
 
-    def _value(self, value: Value, kind: str, types: Types) -> str:
-        """Return a value as these types have it; `.all` marks a shared one in all lanes."""
-        if not isinstance(value, str):
-            return types.constant(value, kind)
-        if value.startswith("%") or " " in value:
-            return value
-        return f"%{value}.all" if types.width > 1 and value in self.spread and kind in SPREAD else f"%{value}"
+    def _typed(self, value: Value, kind: str) -> str:
+        return f"{self.types.names[kind]} {self._value(value, kind)}"
 
-    def _typed(self, value: Value, kind: str, types: Types) -> str:
-        return f"{types.names[kind]} {self._value(value, kind, types)}"
-
-    def _spread(self, name: str, kind: str) -> None:
-        """Spread a value that all lanes share, where something needs it in each."""
-        if name in self.spread and kind in SPREAD:
-            many = self.types.names[kind]
-            first = self._let(f"insertelement {many} poison, {self.single.names[kind]} %{name}, i64 0")
-            self._put(f"%{name}.all = shufflevector {many} {first}, {many} poison, <{self.types.width} x i32> zeroinitializer")
+    def _splat(self, single: str, value: str, kind: str, name: str | None = None) -> str:
+        """Return a value for all lanes from one that they share."""
+        name = name or self._new()
+        if self.types.width == 1:
+            self._put(f"{name} = bitcast {single} {value} to {single}")
+            return name
+        many = self.types.names[kind]
+        first = self._let(f"insertelement {many} poison, {single} {value}, i64 0")
+        self._put(f"{name} = shufflevector {many} {first}, {many} poison, <{self.types.width} x i32> zeroinitializer")
+        return name
 
     def _begin_block(self, label: str) -> None:
         self._put(f"\n{label}:")
@@ -139,7 +132,7 @@ class Llvm:
     def _parameters(self, function: Function) -> list[tuple[str, str]]:
         pointers = [("ptr noalias", f"%{memory.name}") for memory in self.program.memories]
         if function is self.program.main:
-            return pointers + [("i64", f"%{name}") for name, _ in function.params]
+            return pointers + [("i64", f"%{name}" if kind == INDEX else f"%{name}.given") for name, kind in function.params]
         typed = [(self.types.names[kind], f"%{name}") for name, kind in function.params]
         return pointers + typed + [("i64", name) for name in self.passed]
 
@@ -148,9 +141,6 @@ class Llvm:
 
     def _define(self, function: Function, masked: bool) -> None:
         self.lines = []
-        if self.types.width > 1:
-            self.differing = differing(self.program, function)
-            self.spread = spread(self.program, function, self.differing)
         self._begin_block(".entry")
         main = function is self.program.main
         if main:
@@ -158,7 +148,7 @@ class Llvm:
         self._block(function.body, "%.mask" if masked else None)
         gives, out = self._gives(function), ""
         for place, (value, kind) in enumerate(function.outs):
-            out = self._let(f"insertvalue {gives} {out or 'poison'}, {self._typed(value, kind, self.types)}, {place}")
+            out = self._let(f"insertvalue {gives} {out or 'poison'}, {self._typed(value, kind)}, {place}")
         parameters = self._parameters(function) + [(self.types.names[TRUTH], "%.mask")] * masked
         listed = ", ".join(f"{kind} {name}" for kind, name in parameters)
         head = f"define {self.convention if main else 'internal '}{gives} @{function.name}({listed}) #0 {{"
@@ -167,14 +157,15 @@ class Llvm:
     def _begin(self, main: Function) -> None:
         """Add the first lines of the function to run."""
         for name, kind in main.params:
-            self._spread(name, kind)
+            if kind == WORD:
+                self._splat("i64", f"%{name}.given", WORD, f"%{name}")
 
     def _call(self, s: Call, mask: str | None) -> None:
         given = [f"ptr %{memory.name}" for memory in self.program.memories]
-        given += [self._typed(value, kind, self.types) for value, (_, kind) in zip(s.args, s.function.params, strict=True)]
+        given += [self._typed(value, kind) for value, (_, kind) in zip(s.args, s.function.params, strict=True)]
         given += [f"i64 {name}" for name in self.passed]
         if self.types.width > 1:
-            given.append(self._typed(mask or self.types.fields["yes"], TRUTH, self.types))
+            given.append(self._typed(mask or self.types.fields["yes"], TRUTH))
         gives = self._gives(s.function)
         line = f"call {gives} @{s.function.name}({', '.join(given)})"
         if not s.function.outs:
@@ -202,34 +193,41 @@ class Llvm:
                 self._loop(s, mask)
 
     def _op(self, s: Op) -> None:
-        types = self._types(s.ref)
-        # The count of a rotation is a word here.
-        kinds = (WORD if kind == STATIC else kind for kind in s.operation.takes)
-        values = [self._value(value, kind, types) for value, kind in zip(s.args, kinds, strict=True)]
-        self._put(f"%{s.ref} = {s.operation.meanings['llvm'].format(*values, **types.fields)}")
-        self._spread(s.ref, s.operation.gives)
+        values: list[str] = []
+        kinds = s.operation.takes
+        for value, kind in zip(s.args, kinds, strict=True):
+            # The count of a rotation is a word here.
+            values.append(self._value(value, WORD if kind == STATIC else kind))
+        line = s.operation.meanings["llvm"].format(*values, **self.types.fields)
+        if INDEX in kinds and s.operation.gives in (NUMBER, WORD):
+            single = {NUMBER: "double", WORD: "i64"}[s.operation.gives]
+            self._splat(single, self._let(line), s.operation.gives, f"%{s.ref}")
+        else:
+            self._put(f"%{s.ref} = {line}")
 
     def _address(self, name: str, index: Value) -> str:
         kind = self.types.names[NUMBER] if self.program.memory(name).lanes else "double"
-        return self._let(f"getelementptr {kind}, ptr %{name}, {self._typed(index, INDEX, self.single)}")
+        return self._let(f"getelementptr {kind}, ptr %{name}, {self._typed(index, INDEX)}")
 
     def _load(self, s: Load) -> None:
         place = self._address(s.memory, s.index)
-        self._put(f"%{s.ref} = load {self._types(s.ref).names[NUMBER]}, ptr {place}")
-        self._spread(s.ref, NUMBER)
+        if self.program.memory(s.memory).lanes or self.types.width == 1:
+            self._put(f"%{s.ref} = load {self.types.names[NUMBER]}, ptr {place}")
+        else:
+            self._splat("double", self._let(f"load double, ptr {place}"), NUMBER, f"%{s.ref}")
 
     def _store(self, s: Store, mask: str | None) -> None:
-        value, place = self._typed(s.value, NUMBER, self.types), self._address(s.memory, s.index)
+        value, place = self._typed(s.value, NUMBER), self._address(s.memory, s.index)
         if mask is None:
             self._put(f"store {value}, ptr {place}")
             return
         t = self.types
-        where = self._typed(mask, TRUTH, t)
+        where = self._typed(mask, TRUTH)
         self._put(f"call void @llvm.masked.store.{t.suffix}.p0({value}, ptr {place}, i32 {8 * t.width}, {where})")
 
     def _branch(self, s: Branch, mask: str | None) -> None:
         at = self._new()[2:]
-        self._put(f"br i1 {self._value(s.truth, UNIFORM, self.single)}, label %then.{at}, label %past.{at}")
+        self._put(f"br i1 {self._value(s.truth, UNIFORM)}, label %then.{at}, label %past.{at}")
         self._begin_block(f"then.{at}")
         self._block(s.body, mask)
         self._put(f"br label %past.{at}")
@@ -237,20 +235,17 @@ class Llvm:
 
     def _loop(self, s: Loop, mask: str | None) -> None:
         at, truth, yes = self._new()[2:], self.types.names[TRUTH], self.types.fields["yes"]
-        # Lanes that are not done yet; where all are done together the branch says it.
-        narrows = s.done in self.differing
+        # Lanes that are not done yet; on one lane the branch says it.
+        narrows = s.done is not None and self.types.width > 1
         on, before = f"%.on{at}", mask or yes
         first = self.label
         self._put(f"br label %head.{at}")
         self._begin_block(f"head.{at}")
         start = len(self.lines)
-        for slot in s.slots:
-            self._spread(slot.name, slot.kind)
         self._block(s.head, mask)
-        more = self._let(f"icmp slt i64 %{s.counter}, {self._value(s.most, INDEX, self.single)}")
+        more = self._let(f"icmp slt i64 %{s.counter}, {self._value(s.most, INDEX)}")
         if s.done is not None:
-            types = self._types(s.done)
-            go = self._let(f"xor {self._typed(s.done, TRUTH, types)}, {types.fields['yes']}")
+            go = self._let(f"xor {self._typed(s.done, TRUTH)}, {yes}")
             if narrows:
                 mask = self._let(f"and {truth} {on}, {go}")
                 bits = self._let(f"bitcast {truth} {mask} to i{self.types.width}")
@@ -262,11 +257,10 @@ class Llvm:
         self._block(s.body, mask)
         phis = [(s.counter, "i64", "0", self._let(f"add i64 %{s.counter}, 1"))]
         for slot in s.slots:
-            types = self._types(slot.name)
-            kind, after = types.names[slot.kind], self._value(slot.after, slot.kind, types)
+            kind, after = self.types.names[slot.kind], self._value(slot.after, slot.kind)
             if narrows:
                 after = self._let(f"select {truth} {mask}, {kind} {after}, {kind} %{slot.name}")
-            phis.append((slot.name, kind, self._value(slot.before, slot.kind, types), after))
+            phis.append((slot.name, kind, self._value(slot.before, slot.kind), after))
         if narrows:
             phis.append((on[1:], truth, before, mask or before))
         self.lines[start:start] = [
@@ -276,6 +270,4 @@ class Llvm:
         self._put(f"br label %head.{at}")
         self._begin_block(f"past.{at}")
         for slot in s.slots:
-            self._put(f"%{slot.end} = phi {self._types(slot.end).names[slot.kind]} [ %{slot.name}, %{tested} ]")
-        for slot in s.slots:
-            self._spread(slot.end, slot.kind)
+            self._put(f"%{slot.end} = phi {self.types.names[slot.kind]} [ %{slot.name}, %{tested} ]")

@@ -52,7 +52,7 @@ class Threads(Llvm):
 
     def _address(self, name: str, index: Value) -> str:
         if self.program.memory(name).lanes:
-            row = self._let(f"mul {self._typed(index, INDEX, self.single)}, %.lanes")
+            row = self._let(f"mul {self._typed(index, INDEX)}, %.lanes")
             index = self._let(f"add i64 {row}, %.thread")
         return super()._address(name, index)
 
