@@ -7,7 +7,7 @@ One lane, any lane of a batch, plain Python, C and JavaScript agree bit for bit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -180,34 +180,21 @@ def _put(cells: Cells, base: Any, state: Any) -> None:
 
 
 class Kernel:
-    """A program, compiled when it is first called or made `ready`. Called with its memories by name, then counts and words
-    in the order the program states."""
+    """A compiled program. Called with its memories by name, then counts and words in the order the program states."""
 
     def __init__(self, program: Program, width: int) -> None:
-        self.program, self._width = program, width
-
-    @cached_property
-    def ready(self) -> Callable[..., None]:
-        """The compiled program."""
-        return load(self.program, self._width)
-
-    @cached_property
-    def halves(self) -> tuple[Kernel, Kernel]:
-        """The kernels of what all lanes share, for `CHUNK` control steps at most, and of what is a lane's own; compiled."""
-        shared, lane = split(self.program, CHUNK)
-        halves = Kernel(shared, 1), Kernel(lane, self._width)
-        for half in halves:
-            half.ready  # noqa: B018
-        return halves
+        self.program = program
+        self._call = load(program, width)
 
     def __call__(self, memories: dict[str, Array], *counts: int) -> None:
         pointers = [memories[memory.name].ctypes.data for memory in self.program.memories]
-        self.ready(*pointers, *map(word, counts))
+        self._call(*pointers, *map(word, counts))
 
 
-CHUNK = 64
-"""Control steps for which the numbers that all lanes share are laid down before lanes fly them; they stay in the cache."""
 _KERNELS: dict[Any, Kernel] = {}
+_HALVES: dict[Any, tuple[tuple[Kernel, Kernel], tuple[int, ...]]] = {}
+CHUNK = 1024
+"""Control steps for which the numbers that all lanes share are made at once, before lanes fly them."""
 
 
 def make_kernel(kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any) -> Kernel:
@@ -300,11 +287,32 @@ def many(
     return recorder.program("fly", "Flies many closed loops.")
 
 
-def stay_alike(program: Program, alike: tuple[int, ...]) -> tuple[int, ...]:
-    """The places among these at which the carry is equal in all lanes after a flight of `many`, too."""
-    names, (block,) = differing(program), [s for s in program.main.body if isinstance(s, Loop)]
-    ends = [s.value for s in block.body if isinstance(s, Store) and s.memory == "carry"]
-    return tuple(row for row in alike if ends[row] not in names)
+def steady(step: Step, alike: tuple[int, ...], *arguments: Any) -> tuple[Program, tuple[int, ...]]:
+    """The program many(step, *arguments, alike=alike), and what is left of `alike`: the places at which the carry is equal in all
+    lanes before the flight and after it."""
+    while True:
+        program = many(step, *arguments, alike=alike)
+        names, (block,) = differing(program), [s for s in program.main.body if isinstance(s, Loop)]
+        ends = [s.value for s in block.body if isinstance(s, Store) and s.memory == "carry"]
+        stay = tuple(row for row in alike if ends[row] not in names)
+        if stay == alike:
+            return program, alike
+        alike = stay
+
+
+def make_halves(
+    parts: Composition, width: int, alike: tuple[int, ...], *arguments: Any
+) -> tuple[tuple[Kernel, Kernel], tuple[int, ...]]:
+    """The kernels of `steady`: that of what all lanes share, and that of what is a lane's own; and what is left of `alike`.
+    They are called one after the other for at most `CHUNK` control steps."""
+    key = (parts, width, form(arguments))
+    if (*key, alike) not in _HALVES:
+        program, stay = steady(make_step(parts), alike, *arguments)
+        if (*key, stay) not in _HALVES:
+            shared, lane = split(program, CHUNK)
+            _HALVES[*key, stay] = (Kernel(shared, 1), Kernel(lane, width)), stay
+        _HALVES[*key, alike] = _HALVES[*key, stay]
+    return _HALVES[*key, alike]
 
 
 def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:

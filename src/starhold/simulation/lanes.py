@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten, leaves, mapped, places, rebuild, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Phase
-from starhold.loop.kernels import CHUNK, Arguments, Kernel, Numbers, Observer, make_kernel, many, numbers_of, stay_alike
+from starhold.loop.kernels import CHUNK, Arguments, Numbers, Observer, make_halves, numbers_of
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
-PIECES = 16
-"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect."""
+PIECES = 4
+"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect. Each flies what all
+lanes share, too."""
 
 
 class ThreadPool:
@@ -103,7 +104,8 @@ def simulate_many(
 
 
 class RunningBatch:
-    """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it.
+    """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it. `alike` are
+    the places of the carry's numbers that are equal in all lanes, bit for bit, and stay so: they are flown once for all.
 
     carries: (numbers, lanes), see `carry_columns`; first_run: the run number of lane 0, or those of all lanes (lanes,);
     noted: (numbers, lanes)."""
@@ -159,7 +161,7 @@ class RunningBatch:
     ) -> None:
         """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer: in
         place of the batch's, with notes of the same shape."""
-        _, kernel, alike, arguments, varying, turn = self.prepare(phase, observer)
+        _, halves, alike, arguments, varying, turn = self.prepare(phase, observer)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first in (None, phase.first):
             rows = list(self.rows.state.rate)
@@ -168,19 +170,18 @@ class RunningBatch:
             part[:, rows] = turned.reshape(len(rows), len(piece), self.width).swapaxes(0, 1)
         begin = phase.first if first is None else first
         end = phase.last if count is None else begin + count
-        shared, lane = kernel.halves
-        memories = {memory.name: np.empty(memory.size or 0) for memory in lane.program.memories}
+        memories = {memory.name: np.empty(memory.size or 0) for memory in halves[0].program.memories}
         memories |= {"carry": part, "noted": self.noted[piece.start : piece.stop], "own": varying[piece.start : piece.stop]}
         memories |= {"shared": arguments.shared, "tables": arguments.tables}
         run = self.first_run + piece.start * self.width
         # Without a step they are looked at all the same.
         for step in range(begin, max(end, begin + 1), CHUNK):
             memories["common"] = np.ascontiguousarray(part[0, alike, 0])
-            for half in (shared, lane):
+            for half in halves:
                 half(memories, step, min(CHUNK, end - step), len(piece), self.width, self.loop.seed, run)
 
     def prepare(self, phase: Phase, observer: Observer | None = None) -> Any:
-        """Compile the kernel of a phase once, before threads use it."""
+        """Compile the kernel of a phase once, before threads use it; phases in the order in which they are flown."""
         observer = observer or self.observer
         key = (id(phase), id(observer))
         if key not in self._ready:
@@ -189,22 +190,12 @@ class RunningBatch:
             turn = self._turned(phase) if phase.jumps else None
             if turn is not None:
                 self.alike = tuple(row for row in self.alike if row not in self.rows.state.rate)
-            kernel = self._kernel(numbers, observer)
-            kernel.halves  # noqa: B018
+            more = (self.like, numbers, self.loop.substeps, observer, self.runs)
+            halves, self.alike = make_halves(self.loop.composition(), self.width, self.alike, *more)
             # The key's objects are kept, lest others get their ids.
             kept = (phase, observer)
-            self._ready[key] = (kept, kernel, list(self.alike), arguments, self._packed(arguments.rows(self.lanes)), turn)
+            self._ready[key] = (kept, halves, list(self.alike), arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[key]
-
-    def _kernel(self, numbers: Numbers, observer: Observer | None) -> Kernel:
-        """The kernel of these numbers; fewer numbers of the carry are `alike` from now on where lanes part in its flight."""
-        more = (self.like, numbers, self.loop.substeps, observer, self.runs)
-        while True:
-            kernel = make_kernel(many, self.loop.composition(), self.width, *more, self.alike)
-            stay = stay_alike(kernel.program, self.alike)
-            if stay == self.alike:
-                return kernel
-            self.alike = stay
 
     def _turned(self, phase: Phase) -> Any:
         """A function that gives the body's rates in the lanes of a piece at the start of a phase."""
