@@ -5,8 +5,8 @@ many chain shapes, the fastest counts, in explicit vectors of the widest kind th
 arithmetic, as starhold's kernels compute (a product and a sum are two instructions), and once with the two fused, which
 strict arithmetic forbids. Division and square root are measured too: they are far slower, and have a unit of their own.
 
-The operations of a step are those of the kernel's own trace, common subexpressions once and nothing in vain: those of a lane.
-What all lanes share, such as the orbit, is computed once for all of them, and counts as nothing.
+The operations of a step are those of a lane in the kernel's own trace, common subexpressions once and nothing in vain. What
+all lanes share, such as the orbit, is computed once for all of them, and counts as nothing.
 
 Run: python benchmarks/peak.py
 """
@@ -99,11 +99,8 @@ def chain(body: str, chains: int) -> Callable[[], None]:
 
 def operations(loop: ClosedLoop) -> tuple[Work, Work]:
     """Operations of one control step of lanes with starts of their own: those that all share, and those of each."""
-    numbers, alike = (
-        Numbers.of(loop.phases(1)[0]),
-        RunningBatch(loop, carry_columns(loop, steps.starts(loop, 2)), 0, 2).alike,
-    )
-    program, _ = steady(make_step(loop.composition()), alike, loop.carry(), numbers, loop.substeps, None)
+    batch, numbers = RunningBatch(loop, carry_columns(loop, steps.starts(loop, 2)), 0, 2), Numbers.of(loop.phases(1)[0])
+    program, _ = steady(make_step(loop.composition()), batch.alike, loop.carry(), numbers, loop.substeps, None)
     shared, lane = split(program, 1)
     return _of_a_step(shared), _of_a_step(lane)
 

@@ -33,8 +33,8 @@ STEP = {
     "wheels-orbital": (231, 25, 1178, 0),
 }
 """Of a control step of each built-in scenario's first law: sums and products, and divisions and roots, first those that all
-lanes share, then those of each lane; lanes differ in attitude and rate, or in position near a libration point. Where a change
-has less of them for a lane, its numbers belong here."""
+lanes share, then those of each lane. Lanes differ in attitude and rate, or in position near a libration point. Numbers of a
+change that needs fewer belong here."""
 
 
 def starts_of(loop, lanes=2):
@@ -54,7 +54,7 @@ def halves_of(loop, starts):
 
 
 def counted(halves):
-    """The numbers of `STEP`."""
+    """The numbers of a step as `STEP` has them."""
     found = []
     for half in halves:
         one, two = (work(half, {"first": 0, "blocks": 1, "width": 1, "count": count}).work for count in (1, 2))

@@ -288,8 +288,8 @@ def many(
 
 
 def steady(step: Step, alike: tuple[int, ...], *arguments: Any) -> tuple[Program, tuple[int, ...]]:
-    """The program many(step, *arguments, alike=alike), and what is left of `alike`: the places at which the carry is equal in all
-    lanes before the flight and after it."""
+    """The program many(step, *arguments) with what is left of `alike`, and that: the places at which the carry is equal in
+    all lanes before the flight and after it."""
     while True:
         program = many(step, *arguments, alike=alike)
         names, (block,) = differing(program), [s for s in program.main.body if isinstance(s, Loop)]

@@ -5,7 +5,7 @@ A value differs where it comes from the number of the lane or of the block of la
 another that differs. Only numbers are handed over: truths, words and indices are cheap, and computed in both parts.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from starhold.algebra.operations import NUMBER, OPERATIONS
 from starhold.trace.program import (
@@ -28,23 +28,16 @@ ROWS, ENDS = "rows", "ends"
 """Memories between the parts: the numbers of each turn, row after row, and those after the last turn."""
 
 
-class Halves(NamedTuple):
-    """The program of what all lanes share, and that of a lane."""
-
-    shared: Program
-    lane: Program
-
-
 def differing(program: Program) -> set[Value]:
     """Return the names of the values that differ between the lanes of a program that is a loop over blocks of lanes."""
     own = {memory.name for memory in program.memories if memory.lanes}
     blocks, place = _loops(program)
-    names, before = {blocks.counter, "lane"}, -1
+    names, before = {blocks.counter}, -1
     # What the end of a turn gives is the start of the next.
     while before != (before := len(names)):
         for s in statements(program.main.body):
             if isinstance(s, Op):
-                if not names.isdisjoint((s.operation.name, *s.args)):
+                if s.operation.name == "lane" or not names.isdisjoint(s.args):
                     names.add(s.ref)
             elif isinstance(s, Load):
                 if s.memory in own or s.index in names:
@@ -60,9 +53,9 @@ def differing(program: Program) -> set[Value]:
     return names
 
 
-def split(program: Program, most: int) -> Halves:
+def split(program: Program, most: int) -> tuple[Program, Program]:
     """Split a loop over blocks of lanes, in each of which the lanes go through a loop of a given count of turns, of at most
-    so many turns."""
+    so many: into the program of what all lanes share, which runs first, and that of a lane."""
     names, (blocks, place), main = differing(program), _loops(program), program.main
     loop: Loop = blocks.body[place]
     before, after = blocks.body[:place], blocks.body[place + 1 :]
@@ -105,7 +98,7 @@ def split(program: Program, most: int) -> Halves:
         functions = (*program.functions[:-1], main._replace(body=prune(body, ())[0]))
         return Program(functions, (*program.memories, *between))
 
-    return Halves(part((*around, *same(before), turn, *ends), True), part(lane(handed, last), False))
+    return part((*around, *same(before), turn, *ends), True), part(lane(handed, last), False)
 
 
 def _loops(program: Program) -> tuple[Loop, int]:
