@@ -1,5 +1,5 @@
-"""What all lanes share is computed once: a program of lanes is split into the part that is the same for all of them, which
-runs first and leaves a row of numbers for each turn of the loop, and the part of a lane, which reads them.
+"""A program of many lanes is split in two, so that what all lanes share is computed once: the shared part runs first and
+leaves a row of numbers for each turn of the loop, which the part of a lane reads.
 
 A value differs where it comes from the number of the lane or of the block of lanes, from a lane's own memory, or from
 another that differs. Only numbers are handed over: truths, words and indices are cheap, and computed in both parts.
@@ -30,7 +30,7 @@ ROWS, ENDS = "rows", "ends"
 
 def differing(program: Program) -> set[Value]:
     """Return the names of the values that differ between the lanes of a program that is a loop over blocks of lanes."""
-    own = {memory.name for memory in program.memories if memory.lanes}
+    of_lanes = {memory.name for memory in program.memories if memory.lanes}
     blocks, place = _loops(program)
     names, before = {blocks.counter}, -1
     # What the end of a turn gives is the start of the next.
@@ -40,7 +40,7 @@ def differing(program: Program) -> set[Value]:
                 if s.operation.name == "lane" or not names.isdisjoint(s.args):
                     names.add(s.ref)
             elif isinstance(s, Load):
-                if s.memory in own or s.index in names:
+                if s.memory in of_lanes or s.index in names:
                     names.add(s.ref)
             elif isinstance(s, Call):
                 names.update(name for name, _ in s.refs)
@@ -77,8 +77,8 @@ def split(program: Program, most: int) -> tuple[Program, Program]:
     def lane(handed: list[str], last: list[str]) -> Block:
         body = tuple(s for s in loop.body if moved.isdisjoint(name for name, _ in _made(s)))
         loads = (Load(name, ROWS, f"row.{k}") for k, name in enumerate(handed))
-        own = tuple(slot for slot in loop.slots if slot not in slots)
-        turn = loop._replace(slots=own, body=(*_places(loop, len(handed)), *loads, *body))
+        differ = tuple(slot for slot in loop.slots if slot not in slots)
+        turn = loop._replace(slots=differ, body=(*_places(loop, len(handed)), *loads, *body))
         ends = (Load(name, ENDS, k) for k, name in enumerate(last))
         return (*around, blocks._replace(body=(*before, turn, *ends, *after)))
 
