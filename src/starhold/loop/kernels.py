@@ -20,8 +20,9 @@ from starhold.algebra.words import number_of, whole_word, word_add, word_of
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
 from starhold.loop.step import Step, make_equations
 from starhold.trace.machine import load, word
-from starhold.trace.program import Program
+from starhold.trace.program import Loop, Program, Store
 from starhold.trace.recording import Cells, Recorder
+from starhold.trace.sharing import differing, split
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -157,8 +158,9 @@ def state_of(numbers: Any, like: Any) -> Any:
     return mapped(state, lambda leaf: Buffer([next(rest) for _ in range(leaf.size)]) if isinstance(leaf, Buffer) else leaf)
 
 
-def _state(like: Any, cells: Cells, base: Any) -> Any:
-    """The state that lies in memory from `base` on, as `numbers_of` orders it."""
+def _state(like: Any, cells: Cells, base: Any, known: dict[int, Any] | None = None) -> Any:
+    """The state that lies in memory from `base` on, as `numbers_of` orders it; known: its numbers that lie elsewhere, by
+    place."""
     place, start = 0, len(flatten(like))
 
     def leaf(value: Any) -> Any:
@@ -167,7 +169,7 @@ def _state(like: Any, cells: Cells, base: Any) -> Any:
             start += value.size
             return Buffer(cells, base + start - value.size, value.size)
         place += 1
-        return cells[base + place - 1]
+        return known[place - 1] if known and place - 1 in known else cells[base + place - 1]
 
     return mapped(like, leaf)
 
@@ -194,6 +196,9 @@ class Kernel:
 
 _PROGRAMS: dict[Any, Program] = {}
 _KERNELS: dict[Any, Kernel] = {}
+_HALVES: dict[Any, tuple[tuple[Kernel, Kernel], tuple[int, ...]]] = {}
+CHUNK = 1024
+"""Control steps for which the numbers that all lanes share are made at once, before lanes fly them."""
 
 
 def make_program(kind: Callable[..., Program], parts: Composition, *arguments: Any) -> Program:
@@ -248,13 +253,22 @@ def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
     return recorder.program("fly", "Flies a closed loop.")
 
 
-def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Observer | None, runs: Any = ()) -> Program:
+def many(
+    step: Step,
+    carry: Any,
+    numbers: Numbers,
+    substeps: int,
+    observer: Observer | None,
+    runs: Any = (),
+    alike: tuple[int, ...] = (),
+) -> Program:
     """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
     place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. The observer's notes lie
-    in `noted`."""
+    in `noted`. alike: places of numbers of the carry that are equal in all lanes; they lie in `common`, in this order."""
     recorder = Recorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
+        common = recorder.memory("common")
         seen = recorder.memory("noted", lanes=True, writable=True)
         first, count, blocks, width = (recorder.input(name, "index") for name in ("first", "count", "blocks", "width"))
         seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
@@ -266,7 +280,8 @@ def many(step: Step, carry: Any, numbers: Numbers, substeps: int, observer: Obse
             along = word_add(word_add(run, word_of(b * width)), recorder.lane())
             key = (seed, along if isinstance(runs, tuple) else whole_word(own_run))
             base, place = b * len(numbers_of(carry)), b * len(flatten(first_noted))
-            state, noted = _state(carry, cells, base), _state(first_noted, seen, place)
+            known = {row: common[k] for k, row in enumerate(alike)}
+            state, noted = _state(carry, cells, base, known), _state(first_noted, seen, place)
 
             def turn(k: Any, carry: Any, noted: Any) -> Any:
                 now = first + k
@@ -317,6 +332,34 @@ def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: b
 
 def _put_row(cells: Cells, row: Any, values: Any) -> None:
     _put(cells, row * len(flatten(values)), values)
+
+
+def steady(step: Step, alike: tuple[int, ...], *arguments: Any) -> tuple[Program, tuple[int, ...]]:
+    """The program many(step, *arguments) with what is left of `alike`, and that: the places at which the carry is equal in
+    all lanes before the flight and after it."""
+    while True:
+        program = many(step, *arguments, alike=alike)
+        names, (block,) = differing(program), [s for s in program.main.body if isinstance(s, Loop)]
+        ends = [s.value for s in block.body if isinstance(s, Store) and s.memory == "carry"]
+        stay = tuple(row for row in alike if ends[row] not in names)
+        if stay == alike:
+            return program, alike
+        alike = stay
+
+
+def make_halves(
+    parts: Composition, width: int, alike: tuple[int, ...], *arguments: Any
+) -> tuple[tuple[Kernel, Kernel], tuple[int, ...]]:
+    """The kernels of `steady`: that of what all lanes share, and that of what is a lane's own; and what is left of `alike`.
+    They are called one after the other for at most `CHUNK` control steps."""
+    key = (parts, width, form(arguments))
+    if (*key, alike) not in _HALVES:
+        program, stay = steady(make_step(parts), alike, *arguments)
+        if (*key, stay) not in _HALVES:
+            shared, lane = split(program, CHUNK)
+            _HALVES[*key, stay] = (Kernel(shared, 1), Kernel(lane, width)), stay
+        _HALVES[*key, alike] = _HALVES[*key, stay]
+    return _HALVES[*key, alike]
 
 
 def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:
