@@ -25,7 +25,8 @@ import steps
 from common import header, interleaved, show
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Numbers, make_step, steady
+from starhold.loop.kernels import Numbers, make_step
+from starhold.loop.programs import steady
 from starhold.parts.craft import make_craft
 from starhold.simulation.lanes import RunningBatch, carry_columns
 from starhold.trace.bounds import Work, work

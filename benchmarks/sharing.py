@@ -16,7 +16,8 @@ import numpy as np
 import steps
 from common import header, interleaved, show
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Arguments, Numbers, make_kernel, many
+from starhold.loop.kernels import Arguments, Numbers, make_kernel
+from starhold.loop.programs import many
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lanes import RunningBatch, carry_columns

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from starhold.algebra.structure import flatten
-from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, one, state_of
+from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, state_of
+from starhold.loop.programs import one
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 from tests.simulation.loops import builtin, choices

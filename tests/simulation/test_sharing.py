@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from starhold.algebra.structure import flatten, unflatten
-from starhold.loop.kernels import Numbers, make_step, steady
+from starhold.loop.kernels import Numbers, make_step
+from starhold.loop.programs import steady
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from starhold.simulation.lane import fly

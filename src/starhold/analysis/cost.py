@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, numbers_of, replay
+from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, numbers_of
+from starhold.loop.programs import replay
 from starhold.simulation.lane import Recording, recorded
 
 CALLS = 50_000

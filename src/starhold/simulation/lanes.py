@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten, leaves, mapped, places, rebuild, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Phase
-from starhold.loop.kernels import CHUNK, Arguments, Numbers, Observer, make_halves, numbers_of
+from starhold.loop.kernels import Arguments, Numbers, Observer, numbers_of
+from starhold.loop.programs import CHUNK, make_halves
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 

@@ -21,7 +21,8 @@ from starhold.errors import InputError
 from starhold.laws.interface import Field
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Arguments, Numbers, make_program, numbers_of, one
+from starhold.loop.kernels import Arguments, Numbers, make_program, numbers_of
+from starhold.loop.programs import one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
 from starhold.scenario.making import changed, plain, variants
