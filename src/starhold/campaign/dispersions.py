@@ -46,6 +46,11 @@ class Dispersion:
         return ", ".join(self.keys)
 
     @property
+    def told(self) -> bool:
+        """Whether what laws suppose has the drawn values too."""
+        return self.distribution.known_to_law or not self.nominal_tables
+
+    @property
     def wordy(self) -> bool:
         """Whether a word is drawn, or a truth by its word."""
         return self.places[0].wordy
