@@ -122,8 +122,9 @@ class Lanes:
         looked = left[sorted({0, len(left) // 2})]
         if self.at_once and self._agrees(_some(columns, looked), runs[looked], refused is None):
             lot = self._together(_some(columns, left), runs[left])
-            yield lot, left, self._readings(lot)
-            return
+            if lot is not None:
+                yield lot, left, self._readings(lot)
+                return
         if refused is None:
             flats = dict(enumerate(self._each(columns, runs.tolist())))
         else:
@@ -167,10 +168,10 @@ class Lanes:
     def _agrees(self, columns: Columns, runs: NDArray[np.int64], strict: bool = True) -> bool:
         """Whether the numbers of these runs, made at once, are those of each one's own scenario. InputError where one is
         refused; where that is not strict, they do not agree."""
-        try:
-            numbers = np.array([*_numbers(self._together(columns, runs)).values()])
-        except (ValueError, TypeError, RecordingError):
+        lot = self._together(columns, runs)
+        if lot is None:
             return False
+        numbers = np.array([*_numbers(lot).values()])
         pairs = enumerate(runs.tolist())
         flats = self._each(columns, runs.tolist()) if strict else (self._tried(columns, *pair) for pair in pairs)
         return all(self.base.gives(flat, numbers[:, lane]) for lane, flat in enumerate(flats))
@@ -187,9 +188,15 @@ class Lanes:
                     followed[place] = equal[0]
         return followed
 
-    def _together(self, columns: Columns, runs: NDArray[np.int64]) -> Lot:
-        """Lanes made at once: numbers that are values, and those that equations make of values. ValueError or
-        RecordingError where there are none."""
+    def _together(self, columns: Columns, runs: NDArray[np.int64]) -> Lot | None:
+        """Lanes made at once; None where they cannot be."""
+        try:
+            return self._made(columns, runs)
+        except (ValueError, TypeError, RecordingError):
+            return None
+
+    def _made(self, columns: Columns, runs: NDArray[np.int64]) -> Lot:
+        """Lanes of numbers that are values, and of those that equations make of values."""
         base, every = self.base, set[int]().union(*self.moved.values())
         rows: dict[int, Array] = {place: columns[name].astype(float) for place, name in self._follows.items()}
         like = base.loop.carry()

@@ -23,7 +23,7 @@ from starhold.parts.craft import Craft, check_moments, check_rest, compact, inve
 from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.craft import axial_inertia, effectors_of, sure_torque
-from starhold.scenario.bodies.rigid_body.rotors import Rotors, lacking, rotors_over, stacked
+from starhold.scenario.bodies.rigid_body.rotors import Rotors, impossible, rotors_over, stacked
 from starhold.scenario.bodies.rigid_body.start import start_of, stated, target_of, unit_of
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class Dials(Body):
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:
         """Return the arguments of `moved`, with an array (lanes,) in place of each number; columns: values (components...,
-        lanes) by key, of whole vectors or of single components."""
+        lanes) by key, of whole vectors or of single components. ValueError where lanes differ in more than numbers."""
         initial, moved = scenario.table.initial, dict[str, Any]()
         for key, given in ((ATTITUDE, initial.attitude), (ANGLES, initial.angles), (RATE, initial.rate)):
             values = _whole(columns, key, given)
@@ -116,6 +116,8 @@ class Dials(Body):
             moved[KNOWN] = _inertia(moments, isinstance(total_inertia(scenario.craft)[0], tuple))
         if LIMIT in columns:
             moved[LIMIT] = columns[LIMIT]
+        if rotors is not None and rotors.sure is None:
+            raise ValueError("lanes differ in how their wheels share a torque out")
         return moved if rotors is None else moved | {ROTORS: rotors}
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
@@ -124,15 +126,16 @@ class Dials(Body):
         moments, rotors = _moments(scenario, columns), rotors_over(scenario, columns)
         if moments is None and rotors is None:
             return None
+        lanes = next(iter(columns.values())).shape[-1]
         moments = np.asarray(scenario.table.spacecraft.inertia)[..., None] if moments is None else moments
-        full = moments * np.eye(3)[:, :, None] if moments.ndim == 2 else moments
+        full = np.moveaxis(moments * np.eye(3)[:, :, None] if moments.ndim == 2 else moments, -1, 0)
         ordered = np.sort(moments, axis=0).T if moments.ndim == 2 else _principal(full)
         no_body = (ordered[:, 0] <= 0.0) | (ordered[:, 2] > (ordered[:, 0] + ordered[:, 1]) * (1.0 + 1e-9))
         if not effectors_of(scenario):
             return no_body
-        axial = axial_inertia(effectors_of(scenario))[..., None] if rotors is None else stacked(rotors.axial)
-        rest = _principal(full - axial)[:, 0] <= 0.0
-        return no_body | rest | (False if rotors is None else lacking(rotors.wheels))
+        axial = axial_inertia(effectors_of(scenario)) if rotors is None else stacked(rotors.axial, lanes)
+        no_rest = _principal(full - axial)[:, 0] <= 0.0
+        return no_body | no_rest | (False if rotors is None else impossible(scenario, rotors.wheels, lanes))
 
 
 def _crafts(scenario: Scenario, values: Mapping[str, Any], like: Craft) -> tuple[Craft, Craft]:
@@ -196,7 +199,6 @@ def _inertia(moments: Array, matrix: bool) -> Any:
     return tuple(tuple(row) for row in rows) if matrix else tuple(rows[k, k] for k in range(3))
 
 
-def _principal(inertias: Array) -> Array:
-    """The principal moments (lanes, 3) of inertias (3, 3, lanes), the least first."""
-    full = np.moveaxis(inertias, -1, 0)
-    return np.linalg.eigvalsh(0.5 * (full + full.swapaxes(1, 2)))
+def _principal(inertias: Array) -> NDArray[np.floating[Any]]:
+    """The principal moments (lanes, 3) of inertias (lanes, 3, 3), the least first."""
+    return np.linalg.eigvalsh(0.5 * (inertias + inertias.swapaxes(1, 2)))
