@@ -150,6 +150,10 @@ def test_the_verdict_says_what_the_law_knows():
     assert told.endswith(
         "The law supposes the file's own spacecraft.inertia, and is told each drawn spacecraft.torque_limit."
     )
+    for action, told in (("none", "never learns"), ("reallocate", "learns at the diagnosis each drawn")):
+        scenario = turn(fault=[{"time": 1.0, "inertia": [2.2, 3.1, 4.4], "action": action}])
+        (law,) = fly(scenario=scenario, over={"fault[1].inertia": INERTIA}, requirement=asked, runs=5).laws
+        assert law.verdicts[0].sentence().endswith(f"The law {told} fault[1].inertia.")
     rate = {"initial.rate": normal(0.01)}
     (law,) = fly(scenario=turn(), over=rate, requirement=asked, runs=5).laws
     assert "The law" not in law.verdicts[0].sentence()
@@ -162,11 +166,50 @@ def test_the_verdict_says_what_the_law_knows():
         ({"sensor.rate_noise": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
         ({"law.lyapunov.k_rate": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
         ({"initial.rate[1]": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
+        (
+            {"fault[1].inertia": INERTIA | {"known_to_law": True}},
+            "false, for the action on a fault says what laws learn of it",
+        ),
     ],
 )
 def test_what_no_law_can_know_and_the_old_name_are_refused(over, told):
+    unnoticed = {"time": 1.0, "inertia": [2.2, 3.1, 4.4], "action": "none"}
+    scenario = with_campaign(turn(initial={"rate": [0.01, 0.0, 0.0]}, fault=[unnoticed]), {"over": over, "runs": 3})
     with pytest.raises(InputError, match=re.escape(told)):
-        begin(with_campaign(turn(initial={"rate": [0.01, 0.0, 0.0]}), {"over": over, "runs": 3}), ["lyapunov"])
+        begin(scenario, ["lyapunov"])
+
+
+MODELLED = """
+from typing import Annotated, NamedTuple
+from starhold.parts.contract import Card, Parameter
+CARD = Card("A leak", "M = const", ("none",), ("constant",))
+ROLE = "environment"
+MODELLED = True
+class Params(NamedTuple):
+    torque: Annotated[tuple, Parameter("N m", shape=(3,), text="of the leak")]
+def torque(state, params, craft, memory):
+    return params.torque
+def examples():
+    return [Params((1e-3, 0.0, 0.0))]
+"""
+
+
+def test_what_every_command_is_computed_with_is_drawn_only_as_known(tmp_path):
+    """Else a verdict would be that of a law that is told, and not say so."""
+    (tmp_path / "leak.py").write_text(MODELLED, encoding="utf-8")
+    leak = {"file": "leak.py", "torque": [1e-3, 0.0, 0.0]}
+    thrusters = {"type": "thrusters", "torque": [0.2, 0.2, 0.2]}
+    asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
+    for part, key in ((leak, "part.leak.torque"), (thrusters, "part.thrusters.torque")):
+        scenario = short(4.0, [LYAPUNOV], folder=tmp_path, part=[part])
+        with pytest.raises(InputError, match="known_to_law: found false; allowed: true, for commands of laws are computed"):
+            begin(with_campaign(scenario, {"over": {key: normal(1e-4)}, "runs": 3}), ["lyapunov"])
+        over = {key: normal(1e-4, known_to_law=True)}
+        (law,) = fly(scenario=scenario, over=over, requirement=asked, runs=5).laws
+        assert law.verdicts[0].sentence().endswith(f"The law is told each drawn {key}.")
+    over = {"part.thrusters.lever": normal(0.1)}
+    (law,) = fly(scenario=scenario, over=over, requirement=asked, runs=5).laws
+    assert "The law" not in law.verdicts[0].sentence()
 
 
 def test_a_scenario_may_say_what_its_laws_suppose():
