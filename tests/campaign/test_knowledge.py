@@ -174,9 +174,9 @@ def test_the_verdict_says_what_the_law_knows():
 )
 def test_what_no_law_can_know_and_the_old_name_are_refused(over, told):
     unnoticed = {"time": 1.0, "inertia": [2.2, 3.1, 4.4], "action": "none"}
-    scenario = with_campaign(turn(initial={"rate": [0.01, 0.0, 0.0]}, fault=[unnoticed]), {"over": over, "runs": 3})
+    scenario = turn(initial={"rate": [0.01, 0.0, 0.0]}, fault=[unnoticed])
     with pytest.raises(InputError, match=re.escape(told)):
-        begin(scenario, ["lyapunov"])
+        begin(with_campaign(scenario, {"over": over, "runs": 3}), ["lyapunov"])
 
 
 MODELLED = """

@@ -46,7 +46,7 @@ class Dispersion:
         return ", ".join(self.keys)
 
     @property
-    def told(self) -> bool:
+    def known(self) -> bool:
         """Whether what laws suppose has the drawn values too."""
         return self.distribution.known_to_law or not self.nominal_tables
 

@@ -36,7 +36,7 @@ class Moving:
         return {
             key: np.moveaxis(values, 0, -1)
             for one in self.drawn
-            if one.told or not known
+            if one.known or not known
             for key, values in one.arrays(columns).items()
         }
 
@@ -51,17 +51,17 @@ class Moving:
         return dict(zip(names, equation.over(np.array(varying)), strict=True))
 
     def _arguments(self, columns: Columns) -> tuple[Any, ...]:
-        """The arguments of the equation: what flies, what laws are told, and the parameters of parts."""
+        """The arguments of the equation: what flies, what laws suppose, and the parameters of parts."""
         hooks, every = self.scenario.hooks, self.by_key(columns)
         true = hooks.drawn(self.scenario, every)
-        told = hooks.drawn(self.scenario.known, self.by_key(columns, known=True))
+        supposed = hooks.drawn(self.scenario.known, self.by_key(columns, known=True))
         parts = dict[str, Any]()
         for key, path in self._paths.items():
             if path[0] == "part":
                 fitted = self.scenario.parts[path[1]]
                 parts[fitted.called] = _put(parts.get(fitted.called, fitted.params), path[2:], every[key])
-        self._names = tuple(true), tuple(told), tuple(parts)
-        return tuple(true.values()), tuple(told.values()), tuple(parts.values())
+        self._names = tuple(true), tuple(supposed), tuple(parts)
+        return tuple(true.values()), tuple(supposed.values()), tuple(parts.values())
 
     def _equation(self, arguments: Any, count: int) -> tuple[Compiled, list[str]]:
         if self._compiled is None:
@@ -78,10 +78,10 @@ class Moving:
             self._compiled = Compiled(equation, *[0.0] * count), names
         return self._compiled
 
-    def _named(self, true: Any, told: Any, params: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    def _named(self, true: Any, supposed: Any, params: Mapping[str, Any]) -> list[tuple[str, Any]]:
         """The numbers of the loop with their names: the carry as it begins, and what phases have."""
         loop = self.base.loop
-        moved = self.scenario.hooks.flown(self.scenario, loop, true, told)
+        moved = self.scenario.hooks.flown(self.scenario, loop, true, supposed)
         parts = tuple(replace(one, params=params[one.name]) if one.name in params else one for one in moved.parts)
         setup = replace(loop, parts=parts).setup()._replace(limit=moved.limit)
         carry = loop.carry(moved.made_with, setup=setup)

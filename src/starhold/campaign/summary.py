@@ -126,10 +126,10 @@ def _knowledge(job: Job, law: str) -> str:
     """A sentence on which drawn values the law is told; none where it is told no number of its craft in any case."""
     clauses: dict[str, list[str]] = {"supposes the file's own": [], "is told each drawn": []}
     clauses |= {"learns at the diagnosis each drawn": [], "never learns": []}
-    supposed, told, learnt, missed = clauses.values()
+    supposed, known, learnt, missed = clauses.values()
     for one in job.dispersions:
-        known = told if one.distribution.known_to_law else [] if one.told else supposed
-        known += one.keys
+        if one.distribution.known_to_law or not one.known:
+            (known if one.known else supposed).extend(one.keys)
         for place in one.places:
             if place.path[0] == "fault" and place.path[2] == "inertia":
                 fault = job.scenario.table.fault[int(place.path[1])]
