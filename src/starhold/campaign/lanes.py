@@ -201,9 +201,10 @@ class Lanes:
         rows: dict[int, Array] = {place: columns[name].astype(float) for place, name in self._follows.items()}
         like = base.loop.carry()
         carried, moving = len(numbers_of(like)), len(flatten((like.state, like.effectors)))
+        numbers = self.moving.numbers(columns)
         # The carry is not made by the equation where it begins with values themselves, or with a law's memory of them.
-        begun = any(place < len(flatten(like.state)) for place in rows)
-        for name, row in self.moving.numbers(columns).items():
+        begun = any(place < len(flatten(like.state)) and base.names[place] not in numbers for place in rows)
+        for name, row in numbers.items():
             rows |= {place: row for place in base.places(name) if place in every or place < carried}
         phases = _phases(base.loop.phases(self.steps), carried, rows)
         if any(base.names[place].startswith("gains.") and place not in rows for place in every):
