@@ -205,7 +205,7 @@ class Lanes:
         # The carry is not made by the equation where it begins with values themselves, or with a law's memory of them.
         begun = any(place < len(flatten(like.state)) and base.names[place] not in numbers for place in rows)
         for name, row in numbers.items():
-            rows |= {place: row for place in base.places(name) if place in every or place < carried}
+            rows |= {place: row for place in base.places(name) if place in every or base.names[place] == name}
         phases = _phases(base.loop.phases(self.steps), carried, rows)
         if any(base.names[place].startswith("gains.") and place not in rows for place in every):
             gains = self.moving.gains(columns, phases[0].nominal)
