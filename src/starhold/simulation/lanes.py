@@ -244,10 +244,9 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
     rows = places(first)
     moving = len(flatten((first.state, first.effectors)))
     if _differ(loop) or (varies and loop.remembers):
-        gains, nominal = (None, None) if phase is None else (phase.gains, phase.nominal)
-        setup = loop.setup()
+        given = (None, None, loop.setup()) if phase is None else (phase.gains, phase.nominal, phase.setup)
         carries = (
-            loop.carry(unflatten(start[:, lane], loop.start), _of_lane(gains, lane), _of_lane(nominal, lane), setup)
+            loop.carry(unflatten(start[:, lane], loop.start), *(_of_lane(value, lane) for value in given))
             for lane in range(lanes)
         )
         columns = np.array([numbers_of(carry) for carry in carries]).T
