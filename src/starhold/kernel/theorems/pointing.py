@@ -28,9 +28,6 @@ def points(claim: Claim) -> Proof:
     loop = AttitudeLoop(claim)
     yield from loop.sound()
     held, numbers, samples = Held(loop), claim.numbers, 0
-    noise, swayed = Statement("", ()), AT_REST
-    if SHARE in numbers:
-        noise, swayed = yield from within_radii(claim, held.near)
     c, h = numbers["level"], held.h
     start = yield from contents(loop, loop.lyapunov)
     region = held.region(c)
@@ -40,6 +37,9 @@ def points(claim: Claim) -> Proof:
         yield "the sign never changes", Exceeds(region.least, held.turned / 2)
     tube = held.tube(region)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(tube))
+    noise, swayed = Statement("", ()), AT_REST
+    if SHARE in numbers:
+        noise, swayed = yield from within_radii(claim, held.near)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
     within = [(Fraction(0), tube.sizes[ANGLE])]
