@@ -65,6 +65,15 @@ def pytest_configure(config):
         config.pluginmanager.register(Stopwatch(config.cache))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _proofs(tmp_path_factory):
+    """Workers keep what they prove in one folder of the run, beside their own."""
+    from tests.proofs import share
+
+    own = tmp_path_factory.getbasetemp()
+    share((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "proofs")
+
+
 @pytest.fixture
 def offer(monkeypatch):
     """Let modules in a folder be the parts of another package, by its entry points, until the test ends."""
