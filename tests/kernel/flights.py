@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-
 NEXT, LAST = [1, 2, 0], [2, 0, 1]
 
 
