@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from functools import partial
 from importlib.metadata import EntryPoint
 
 # Before NumPy loads: on small matrices the library's threads only wait for one another.
@@ -72,6 +73,25 @@ def _proofs(tmp_path_factory):
 
     own = tmp_path_factory.getbasetemp()
     share((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "proofs")
+
+
+@pytest.fixture
+def _plain_code(monkeypatch):
+    """Kernels that are not optimised: the same bits at a tenth of the compiler's time, for tests that fly little."""
+    from starhold.loop import kernels
+    from starhold.trace import calling, machine
+
+    def target():
+        llvm = machine._llvm()
+        features = llvm.get_host_cpu_features().flatten()
+        return llvm.Target.from_default_triple().create_target_machine(
+            opt=0, cpu=llvm.get_host_cpu_name(), features=features
+        )
+
+    monkeypatch.setattr(machine, "_machine", target)
+    monkeypatch.setattr(kernels, "_KERNELS", {})
+    for module in (kernels, calling):
+        monkeypatch.setattr(module, "load", partial(machine.load, passes=False))
 
 
 @pytest.fixture

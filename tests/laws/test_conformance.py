@@ -17,6 +17,7 @@ from starhold.simulation.lane import fly
 from tests.refusals import refused, replaced
 from tests.tiers import WHOLE, fewer
 
+pytestmark = pytest.mark.usefixtures("_plain_code")
 LAWS = {**catalogue(), **catalogue("libration-point")}
 GOOD = Path(catalogue()["pd"].module.__file__).read_text()
 
@@ -27,8 +28,8 @@ CERTIFIED = {"lyapunov", "lqr", "matrix-pd", "sliding", "wheel", "modal"}
 
 @cache
 def verdicts(name):
-    """What is found of a law with its first gains, without what other tests find of its certificates; or, where the whole is
-    asked for, all with all that it has as examples."""
+    """What is found of a law with its first gains, without what other tests find of its certificates; where the whole is
+    asked for, with all that it has as examples."""
     law, given = LAWS[name], LAWS[name].examples()
     left = {can_be_certified} if name in CERTIFIED and not WHOLE else set()
     with (
