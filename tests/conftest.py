@@ -3,8 +3,8 @@
 import os
 import signal
 import sys
-from functools import partial
 from importlib.metadata import EntryPoint
+from unittest.mock import patch
 
 # Before NumPy loads: on small matrices the library's threads only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -12,7 +12,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
-from tests.tiers import fewer
+from starhold.loop import kernels
+from starhold.trace import calling, machine
+from tests.proofs import share
+from tests.tiers import WHOLE, fewer
 
 # Where modules are not to be kept once compiled, each process that a test starts would compile all of starhold anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -69,18 +72,32 @@ def pytest_configure(config):
 @pytest.fixture(scope="session", autouse=True)
 def _proofs(tmp_path_factory):
     """Workers keep what they prove in one folder of the run, beside their own."""
-    from tests.proofs import share
-
     own = tmp_path_factory.getbasetemp()
     share((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "proofs")
 
 
-@pytest.fixture
-def _plain_code(monkeypatch):
-    """Kernels that are not optimised: the same bits at a tenth of the compiler's time, for tests that fly little."""
-    from starhold.loop import kernels
-    from starhold.trace import calling, machine
+@pytest.fixture(scope="session", autouse=True)
+def _plain_code():
+    """Compile kernels without optimisation, with the same bits in a tenth of the time; `make test-all` has what users have."""
+    if not WHOLE:
+        _compile_by(_plainly)
 
+
+@pytest.fixture(scope="module")
+def optimised():
+    """Compile kernels as users have them: for tests that what LLVM makes of a program gives its bits."""
+    with pytest.MonkeyPatch.context() as patched:
+        _compile_by(machine.load, patched.setattr)
+        patched.setattr(kernels, "_KERNELS", {})
+        yield
+
+
+def _compile_by(load, put=setattr):
+    for module in (kernels, calling):
+        put(module, "load", load)
+
+
+def _plainly(program, width, passes=None):
     def target():
         llvm = machine._llvm()
         features = llvm.get_host_cpu_features().flatten()
@@ -88,10 +105,8 @@ def _plain_code(monkeypatch):
             opt=0, cpu=llvm.get_host_cpu_name(), features=features
         )
 
-    monkeypatch.setattr(machine, "_machine", target)
-    monkeypatch.setattr(kernels, "_KERNELS", {})
-    for module in (kernels, calling):
-        monkeypatch.setattr(module, "load", partial(machine.load, passes=False))
+    with patch.object(machine, "_machine", target):
+        return machine.load(program, width, passes=False)
 
 
 @pytest.fixture

@@ -17,7 +17,6 @@ from starhold.simulation.lane import fly
 from tests.refusals import refused, replaced
 from tests.tiers import WHOLE, fewer
 
-pytestmark = pytest.mark.usefixtures("_plain_code")
 LAWS = {**catalogue(), **catalogue("libration-point")}
 GOOD = Path(catalogue()["pd"].module.__file__).read_text()
 

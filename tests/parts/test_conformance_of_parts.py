@@ -8,7 +8,6 @@ from starhold.errors import InputError
 from starhold.parts.catalogue import PACKAGES, parts
 from tests.parts.files import ACTUATOR, ENVIRONMENT, PARTS
 
-pytestmark = pytest.mark.usefixtures("_plain_code")
 ALL = [(role, name) for role in PACKAGES for name in parts(role)]
 EVERY = {"declares_itself", "is_pure", "reads_alike", "stays_finite"}
 """Checks that say something of every part but a body."""

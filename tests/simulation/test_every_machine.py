@@ -14,6 +14,7 @@ from tests.simulation.loops import builtin, choices
 from tests.tiers import fewer, leading
 from tests.trace.machines import LEVELS, Job, on_c, on_node
 
+pytestmark = pytest.mark.usefixtures("optimised")
 STEPS = 450
 """More than the last change of a flight with faults comes after."""
 
