@@ -78,7 +78,7 @@ def _proofs(tmp_path_factory):
 
 @pytest.fixture(scope="session", autouse=True)
 def _plain_code():
-    """Compile kernels without optimisation, with the same bits in a tenth of the time; `make test-all` has what users have."""
+    """Compile kernels without optimisation: the same bits in a tenth of the time. `make test-all` has what users have."""
     if not WHOLE:
         _compile_by(_plainly)
 
