@@ -12,7 +12,7 @@ import numpy as np
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.modes import loop_of_mode
-from starhold.studies.phasing_bench import ORDER, Bench, Stage, Stimulus, blocks_of
+from starhold.studies.phasing_bench import ORDER, TORQUE, Bench, Stage, Stimulus, blocks_of
 
 SMALL = 0.25
 """A number below this share of the largest of its vector counts as 0."""
@@ -97,6 +97,10 @@ def _notes(loop: ClosedLoop, cells: Sequence[Cell], laws: Sequence[str]) -> list
     shown = {cell.stage.partition(":")[0] for cell in cells}
     parts = [f.called for role in ("sensor", "estimator", "effector") for f in loop.used(role)]
     notes = [f"{name}: no stimulus of this sheet moves it in body axes." for name in parts if name not in shown]
+    whole = [
+        n for n in parts if n in shown and {c.stage for c in cells if c.stage.startswith(f"{n}: ")} == {f"{n}: {TORQUE}"}
+    ]
+    notes += [f"{name}: the sheet tells its torque, and not what each of its units does." for name in whole]
     notes += [f"{f.called}: it passes the command on in time; the sheet leaves it out." for f in loop.used("actuator")]
     silent = [name for name in laws if name not in shown]
     notes += [f"{name}: this law asks for nothing at its first instant; the sheet begins with a torque." for name in silent]

@@ -42,8 +42,8 @@ class Block(NamedTuple):
         return list(AXES) if self.size == 3 and self.name != MOTORS else [str(k + 1) for k in range(self.size)]
 
 
-MOTORS, ACTUATORS = "motor torque", "actuators"
-"""Of wheels what each motor gives; of a loop without effectors what acts on the body."""
+MOTORS, TORQUE, ACTUATORS = "motor torque", "torque on the body", "actuators"
+"""The names of what each wheel gives, of what acts, and of what gives it in a loop without effectors."""
 UNITS: dict[str, tuple[Block, Any, Any]] = {
     "dipole": (Block("dipole", "A m^2"), lambda s: s.dipole, lambda s, v: s._replace(dipole=v)),
     "firing": (
@@ -52,8 +52,8 @@ UNITS: dict[str, tuple[Block, Any, Any]] = {
         lambda s, v: s._replace(firing=tuple(map(sign, v)), left=tuple(map(abs, v))),
     ),
 }
-"""What each unit of an effector with `switch` does, by a field of the effector's state that it has; how it is read from the
-state, and the state in which it is another."""
+"""For effectors with `switch`, by a field of their state: the block of what each unit does, how it is read from the state,
+and how a state is made that has another."""
 
 
 class Stage(NamedTuple):
@@ -119,17 +119,17 @@ class Bench:
         effectors = tuple(self._watched(f, params) for f, params in pairs)
         self.body = None
         if not any(f.part.flag("ACTS") for f in loop.used("effector")):
-            self.body = Stage("torque", ACTUATORS, (Block("torque on the body", "N m"),))
+            self.body = Stage("torque", ACTUATORS, (Block(TORQUE, "N m"),))
             self.stages.append(self.body)
         self._step = make_step(parts._replace(sensors=sensors, estimator=estimator, effectors=effectors))
 
     def vectors(self, stimulus: Stimulus, said: Mapping[Stage, Array]) -> dict[Stage, Array]:
-        """What each stage shows (SI) where some of those before it show what is said."""
+        """Tell what each stage shows (SI) where some of those before it show what is said."""
         self._said, self._shown = said, {}
         given = said.get(self.command)
-        asked = stimulus.given if given is None else tuple(given.tolist())
+        wanted = stimulus.given if given is None else tuple(given.tolist())
         loop, key = self.loop, (0, 0)
-        carry = self._step.update(stimulus.carry, 0, key, loop.gains, loop.known, self.setup, asked)
+        carry = self._step.update(stimulus.carry, 0, key, loop.gains, loop.known, self.setup, wanted)
         self._step.sample(carry, 0, self.setup)
         self._shown[self.command] = np.array(carry.command)
         if self.body is not None:
@@ -149,7 +149,7 @@ class Bench:
             return fitted.part
         self.stages.append(stage)
 
-        def told(value: Any) -> Any:
+        def heard(value: Any) -> Any:
             parts = [self._turn(value.attitude) if b.name == "attitude" else getattr(value, b.name) for b in blocks]
             vector = self._shown[stage] = np.array(flatten(tuple(parts)))
             if stage not in self._said:
@@ -160,11 +160,11 @@ class Bench:
 
         def measure(state: Any, memory: Any, params: Any, dice: Any, step: int) -> Any:
             reading, memory = module.measure(state, memory, params, Silent(), step)
-            return told(reading), memory
+            return heard(reading), memory
 
         def estimate(*given: Any) -> Any:
             value, memory = module.estimate(*given)
-            return told(value), memory
+            return heard(value), memory
 
         equation = {"measure": measure} if sensor else {"estimate": estimate}
         return replace(fitted.part, module=_Stand(module, **equation))  # pyright: ignore[reportArgumentType]
@@ -182,7 +182,7 @@ class Bench:
         elif (motors := module.command(ZERO, params)) is not ZERO:
             share = Block(MOTORS, "N m", len(motors))
         units = Stage("share", fitted.called, () if share is None else (share,))
-        torque = Stage("torque", fitted.called, (Block("torque on the body", "N m"),))
+        torque = Stage("torque", fitted.called, (Block(TORQUE, "N m"),))
         self.stages += [units, torque] if share is not None else [torque]
         act = module.applied if acts else module.reaction
 
@@ -190,7 +190,7 @@ class Bench:
             values = tuple(vector.tolist())
             return (UNITS[field][2](inner, values), command) if field else (inner, values)
 
-        def told(inner: Any, command: Any, body: Any, params: Any) -> Any:
+        def heard(inner: Any, command: Any, body: Any, params: Any) -> Any:
             if share is not None:
                 self._shown[units] = np.array(UNITS[field][1](inner) if field else command)
                 if units in self._said:
@@ -204,10 +204,10 @@ class Bench:
             return given
 
         def record(*given: Any) -> Any:
-            told(*given)
+            heard(*given)
             return module.record(*given)
 
-        equation = {"applied": told} if acts else {"record": record}
+        equation = {"applied": heard} if acts else {"record": record}
         return replace(fitted.part, module=_Stand(module, **equation))  # pyright: ignore[reportArgumentType]
 
     def _turn(self, attitude: Quaternion) -> Vector:

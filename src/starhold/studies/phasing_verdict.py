@@ -183,8 +183,8 @@ def explained(sheet: Sheet, values: Sequence[float | str | None]) -> list[tuple[
     """The sets of mistakes, at most one a stage and MOST in all, that explain what was seen; those with the fewest."""
     tests = _tests(sheet, values)
     for most in range(MOST + 1):
-        if found := list(_fitting(sheet, tests, most)):
-            return found
+        if sets := list(_fitting(sheet, tests, most)):
+            return sets
     return []
 
 
@@ -230,7 +230,7 @@ def _fitting(sheet: Sheet, tests: Mapping[tuple[int, int], Sequence[Test]], most
 
 
 def outputs(stimulus: Stimulus, stage: Stage, before: Mapping[Stage, Array], picks: Any) -> Array:
-    """What a stage shows (n, k) after those before it, with each of the mistakes of these numbers."""
+    """Tell what a stage shows (n, k) after those before it, with each of the mistakes of these numbers."""
     vector = stimulus.bench.vectors(stimulus, before)[stage]
     matrices = mistakes_of(stage)[np.asarray(picks)]
     if stage.kind == "torque" and stage.part != ACTUATORS:
@@ -290,14 +290,14 @@ def _blocks(sheet: Sheet, values: Sequence[float | str | None]) -> dict[Any, lis
 
 def _sizes(sheet: Sheet, values: Sequence[float | str | None]) -> list[str]:
     """Sentences about vectors of another size than expected."""
-    told: list[str] = []
+    sentences: list[str] = []
     for cells in _blocks(sheet, values).values():
         numbers = [abs(value) for _, value in cells if isinstance(value, float)]
         ratio = max(numbers) / max(abs(cell.value) for cell, _ in cells) if len(numbers) == len(cells) else 1.0
         if not 1.0 / FAR <= ratio <= FAR:
             first = cells[0][0]
-            told.append(f"{first.stimulus}, {first.stage}: {ratio:.2g} times the size that is expected.")
-    return told
+            sentences.append(f"{first.stimulus}, {first.stage}: {ratio:.2g} times the size that is expected.")
+    return sentences
 
 
 # --- The file ---------------------------------------------------------------------------------------------------------
@@ -320,7 +320,7 @@ def opened(path: str) -> Seen:
 
 
 def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
-    """What was seen in each cell of a sheet: a number, a sign, or None. InputError for rows that are not of this sheet."""
+    """Tell what was seen in each cell of a sheet: a number, a sign, or None. InputError for rows that are not of this sheet."""
     places = {(cell.stimulus, cell.stage, cell.axis): place for place, cell in enumerate(sheet.cells)}
     values: list[float | str | None] = [None] * len(sheet.cells)
     met: set[int] = set()
@@ -333,8 +333,8 @@ def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
                 )
         place = places.get((row["stimulus"], row["stage"], row["axis"]))
         if place is None or place in met:
-            found = "a row that is there twice" if place is not None else f"{row['stage']} {row['axis']} under this stimulus"
-            raise InputError(seen.where, f"{where}, {row['stimulus']}", found, "each row of the sheet once")
+            given = "a row that is there twice" if place is not None else f"{row['stage']} {row['axis']} under this stimulus"
+            raise InputError(seen.where, f"{where}, {row['stimulus']}", given, "each row of the sheet once")
         met.add(place)
         values[place] = _read(row[SEEN], seen.where, where)
     if all(value is None for value in values):

@@ -27,7 +27,8 @@ def present(scenario: Scenario, entry: LawEntry, seen: Seen | None, result: Phas
     sheet = result.sheet
     stages = list(dict.fromkeys(cell.stage for cell in sheet.cells))
     counts = [[stage, sum(cell.stage == stage for cell in sheet.cells)] for stage in stages]
-    blocks: list[Block] = ["", Table([Column("stage"), Column("rows", "", "d")], counts), "", *result.verdict, *sheet.notes]
+    blocks: list[Block] = ["", Table([Column("stage"), Column("rows", "", "d")], counts), "", *sheet.notes]
+    blocks = blocks if seen is None else list(result.verdict)
     sections = [Section("How the sheet is used", MANUAL)]
     sections += [Section("What was found", result.verdict)] * (result.seen is not None)
     sections.append(Section("Expected and seen", [_page(result)], fresh=True))
