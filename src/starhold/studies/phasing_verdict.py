@@ -320,7 +320,7 @@ def opened(path: str) -> Seen:
 
 
 def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
-    """Tell what was seen in each cell of a sheet: a number, a sign, or None. InputError for rows that are not of this sheet."""
+    """Tell what was seen in each cell of a sheet: a number, a sign, or None. InputError for rows of another sheet."""
     places = {(cell.stimulus, cell.stage, cell.axis): place for place, cell in enumerate(sheet.cells)}
     values: list[float | str | None] = [None] * len(sheet.cells)
     met: set[int] = set()
