@@ -302,7 +302,7 @@ def _sizes(sheet: Sheet, values: Sequence[float | str | None]) -> list[str]:
 
 # --- The file ---------------------------------------------------------------------------------------------------------
 
-KEYS = ("stimulus", "stage", "axis")
+KEYS, EXPECTED = ("stimulus", "stage", "axis"), "expected sign"
 
 
 def opened(path: str) -> Seen:
@@ -314,7 +314,8 @@ def opened(path: str) -> Seen:
         for name in (*KEYS, SEEN):
             if name not in heads:
                 raise InputError(path, "", f"no column {name}", f"the columns of phasing.csv: {', '.join((*KEYS, SEEN))}")
-        return Seen(path, [(rows.line_num, {name: (row[name] or "").strip() for name in (*KEYS, SEEN)}) for row in rows])
+        names = (*KEYS, EXPECTED, SEEN)
+        return Seen(path, [(rows.line_num, {name: (row.get(name) or "").strip() for name in names}) for row in rows])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(path, "", getattr(error, "strerror", None) or str(error), "phasing.csv, filled in") from None
 
@@ -335,6 +336,9 @@ def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
         if place is None or place in met:
             given = "a row that is there twice" if place is not None else f"{row['stage']} {row['axis']} under this stimulus"
             raise InputError(seen.where, f"{where}, {row['stimulus']}", given, "each row of the sheet once")
+        if row[EXPECTED] not in ("", sheet.cells[place].sign):
+            allowed = f"{sheet.cells[place].sign}: this sheet is of another scenario"
+            raise InputError(seen.where, f"{where}, {EXPECTED}", row[EXPECTED], allowed)
         met.add(place)
         values[place] = _read(row[SEEN], seen.where, where)
     if all(value is None for value in values):
