@@ -69,7 +69,8 @@ def exit_codes() -> list[str]:
     meanings = {
         "DIVERGED": "every motion was lost (`run` and `rerun`: the one motion), or a check failed (`check`, `check-part`)",
         "USER_ERROR": "what was asked for is wrong: one line says where, what was found and what is allowed",
-        "REFUTED": "a claim is refuted by a state; of `verify`, a campaign or a budget, a requirement is missed",
+        "REFUTED": "a claim is refuted by a state; of `verify`, a campaign or a budget, a requirement is missed; "
+        "of `phasing`, a sign is wrong",
         "UNDECIDED": "nothing is refuted or missed, but a claim or a requirement is not decided",
         "INTERNAL_ERROR": "a fault of starhold itself",
     }

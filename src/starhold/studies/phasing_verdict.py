@@ -17,7 +17,8 @@ from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest
 from starhold.scenario.reading import LawEntry, Scenario
-from starhold.studies.phasing import ACTUATORS, AXES, MOTORS, ORDER, STATED, Array, Cell, Sheet, Stage, Stimulus, sheet_of
+from starhold.studies.phasing import Cell, Sheet, sheet_of
+from starhold.studies.phasing_bench import ACTUATORS, AXES, MOTORS, ORDER, STATED, Array, Stage, Stimulus
 
 Test: TypeAlias = Callable[[Array], Any]
 """Which of some vectors (n, k) agree with what was seen."""
@@ -28,8 +29,8 @@ NEAR = 0.35
 """Numbers agree that differ by at most this share of the largest of their vector; the craft is turned by hand."""
 CLEAR = 0.15
 """A number has a sign from this share of the largest of its vector on."""
-FLOOR = 0.1
-"""Vectors shorter than this share of the expected one are not taken for longer."""
+TINY, FLOOR = 0.02, 0.1
+"""A vector below the first share of the expected one is none; up to the second share what is seen may be none."""
 FAR = 3.0
 """A vector this many times longer or shorter than it should be has another size."""
 SIGNS = {"+": 1.0, "-": -1.0, "\N{MINUS SIGN}": -1.0, "0": 0.0}
@@ -69,23 +70,24 @@ class Mistake(NamedTuple):
 
 @dataclass(frozen=True)
 class Phasing:
-    """A sheet, and if one was filled in what was seen (None: nothing), the explanations with the fewest mistakes, and
-    sentences about sizes."""
+    """A sheet, and if one was filled in what was seen (None: nothing), the explanations with the fewest mistakes, single
+    mistakes that would not show where all that was seen is right, and sentences about sizes."""
 
     sheet: Sheet
     seen: list[float | str | None] | None
     explanations: list[tuple[Mistake, ...]]
+    hidden: list[tuple[Mistake, ...]]
     sizes: list[str]
 
     @property
     def outcome(self) -> Literal["met", "missed", "undecided"]:
-        """Whether all signs are right ("met") or one is wrong ("missed"); "undecided" where rows are empty or a size is
-        another."""
+        """Whether all signs are right ("met") or one is wrong ("missed"); "undecided" where rows are empty, a mistake would
+        not show, or a size is another."""
         if self.seen is None:
             return "met"
         if self.explanations != [()]:
             return "missed"
-        return "undecided" if None in self.seen or self.sizes else "met"
+        return "undecided" if None in self.seen or self.hidden or self.sizes else "met"
 
     @property
     def verdict(self) -> list[str]:
@@ -93,17 +95,25 @@ class Phasing:
         if self.seen is None:
             return []
         empty = sum(value is None for value in self.seen)
-        left = [f"{empty} of {len(self.seen)} rows are empty: what they would show is not decided."] if empty else []
+        rest = [f"{empty} of {len(self.seen)} rows are empty: what they would show is not decided."] if empty else []
+        rest += self.sizes
         if self.explanations == [()]:
-            return ["All signs that were seen are right." if empty else "All signs are right.", *left, *self.sizes]
-        listed = [" and ".join(one.sentence for one in every) + "." for every in self.explanations]
-        if not listed:
-            return ["A sign is wrong, and no mistake of one or two parts explains what was seen.", *left, *self.sizes]
+            hidden = [f"{len(self.hidden)} mistakes of one part would not show in these rows:", *_listed(self.hidden)]
+            words = "All signs that were seen are right." if empty or self.hidden else "All signs are right."
+            return [words, *(hidden if self.hidden else []), *rest]
+        if not self.explanations:
+            return ["A sign is wrong, and no mistake of one or two parts explains what was seen.", *rest]
+        listed = _listed(self.explanations)
         if len(listed) == 1:
-            return [f"A sign is wrong. {listed[0]}", *left, *self.sizes]
-        rest = [f"and {len(listed) - SHOWN} more."] * (len(listed) > SHOWN)
-        head = f"A sign is wrong. {len(listed)} explanations fit equally; the rows do not tell them apart:"
-        return [head, *listed[:SHOWN], *rest, *left, *self.sizes]
+            return [f"A sign is wrong. {listed[0]}", *rest]
+        count = len(self.explanations)
+        return [f"A sign is wrong. {count} explanations fit equally; the rows do not tell them apart:", *listed, *rest]
+
+
+def _listed(sets: Sequence[tuple[Mistake, ...]]) -> list[str]:
+    """The first of some sets of mistakes in words."""
+    listed = [f"{' and '.join(mistake.sentence for mistake in one)}." for one in sets[:SHOWN]]
+    return listed + [f"And {len(sets) - SHOWN} more."] * (len(sets) > SHOWN)
 
 
 def study(scenario: Scenario, entry: LawEntry, seen: Seen | None = None) -> Phasing:
@@ -111,9 +121,12 @@ def study(scenario: Scenario, entry: LawEntry, seen: Seen | None = None) -> Phas
     sheet."""
     sheet = sheet_of(build(scenario, entry), entry.name)
     if seen is None:
-        return Phasing(sheet, None, [()], [])
+        return Phasing(sheet, None, [()], [], [])
     values = filled(sheet, seen)
-    return Phasing(sheet, values, explained(sheet, values), _sizes(sheet, values))
+    explanations = explained(sheet, values)
+    right = explanations == [()]
+    hidden = list(_fitting(sheet, _tests(sheet, values), 1)) if right else []
+    return Phasing(sheet, values, explanations, hidden, _sizes(sheet, values) if right else [])
 
 
 # --- Mistakes ---------------------------------------------------------------------------------------------------------
@@ -126,10 +139,11 @@ def mistakes_of(stage: Stage) -> Array:
     size = stage.blocks[0].size
     if size == 3:
         signs = product((1.0, -1.0), repeat=3)
-        plain = [np.diag(sign) @ np.eye(3)[list(order)] for order, sign in product(permutations(range(3)), list(signs))]
+        orders = (np.eye(3)[list(order)] for order in permutations(range(3)))
+        plain: list[Any] = [np.diag(sign) @ order for order, sign in product(orders, list(signs))]
         return np.array([np.kron(np.eye(len(stage.blocks)), matrix) for matrix in plain])
     unit = np.eye(size)
-    once = [np.diag(1.0 - 2.0 * row) for row in unit]
+    once: list[Any] = [np.diag(1.0 - 2.0 * row) for row in unit]
     for i, j in combinations(range(size), 2):
         order = np.arange(size)
         order[[i, j]] = j, i
@@ -138,7 +152,7 @@ def mistakes_of(stage: Stage) -> Array:
     return np.array(list({matrix.tobytes(): matrix for matrix in (unit, *once, -unit, *twice)}.values()))
 
 
-def described(matrix: Array, labels: Sequence[str]) -> str:
+def described(matrix: Any, labels: list[str]) -> str:
     """A signed permutation in words: what is exchanged and then reversed; of three axes as a turn, where it is one about
     an axis."""
     order, reversed_ = np.abs(matrix).argmax(axis=1), matrix.sum(axis=1) < 0.0
@@ -152,7 +166,7 @@ def described(matrix: Array, labels: Sequence[str]) -> str:
     elif reversed_.any():
         words.append(f"{' and '.join(label for label, back in zip(labels, reversed_, strict=True) if back)} reversed")
     text = "; ".join(words)
-    if list(labels) != list(AXES) or np.linalg.det(matrix) < 0.0:
+    if labels != list(AXES) or np.linalg.det(matrix) < 0.0:
         return text
     fixed = [k for k in range(3) if matrix[k, k] > 0.0]
     if len(fixed) != 1:
@@ -169,8 +183,8 @@ def explained(sheet: Sheet, values: Sequence[float | str | None]) -> list[tuple[
     """The sets of mistakes, at most one a stage and MOST in all, that explain what was seen; those with the fewest."""
     tests = _tests(sheet, values)
     for most in range(MOST + 1):
-        if found := list(_fitting(sheet, tests, most)):
-            return found
+        if sets := list(_fitting(sheet, tests, most)):
+            return sets
     return []
 
 
@@ -215,8 +229,8 @@ def _fitting(sheet: Sheet, tests: Mapping[tuple[int, int], Sequence[Test]], most
         yield tuple(Mistake(stage, int(k)) for stage, k in zip(sheet.stages, row, strict=True) if k)
 
 
-def outputs(stimulus: Stimulus, stage: Stage, before: Mapping[Stage, Array], picks: Sequence[int]) -> Array:
-    """What a stage shows (n, k) after those before it, with each of the mistakes of these numbers."""
+def outputs(stimulus: Stimulus, stage: Stage, before: Mapping[Stage, Array], picks: Any) -> Array:
+    """Tell what a stage shows (n, k) after those before it, with each of the mistakes of these numbers."""
     vector = stimulus.bench.vectors(stimulus, before)[stage]
     matrices = mistakes_of(stage)[np.asarray(picks)]
     if stage.kind == "torque" and stage.part != ACTUATORS:
@@ -242,21 +256,23 @@ def _tests(sheet: Sheet, values: Sequence[float | str | None]) -> dict[tuple[int
     tests: dict[tuple[int, int], list[Test]] = {}
     for (at, (first, last)), cells in _blocks(sheet, values).items():
         expected = max(abs(cell.value) for cell, _ in cells)
-        seen = {cell.place: value for cell, value in cells if value is not None}
-        numbers = [abs(value) for value in seen.values() if not isinstance(value, str)]
-        least, scale = FLOOR * expected, max([*numbers, FLOOR * expected])
         factor = math.degrees(1.0) if "deg" in cells[0][0].unit else 1.0
+        seen = {cell.place: value for cell, value in cells if value is not None}
+        largest = max((abs(value) for value in seen.values() if not isinstance(value, str)), default=0.0)
 
-        def test(vectors: Array, seen: Any = seen, ends: Any = (first, last, factor, least, scale)) -> Any:
-            first, last, factor, least, scale = ends
+        def test(vectors: Array, seen: Any = seen, more: Any = (first, last, factor, expected, largest or 1.0)) -> Any:
+            first, last, factor, expected, largest = more
             sizes = np.abs(factor * vectors[:, first:last]).max(axis=1)
-            shares = factor * vectors / np.maximum(sizes, least)[:, None]
+            none = sizes < TINY * expected
+            shares = factor * vectors / np.where(none, expected, sizes)[:, None]
             good = np.ones(len(vectors), dtype=bool)
             for place, value in seen.items():
+                share = shares[:, place]
                 if isinstance(value, str):
-                    good &= abs(shares[:, place]) < NEAR if value == "0" else shares[:, place] * SIGNS[value] > CLEAR
+                    good &= abs(share) < NEAR if value == "0" else share * SIGNS[value] > CLEAR
                 else:
-                    good &= abs(shares[:, place] - value / scale) <= NEAR
+                    small = abs(value) <= FLOOR * expected
+                    good &= np.where(none, small, abs(share - value / largest) <= NEAR)
             return good
 
         if seen:
@@ -274,19 +290,19 @@ def _blocks(sheet: Sheet, values: Sequence[float | str | None]) -> dict[Any, lis
 
 def _sizes(sheet: Sheet, values: Sequence[float | str | None]) -> list[str]:
     """Sentences about vectors of another size than expected."""
-    told: list[str] = []
+    sentences: list[str] = []
     for cells in _blocks(sheet, values).values():
         numbers = [abs(value) for _, value in cells if isinstance(value, float)]
         ratio = max(numbers) / max(abs(cell.value) for cell, _ in cells) if len(numbers) == len(cells) else 1.0
         if not 1.0 / FAR <= ratio <= FAR:
             first = cells[0][0]
-            told.append(f"{first.stimulus}, {first.stage}: {ratio:.2g} times the size that is expected.")
-    return told
+            sentences.append(f"{first.stimulus}, {first.stage}: {ratio:.2g} times the size that is expected.")
+    return sentences
 
 
 # --- The file ---------------------------------------------------------------------------------------------------------
 
-KEYS = ("stimulus", "stage", "axis")
+KEYS, EXPECTED = ("stimulus", "stage", "axis"), "expected sign"
 
 
 def opened(path: str) -> Seen:
@@ -298,13 +314,14 @@ def opened(path: str) -> Seen:
         for name in (*KEYS, SEEN):
             if name not in heads:
                 raise InputError(path, "", f"no column {name}", f"the columns of phasing.csv: {', '.join((*KEYS, SEEN))}")
-        return Seen(path, [(rows.line_num, {name: (row[name] or "").strip() for name in (*KEYS, SEEN)}) for row in rows])
+        names = (*KEYS, EXPECTED, SEEN)
+        return Seen(path, [(rows.line_num, {name: (row.get(name) or "").strip() for name in names}) for row in rows])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(path, "", getattr(error, "strerror", None) or str(error), "phasing.csv, filled in") from None
 
 
 def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
-    """What was seen in each cell of a sheet: a number, a sign, or None. InputError for rows that are not of this sheet."""
+    """Tell what was seen in each cell of a sheet: a number, a sign, or None. InputError for rows of another sheet."""
     places = {(cell.stimulus, cell.stage, cell.axis): place for place, cell in enumerate(sheet.cells)}
     values: list[float | str | None] = [None] * len(sheet.cells)
     met: set[int] = set()
@@ -317,8 +334,11 @@ def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
                 )
         place = places.get((row["stimulus"], row["stage"], row["axis"]))
         if place is None or place in met:
-            found = "a row that is there twice" if place is not None else f"{row['stage']} {row['axis']} under this stimulus"
-            raise InputError(seen.where, f"{where}, {row['stimulus']}", found, "each row of the sheet once")
+            given = "a row that is there twice" if place is not None else f"{row['stage']} {row['axis']} under this stimulus"
+            raise InputError(seen.where, f"{where}, {row['stimulus']}", given, "each row of the sheet once")
+        if row[EXPECTED] not in ("", sheet.cells[place].sign):
+            allowed = f"{sheet.cells[place].sign}: this sheet is of another scenario"
+            raise InputError(seen.where, f"{where}, {EXPECTED}", row[EXPECTED], allowed)
         met.add(place)
         values[place] = _read(row[SEEN], seen.where, where)
     if all(value is None for value in values):

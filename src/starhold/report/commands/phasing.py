@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from starhold.studies.phasing_verdict import Phasing, Seen
 
 MANUAL = (
-    "The craft stands on target and at rest, without torque from outside, its rotors at rest. Each stimulus is given by hand, "
-    "by a coil or by telecommand; all stages of its rows are read. Sizes need not be exact: signs, and which number of a "
-    "vector is large, are what counts. An attitude is told as the turn since the craft stood on target.",
-    "Numbers, or +, - and 0, go into the column `seen` of phasing.csv, which has a row for each number of this sheet; "
-    "`starhold phasing FILE --check phasing.csv -o DIR` judges them.",
+    "The craft stands on target and at rest, without torque from outside, its rotors at rest. Each stimulus is given by "
+    "hand, by coil or by telecommand, and all stages of its rows are read. Signs count, and which number of a vector is "
+    "large; sizes need not be exact. An attitude is told as the turn since the craft stood on target.",
+    "Numbers, or +, - and 0, go into the column seen of phasing.csv, which has a row for each number of this sheet; "
+    "starhold phasing FILE --check phasing.csv -o DIR judges them.",
 )
 
 
@@ -27,7 +27,8 @@ def present(scenario: Scenario, entry: LawEntry, seen: Seen | None, result: Phas
     sheet = result.sheet
     stages = list(dict.fromkeys(cell.stage for cell in sheet.cells))
     counts = [[stage, sum(cell.stage == stage for cell in sheet.cells)] for stage in stages]
-    blocks: list[Block] = ["", Table([Column("stage"), Column("rows", "", "d")], counts), "", *result.verdict, *sheet.notes]
+    blocks: list[Block] = ["", Table([Column("stage"), Column("rows", "", "d")], counts), "", *sheet.notes]
+    blocks = blocks if seen is None else list(result.verdict)
     sections = [Section("How the sheet is used", MANUAL)]
     sections += [Section("What was found", result.verdict)] * (result.seen is not None)
     sections.append(Section("Expected and seen", [_page(result)], fresh=True))
@@ -55,7 +56,7 @@ def _page(result: Phasing) -> Table:
             ends.append(len(rows) - 1)
         expected = ", ".join(f"{cell.axis} {'0' if cell.sign == '0' else f'{cell.value:+.3g}'}" for cell, _ in cells)
         shown = [
-            f"{cell.axis} {'____' if seen is None else seen if isinstance(seen, str) else f'{seen:+.3g}'}"
+            f"{cell.axis} {'…' if seen is None else seen if isinstance(seen, str) else f'{seen:+.3g}'}"
             for cell, seen in cells
         ]
         rows.append([stimulus, stage, " ".join(cell.sign for cell, _ in cells), expected, unit, ", ".join(shown)])
@@ -73,7 +74,7 @@ def _vectors(result: Phasing) -> Iterator[tuple[str, str, str, list[Any]]]:
 
 
 COMMAND = Command(
-    "Tell the sign, axis and size that each stage shows under stimuli by hand: phasing.html and phasing.csv; judge what was seen.",
+    "Tell the signs and axes that each stage shows under stimuli by hand: phasing.html, phasing.csv; judge what was seen.",
     "phasing",
     later("studies.phasing_verdict.study"),
     present,
