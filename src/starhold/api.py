@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
     from starhold.studies.linear import LinearLoop
     from starhold.studies.modal_roots import Study
+    from starhold.studies.serving import Served
     from starhold.studies.verification import RequirementVerdict
 
 
@@ -71,6 +72,29 @@ def steppers(
 
     opened = reading.open_scenario(scenario)
     return Stepper(studies.build(opened, opened.pick(law)), lanes, record)
+
+
+@shortly
+def serve(
+    scenario: reading.Scenario | str | Path,
+    law: str | None = None,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 5750,
+    udp: bool = False,
+    rate: float | None = None,
+    missing: str = "hold",
+    announce: Callable[[str], None] | None = None,
+) -> Served:
+    """Serve a scenario's plant on TCP, or UDP, to flight software that commands it, until its flight ends: see
+    docs/in-the-loop.md for the messages. `recording` of the result is the flight, `lines` tell how it went.
+
+    law: whose measurement readings have, the first if None; port: 0 for any that is free; rate: how many times faster than
+    the clock, None for lockstep; missing: "hold", "zero" or "stop", for a period of real time without a command; announce:
+    called with the address. InputError for what cannot be."""
+    from starhold.studies.serving import serve_plant
+
+    return serve_plant(reading.open_scenario(scenario), law, host, port, udp, rate, missing, announce)
 
 
 @shortly
@@ -210,7 +234,7 @@ def export_c(
     the simulation's bits, CMakeLists.txt, and the certificate whose digest the header has.
 
     name: what functions and files begin with, the law's if None; shells: what else is to call it, of "basilisk",
-    "fmu", "cfs", "fprime".
+    "fmu", "cfs", "fprime", "process".
     InputError for what has no form in C, a name that is no identifier, and a folder that holds results (unless `force`) or
     cannot be written."""
     import hashlib

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import campaign, certifying, export, parts, reproduce, studio, study
+from starhold.cli import campaign, certifying, export, parts, reproduce, serve, studio, study
 from starhold.cli.arguments import (
     DIVERGED,
     INTERNAL_ERROR,
@@ -54,9 +54,15 @@ def run(
     allow_unstable: Unstable = False,
     certify: Certified = True,
     check_step: CheckStep = False,
+    law_process: Annotated[
+        str | None,
+        typer.Option(metavar="PROGRAM", help="a program that commands in the law's place: see `export c --shell process`"),
+    ] = None,
 ) -> None:
     """Fly one law: run.nc, summary.json, pictures and report.html."""
-    flights = _fly(file, law, output, force, allow_unstable, certify, check_step, nested=False)
+    if law_process is not None and check_step:
+        raise InputError("run", "--check-step", "--law-process too", "one of the two")
+    flights = _fly(file, law, output, force, allow_unstable, certify, check_step, nested=False, process=law_process)
     if flights[0].lost is not None:
         raise typer.Exit(DIVERGED)
 
@@ -85,8 +91,10 @@ def _fly(
     certify: bool,
     check_step: bool,
     nested: bool,
+    process: str | None = None,
 ) -> list[Flight]:
-    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own."""
+    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Of a process
+    that commands, if there is one, nothing is known that could be proved or timed."""
     from starhold.report.painter import Painter
 
     # First of all, for it takes as long to get ready as the flight takes.
@@ -112,7 +120,7 @@ def _fly(
                 show(name, done, total)
 
             for entry, loop in zip(entries, loops, strict=True):
-                flights.append(studies.fly_law(scenario, entry, loop, notice))
+                flights.append(studies.fly_law(scenario, entry, loop, notice, process))
                 if entry is entries[-1]:
                     painter.start(report_of(scenario.body).picture(flights, scenario), folder)
                 write_run(flights[-1].recording, (folder / entry.name if nested else folder) / "run.nc")
@@ -122,10 +130,13 @@ def _fly(
                 studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
                 for loop, flight in zip(loops, flights, strict=True)
             ]
-        with painter.paused():
-            flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
+        if process is None:
+            with painter.paused():
+                flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
         print_outcome(flights)
-        if certify:
+        if process is not None:
+            console.print(f"The commands came from {process}: nothing is proved of it.", soft_wrap=True, markup=False)
+        elif certify:
             # What was flown is not kept waiting by proofs.
             flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         if any(flight.certificates for flight in flights):
@@ -149,6 +160,7 @@ for studied in names():
     app.command(studied)(study.command_of(studied))
 app.command()(reproduce.reproduce)
 app.add_typer(export.app, name="export")
+app.command()(serve.serve)
 app.command()(studio.studio)
 app.command()(parts.parts)
 app.command("check-part")(parts.check_part)
