@@ -39,13 +39,13 @@ def fly_by_process(
         child = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
     except (OSError, ValueError, IndexError) as error:
         raise InputError("run", "--law-process", command, f"a program that runs: {error}") from None
-    try:
-        _converse(plant, child, command, progress)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            child.communicate(timeout=GRACE)
-    finally:
-        child.kill()
-        child.wait()
+    with child:
+        try:
+            _converse(plant, child, command, progress)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                child.communicate(timeout=GRACE)
+        finally:
+            child.kill()
     return flight.samples(record_every)
 
 
