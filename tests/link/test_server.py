@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import starhold as sh
-from starhold.link.plant import Ending
+from starhold.link.plant import Ending, summary
 from starhold.link.protocol import Fault, Kind, Message, binary
 from tests.link.clients import PATIENCE, Client, served
 
@@ -52,3 +52,44 @@ def test_lockstep_has_the_bits_of_a_simulation(udp, text):
     assert not result.plant.faults
     assert len(result.plant.latencies) == STEPS + 1
     assert result.lines[0].startswith(f"Ended at step {STEPS} of {STEPS} (")
+
+
+def test_real_time_keeps_to_the_clock_and_counts_what_is_missing():
+    scenario = short("three-laws", 20)
+    period = scenario.table.simulation.control_period / 2.0
+    with served(scenario, rate=2.0, missing="zero") as (address, results):
+        client, begun = Client(address), time.monotonic()
+        client.greet()
+        # A command for the first period and one that is much too late; none for the others.
+        client.send(Kind.COMMAND, 0, (1e-3, 0.0, 0.0))
+        while client.until(Kind.READINGS).step < 5:
+            pass
+        client.send(Kind.COMMAND, 1, (5e-3, 0.0, 0.0))
+        assert client.until(Kind.REFUSED).text == Fault.LATE
+        assert client.until(Kind.STOP).text == Ending.FLOWN
+        spent = time.monotonic() - begun
+        client.close()
+    plant = results.get().plant
+    assert spent >= 20.5 * period
+    assert plant.missed + plant.commanded == 21
+    assert plant.commanded <= 1
+    assert plant.faults[Fault.LATE] >= 1
+    commands = plant.flight.recording()["command"]
+    assert commands[1:].max() == commands[1:].min() == 0.0
+    assert f"Real time at rate 2: {plant.missed} missed periods (zero)" in "\n".join(summary(plant))
+
+
+def test_a_killed_peer_ends_the_flight_and_its_recording_is_kept(tmp_path):
+    scenario = short("three-laws", 50)
+    with served(scenario) as (address, results):
+        client = Client(address)
+        client.greet()
+        for step in range(7):
+            client.send(Kind.COMMAND, step, (1e-3, 0.0, 0.0))
+            client.until(Kind.READINGS)
+        client.socket.sendall(binary(Message(Kind.COMMAND, 7, (1.0, 0.0, 0.0)))[:-5])
+        client.close()
+    result = results.get()
+    assert result.ending is Ending.GONE
+    assert result.plant.faults == {Fault.MALFORMED: 1}
+    assert len(result.recording["time"]) == 7

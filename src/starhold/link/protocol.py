@@ -13,6 +13,8 @@ from typing import Any, NamedTuple, cast
 MAGIC, VERSION = b"SHLK", 1
 HEAD, TAIL = struct.Struct("<4sBBHII"), struct.Struct("<I")
 """Magic, version, kind, zero, bytes of the payload, step; and the CRC-32 of all before it."""
+KEYS = {"kind", "version", "step", "numbers", "text", "about"}
+"""Keys of a line of JSON."""
 LINE = 2**16
 """Bytes that a line of JSON may have."""
 STEPS = 2**32
@@ -153,20 +155,20 @@ class Decoder:
                 self._skipping = True
             if len(held) < HEAD.size:
                 return
-            _, version, number, _, size, step = HEAD.unpack_from(held)
-            whole = HEAD.size + size + TAIL.size
-            fits = size <= LINE if version != VERSION or self.by_plant else size in _sizes(number)
-            if fits and len(held) < whole:
+            _, version, number, zero, size, step = HEAD.unpack_from(held)
+            end = HEAD.size + size
+            fits = version == VERSION and zero == 0 and (size <= LINE if self.by_plant else size in _sizes(number))
+            if fits and len(held) < end + TAIL.size:
                 return
-            if not fits or TAIL.unpack_from(held, whole - TAIL.size)[0] != zlib.crc32(held[: whole - TAIL.size]):
+            if not fits or TAIL.unpack_from(held, end)[0] != zlib.crc32(held[:end]):
                 # The next frame may begin within what was taken for one.
                 del held[:1]
                 self._skipping = True
-                yield Fault.MALFORMED
+                yield Fault.MALFORMED if version == VERSION or zero != 0 else Fault.VERSION
                 continue
-            payload = bytes(held[HEAD.size : whole - TAIL.size])
-            del held[:whole]
-            yield Fault.VERSION if version != VERSION else self._checked(_of_payload(number, step, payload))
+            payload = bytes(held[HEAD.size : end])
+            del held[: end + TAIL.size]
+            yield self._checked(_of_payload(number, step, payload))
 
     def _checked(self, message: Message | Fault) -> Message | Fault:
         if isinstance(message, Fault) or self.by_plant:
@@ -209,8 +211,10 @@ def _of_line(text: bytes) -> Message | Fault:
         version = content.get("version", VERSION)
         if version != VERSION or isinstance(version, bool):
             return Fault.VERSION
-        kind, step, numbers = Kind[content["kind"].upper()], content.get("step", 0), content.get("numbers", [])
-        if content["kind"] != kind.name.lower() or type(step) is not int or not 0 <= step < STEPS:
+        kind, numbers = Kind[content["kind"].upper()], content.get("numbers", [])
+        step = content["step"] if kind is Kind.COMMAND else content.get("step", 0)
+        known = content["kind"] == kind.name.lower() and content.keys() <= KEYS
+        if not known or type(step) is not int or not 0 <= step < STEPS:
             return Fault.MALFORMED
         if not isinstance(numbers, list) or any(type(x) not in (int, float, type(None)) for x in cast("list[Any]", numbers)):
             return Fault.MALFORMED
