@@ -10,7 +10,8 @@ import pytest
 import starhold as sh
 from starhold.link.plant import Ending, summary
 from starhold.link.protocol import Fault, Kind, Message, binary
-from tests.link.clients import PATIENCE, Client, served
+from tests.link.clients import Client, served
+from tests.tiers import fewer
 
 STEPS = 60
 
@@ -93,3 +94,60 @@ def test_a_killed_peer_ends_the_flight_and_its_recording_is_kept(tmp_path):
     assert result.ending is Ending.GONE
     assert result.plant.faults == {Fault.MALFORMED: 1}
     assert len(result.recording["time"]) == 7
+
+
+def test_a_second_peer_is_left_alone():
+    scenario = short("three-laws", 3)
+    with served(scenario) as (address, results):
+        # One that says nothing makes room for the next.
+        Client(address).close()
+        client = Client(address)
+        client.greet()
+        other = Client(address)
+        assert other.receive() is None
+        other.close()
+        client.send(Kind.STOP)
+        assert client.until(Kind.STOP).text == Ending.STOPPED
+        client.close()
+    result = results.get()
+    assert result.ending is Ending.STOPPED
+    assert result.plant.faults[Fault.STRANGER] == 1
+
+
+def test_only_the_first_address_commands_by_datagrams():
+    with served(short("three-laws", 3), udp=True) as (address, results):
+        client, other = Client(address), Client(address, text=True)
+        client.greet()
+        other.send(Kind.STOP)
+        other.send(Kind.COMMAND, 0, (1.0, 0.0, 0.0))
+        client.socket.sendall(b"SHLK")
+        assert client.until(Kind.REFUSED).text == Fault.MALFORMED
+        client.send(Kind.STOP)
+        client.until(Kind.STOP)
+        for one in (client, other):
+            one.close()
+    plant = results.get().plant
+    assert plant.flight.steps == 0
+    assert plant.faults == {Fault.STRANGER: 2, Fault.MALFORMED: 1}
+
+
+@pytest.mark.parametrize("udp", [False, True])
+def test_noise_on_the_line_neither_moves_nor_stops_the_plant(udp):
+    rng, count = np.random.default_rng(7), fewer(10_000, 30)
+    with served(short("three-laws"), udp=udp) as (address, results):
+        client = Client(address)
+        client.greet()
+        for k in range(count):
+            client.socket.sendall(rng.bytes(int(rng.integers(1, 100))))
+            if k % 20 == 19:
+                # The plant goes on: it answers, at the step where it was.
+                assert client.greet()[1].step == 0
+        client.send(Kind.COMMAND, 0, (0.0, 0.0, 0.0))
+        while client.until(Kind.READINGS).step != 1:
+            pass
+        client.send(Kind.STOP)
+        client.until(Kind.STOP)
+        client.close()
+    plant = results.get().plant
+    assert plant.flight.steps == plant.commanded == 1
+    assert plant.faults[Fault.MALFORMED] > count / 50
