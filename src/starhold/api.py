@@ -11,6 +11,7 @@ from starhold.scenario import reading
 from starhold.scenario.reading import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
 from starhold.studies import compare as studies
+from starhold.studies.serving import serve as serve
 from starhold.synthesis.pole_placement import place as place
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
     from starhold.studies.linear import LinearLoop
     from starhold.studies.modal_roots import Study
-    from starhold.studies.serving import Served
     from starhold.studies.verification import RequirementVerdict
 
 
@@ -72,29 +72,6 @@ def steppers(
 
     opened = reading.open_scenario(scenario)
     return Stepper(studies.build(opened, opened.pick(law)), lanes, record)
-
-
-@shortly
-def serve(
-    scenario: reading.Scenario | str | Path,
-    law: str | None = None,
-    *,
-    host: str = "127.0.0.1",
-    port: int = 5750,
-    udp: bool = False,
-    rate: float | None = None,
-    missing: str = "hold",
-    announce: Callable[[str], None] | None = None,
-) -> Served:
-    """Serve a scenario's plant on TCP, or UDP, to flight software that commands it, until its flight ends: see
-    docs/in-the-loop.md for the messages. `recording` of the result is the flight, `lines` tell how it went.
-
-    law: whose measurement readings have, the first if None; port: 0 for any that is free; rate: how many times faster than
-    the clock, None for lockstep; missing: "hold", "zero" or "stop", for a period of real time without a command; announce:
-    called with the address. InputError for what cannot be."""
-    from starhold.studies.serving import serve_plant
-
-    return serve_plant(reading.open_scenario(scenario), law, host, port, udp, rate, missing, announce)
 
 
 @shortly

@@ -56,7 +56,7 @@ class Readings:
 
 
 def sensed_of(loop: ClosedLoop) -> tuple[Any, Any, Any]:
-    """What the law of a loop is given at the start: its measurement, the readings of the sensors, the estimate."""
+    """Return what the law of a loop is given at the start: its measurement, the readings of the sensors, the estimate."""
     first = loop.phases(1)[0]
     step = make_step(loop.composition())
     return step.sense(loop.carry(), 0, (loop.seed, loop.run), first.gains, first.nominal, first.setup)[:3]
