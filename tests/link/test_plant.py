@@ -17,8 +17,8 @@ class Desk:
     def __init__(self, steps=50, rate=None, missing=Missing.HOLD, hello=True, text=False):
         self.now, self.sent, self.write = 0.0, [], line if text else binary
         self.plant = Plant(sh.stepper("three-laws"), {}, Rules(steps, rate, missing), lambda: self.now)
-        self._decoder = Decoder(by_plant=True)
-        self.plant.send = lambda data: self.sent.extend(self._decoder.feed(data))
+        self.decoder, answers = Decoder(), Decoder(by_plant=True)
+        self.plant.send = lambda data: self.sent.extend(answers.feed(data))
         if hello:
             self.tell(Kind.HELLO)
 
@@ -28,7 +28,10 @@ class Desk:
 
     def receive(self, data, datagram=False):
         self.sent.clear()
-        (self.plant.datagram if datagram else self.plant.received)(data)
+        if datagram:
+            self.plant.datagram(data)
+        else:
+            self.plant.received(data, self.decoder)
         return list(self.sent)
 
     def tick_at(self, now):

@@ -64,7 +64,7 @@ def program(folder, text):
 )
 def test_what_misbehaves_is_told_in_a_line(text, found, tmp_path, monkeypatch):
     monkeypatch.setattr(process, "PATIENCE", 2.0 if "nothing" in found else 60.0)
-    with pytest.raises(InputError, match="^run: --law-process: found ") as caught:
+    with pytest.raises(InputError, match=r"^run: --law-process: found ") as caught:
         fly_by_process(program(tmp_path, text), loop_of("lyapunov"), 10)
     assert found in str(caught.value)
 

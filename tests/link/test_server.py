@@ -99,11 +99,11 @@ def test_a_killed_peer_ends_the_flight_and_its_recording_is_kept(tmp_path):
 def test_a_second_peer_is_left_alone():
     scenario = short("three-laws", 3)
     with served(scenario) as (address, results):
-        # One that says nothing makes room for the next.
-        Client(address).close()
-        client = Client(address)
+        # Who says hello first commands, whoever came before.
+        other, client = Client(address), Client(address)
+        other.socket.sendall(b"SHL")
         client.greet()
-        other = Client(address)
+        other.send(Kind.HELLO)
         assert other.receive() is None
         other.close()
         client.send(Kind.STOP)

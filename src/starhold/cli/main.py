@@ -93,8 +93,8 @@ def _fly(
     nested: bool,
     process: str | None = None,
 ) -> list[Flight]:
-    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Of a process
-    that commands, if there is one, nothing is known that could be proved or timed."""
+    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Of a
+    process that commands, if there is one, nothing is known that could be proved or timed."""
     from starhold.report.painter import Painter
 
     # First of all, for it takes as long to get ready as the flight takes.

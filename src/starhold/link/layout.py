@@ -24,8 +24,8 @@ class Field(NamedTuple):
 
 class Layout:
     """The fields of the readings of a loop, after the time: what its own law is given (`measurement`), each sensor by its
-    name (`sensors`), the estimate (`estimate`), then the truth, which no flight software has in orbit: the body (`state`), each
-    effector by its name (`effectors`), and the target where it follows a table (`target`)."""
+    name (`sensors`), the estimate (`estimate`), then the truth, which no flight software has in orbit: the body (`state`),
+    each effector by its name (`effectors`), and the target where it follows a table (`target`)."""
 
     def __init__(self, loop: ClosedLoop) -> None:
         carry, sensed = loop.carry(), sensed_of(loop)

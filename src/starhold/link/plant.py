@@ -64,7 +64,7 @@ class Plant:
         self._about = json.dumps(about | {"steps": rules.steps, "fields": fields})
         self._readings = flight.reset()
         self.send: Callable[[bytes], None] = lambda data: None
-        self._decoder, self._is_text = Decoder(), False
+        self._is_text = False
         self.ending: Ending | None = None
         self.greeted = False
         self.faults = Counter[str]()
@@ -85,25 +85,22 @@ class Plant:
             return None
         return self._begun + (self.flight.steps + 1) * self.flight.loop.period / self.rules.rate
 
-    def received(self, data: bytes) -> None:
-        """Heed the messages in these bytes of a stream, as far as they are valid."""
-        for message in self._decoder.feed(data):
-            self._heed(message, self._decoder)
+    def received(self, data: bytes, decoder: Decoder) -> None:
+        """Heed the messages in these bytes of a stream, which has a decoder of its own, as far as they are valid."""
+        for message in decoder.feed(data):
+            self._heed(message, decoder)
 
     def datagram(self, data: bytes) -> None:
         """Heed the messages in a datagram, which holds whole ones; a line of JSON may lack its end."""
         decoder = Decoder()
-        for message in decoder.feed(data + b"\n" if data.startswith(b"{") else data):
-            self._heed(message, decoder)
+        self.received(data + b"\n" if data.startswith(b"{") else data, decoder)
         for fault in decoder.end():
             self._heed(fault, decoder)
 
-    def hang_up(self) -> None:
-        """Note that the peer is gone, in the middle of a message perhaps: the flight ends, if it had said hello."""
-        self.faults.update(self._decoder.end())
-        self._decoder = Decoder()
-        if self.greeted:
-            self.end(Ending.GONE)
+    def hang_up(self, decoder: Decoder) -> None:
+        """Note that the peer, whose stream had this decoder, is gone, in the middle of a message perhaps."""
+        self.faults.update(decoder.end())
+        self.end(Ending.GONE)
 
     def tick(self) -> None:
         """Fly the period that is over, with the command that came for it or by the rule for none."""

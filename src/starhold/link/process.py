@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from starhold.errors import InputError
 from starhold.link.plant import Ending, Plant, Rules
+from starhold.link.protocol import Decoder
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.simulation.lane import Progress
 from starhold.simulation.stepper import Stepper
@@ -54,7 +55,7 @@ def _converse(plant: Plant, child: subprocess.Popen[bytes], command: str, progre
     assert child.stdin is not None
     assert child.stdout is not None
     source, sink = child.stdout.fileno(), child.stdin.fileno()
-    waiting = bytearray()
+    waiting, decoder = bytearray(), Decoder()
     plant.send = waiting.extend
     shown = 0
     while plant.ending is None or waiting:
@@ -78,7 +79,7 @@ def _converse(plant: Plant, child: subprocess.Popen[bytes], command: str, progre
                 child.wait(GRACE)
             found = f"{at}, a process that ended with {child.returncode}"
             raise InputError("run", "--law-process", found, "a command for every step")
-        plant.received(data or b"")
+        plant.received(data or b"", decoder)
         if plant.faults:
             fault = next(iter(plant.faults))
             raise InputError(

@@ -11,6 +11,7 @@ from typing import Any, cast
 
 from starhold.errors import InputError
 from starhold.link.plant import Ending, Plant
+from starhold.link.protocol import Decoder
 
 HOST, PORT = "127.0.0.1", 5750
 UNREAD = 2**22
@@ -80,35 +81,37 @@ class _Line:
         self.plant = plant
         self.over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.peer: Any = None
-        """The connection or address that commands."""
-        self.transport: Any = None
+        """The connection or address that said hello first, and so commands."""
+        self.transports: set[asyncio.BaseTransport] = set()
         self.signal = 0
         self._timer: asyncio.TimerHandle | None = None
 
-    def received(self, data: bytes) -> None:
-        self.plant.received(data)
-        self._after()
-
-    def datagram(self, data: bytes) -> None:
-        self.plant.datagram(data)
-        self._after()
+    def heed(self, peer: Any, send: Callable[[bytes], None], heed: Callable[[], None]) -> bool:
+        """Let the plant heed what a peer sent, unless another one commands: then it is counted, and the answer is False."""
+        if self.peer not in (None, peer):
+            self.plant.strange()
+            return False
+        # Until somebody has said hello, each is answered alone.
+        self.plant.send = send
+        heed()
+        self.peer = peer if self.plant.greeted else None
+        self.after()
+        return True
 
     def interrupt(self, signal: int) -> None:
+        """End the flight because of a signal."""
         self.signal = signal
         self.plant.end(Ending.INTERRUPTED)
-        self._after()
-
-    def gone(self) -> None:
-        self.plant.hang_up()
-        self._after()
+        self.after()
 
     def close(self) -> None:
+        """Leave all peers."""
         if self._timer is not None:
             self._timer.cancel()
-        if self.transport is not None:
-            self.transport.close()
+        for transport in self.transports:
+            transport.close()
 
-    def _after(self) -> None:
+    def after(self) -> None:
         """Set the clock, or leave, after something happened."""
         if self._timer is not None:
             self._timer.cancel()
@@ -123,58 +126,47 @@ class _Line:
     def _tick(self) -> None:
         self._timer = None
         self.plant.tick()
-        self._after()
+        self.after()
 
 
 class _Stream(asyncio.Protocol):
-    """One connection. The first to come commands until it is gone; without a hello it leaves its place to the next."""
+    """One connection."""
 
     def __init__(self, line: _Line) -> None:
-        self._line = line
+        self._line, self._decoder = line, Decoder()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        line, self._transport = self._line, cast(asyncio.Transport, transport)
-        if line.peer is not None:
-            line.plant.strange()
-            transport.close()
-            return
-        line.peer, line.transport = self, transport
-        line.plant.send = self._send
+        self._transport = cast(asyncio.Transport, transport)
+        self._line.transports.add(transport)
+
+    def data_received(self, data: bytes) -> None:
+        if not self._line.heed(self, self._send, lambda: self._line.plant.received(data, self._decoder)):
+            self._transport.close()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._line.transports.discard(self._transport)
+        self._gone()
 
     def _send(self, data: bytes) -> None:
         self._transport.write(data)
         if self._transport.get_write_buffer_size() > UNREAD:
-            self._line.gone()
+            self._gone()
 
-    def data_received(self, data: bytes) -> None:
+    def _gone(self) -> None:
         if self._line.peer is self:
-            self._line.received(data)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        line = self._line
-        if line.peer is not self:
-            return
-        line.peer = line.transport = None
-        line.gone()
+            self._line.plant.hang_up(self._decoder)
+            self._line.after()
 
 
 class _Datagrams(asyncio.DatagramProtocol):
-    """One message in each datagram. The address of the first hello commands."""
+    """Datagrams, of which each holds whole messages."""
 
     def __init__(self, line: _Line) -> None:
         self._line = line
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._line.transport = transport
         self._transport = cast(asyncio.DatagramTransport, transport)
 
     def datagram_received(self, data: bytes, addr: Any) -> None:
-        line = self._line
-        if line.peer not in (None, addr):
-            line.plant.strange()
-            return
-        # Until somebody has said hello, each sender is answered alone.
-        line.plant.send = lambda answer: self._transport.sendto(answer, addr)
-        line.datagram(data)
-        if line.plant.greeted:
-            line.peer = addr
+        plant = self._line.plant
+        self._line.heed(addr, lambda answer: self._transport.sendto(answer, addr), lambda: plant.datagram(data))

@@ -80,7 +80,9 @@ def serve(
     loop = build(opened, entry)
     unit = getattr(loop.body.module, "TIME_UNIT", "s")
     if rate is not None and unit != "s":
-        raise InputError("serve", "--rate", f"a scenario whose time is in {unit}", "one in seconds, or lockstep without --rate")
+        raise InputError(
+            "serve", "--rate", f"a scenario whose time is in {unit}", "one in seconds, or lockstep without --rate"
+        )
     about: dict[str, Any] = {"scenario": opened.name, "law": entry.name}
     about["digest"] = hashlib.sha256(opened.text.encode()).hexdigest()
     plant = Plant(Stepper(loop), about, Rules(opened.table.simulation.steps, rate, Missing(missing)))
