@@ -7,6 +7,10 @@ runs as fit into some seconds. Basilisk's law is the nearest that it has, and ch
 starhold reaches the same states under that law is checked first. Basilisk's own way of keeping data sleeps for a second a
 run: it stands in the table, for it is what a user meets, but the ratios are to the way without.
 
+A micro-satellite on four wheels with a gyro and a star tracker then flies for five minutes ten thousand times: with the rate
+at the start drawn alone, and with inertia, the gyro's scale, the axes of the wheels and their friction. What the second
+takes more is what numbers cost that differ from run to run, their preparation included.
+
 The fastest round counts, by the clock on the wall. Then ten times as many runs fly once, alone in a process, for the memory.
 
 Run: python benchmarks/campaign.py    (Basilisk is left out where `bsk` is not installed)
@@ -34,15 +38,26 @@ from common import DURATION, FAST, SLOW, header, interleaved, show
 from starhold.algebra.structure import flatten
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.effectors.layouts import pyramid
 from starhold.simulation.lanes import simulate_many
 
-RUNS, MANY = 100_000, 1_000_000
+RUNS, MANY, CRAFTS = 100_000, 1_000_000, 10_000
 STEPS = round(DURATION / common.PERIOD)
 ROUNDS = 3
 BUDGET, RETAINED, CHECKED = 20.0, 8, 4
 """Seconds of a round of Basilisk's, runs that it keeps by its own policies, runs whose ends are compared."""
 KERNEL, CAMPAIGN = "starhold, kernel alone", "starhold, campaign"
 BASILISK, RETAINING = "Basilisk, Monte Carlo controller", "Basilisk, keeping by its own policies"
+START = {"initial.rate": {"distribution": "shell", "high": "0.5 deg/s"}}
+SHARE = {"distribution": "normal", "sigma": "3 %", "relative": True}
+HARDWARE = {
+    "spacecraft.inertia": SHARE,
+    "part.gyro.scale_error": {"distribution": "normal", "sigma": "0.1 %"},
+    "wheels.viscous": SHARE,
+    "wheels.coulomb": SHARE,
+    **{f"wheel[{k}].axis": {"distribution": "normal", "sigma": 0.005} for k in (1, 2, 3, 4)},
+}
+"""What is drawn of a craft for the last comparison."""
 APART = 1e-9
 """By how much the ends may differ: rad, rad/s, relative. Measured: 1e-14."""
 
@@ -76,6 +91,32 @@ def starhold_campaign(runs: int) -> float:
         }
         sh.campaign(scenario, runs=runs, over=over, law="lyapunov", folder=Path(folder, "campaign"))
         return time.perf_counter() - began
+
+
+def craft_campaign(runs: int, over: dict[str, Any]) -> None:
+    """A campaign of a craft on wheels in which this is drawn."""
+    import starhold as sh
+
+    changes = {
+        "simulation.duration": "5 min",
+        "wheels.layout": None,
+        "wheels.viscous": 1e-6,
+        "wheels.coulomb": 1e-5,
+        "wheel": [{"axis": axis} for axis in pyramid()],
+        "part": [{"type": "gyro", "noise": 1e-6}, {"type": "star-tracker", "cross": "5 arcsec", "roll": "30 arcsec"}],
+    }
+    with TemporaryDirectory() as folder:
+        scenario = sh.load("wheels-orbital").with_(changes)
+        sh.campaign(scenario, runs=runs, over=over, law="wheel", folder=Path(folder, "campaign"), search=False)
+
+
+def measure_dispersions(runs: int) -> None:
+    """Let campaigns of rates and of hardware take turns and print their ratio."""
+    tasks = {"rates": lambda: craft_campaign(runs, START), "hardware": lambda: craft_campaign(runs, HARDWARE)}
+    wall = {name: spent.wall for name, spent in interleaved(tasks, ROUNDS).items()}
+    rows = [[name, str(runs), f"{seconds:.2f}", f"{seconds / runs * 1e6:.1f}"] for name, seconds in wall.items()]
+    show(["drawn", "runs", "s", "us a run"], rows)
+    print(f"Hardware drawn / rates alone: {wall['hardware'] / wall['rates']:.2f}")
 
 
 def peak_of(runs: int) -> tuple[float, float]:
@@ -149,6 +190,7 @@ def main() -> None:
     share = 100 if given.quick else 1
     print(header("bsk"))
     measure(RUNS // share, os.cpu_count() or 1, BUDGET / (10 if given.quick else 1))
+    measure_dispersions(CRAFTS // share)
     seconds, peak = peak_of(MANY // share)
     print(f"{MANY // share} runs, campaign: {seconds:.1f} s, {peak:.2f} GB at the peak")
 

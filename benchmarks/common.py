@@ -18,11 +18,12 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from starhold.algebra.quaternion import Quaternion, vector_part
-from starhold.algebra.vector import ZERO, Vector, add, gyroscopic_torque, scale
-from starhold.laws.catalogue import Law
+from starhold.algebra.quaternion import Quaternion
+from starhold.algebra.vector import ZERO, Vector, add, gyroscopic_torque
+from starhold.laws import mrp
+from starhold.laws.catalogue import Law, catalogue
 from starhold.laws.interface import Card, Measurement, NoMemory
-from starhold.laws.pd import Gains
+from starhold.laws.mrp import Gains
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
@@ -98,15 +99,9 @@ def show(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     print()
 
 
-def feedback(seen: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
-    """u = -k_attitude sigma - k_rate w, sigma = q/(1 + q0); shown q0 >= 0, it keeps |sigma| <= 1."""
-    q = seen.attitude
-    return add(scale(-gains.k_attitude / (1.0 + q[0]), vector_part(q)), scale(-gains.k_rate, seen.rate)), memory
-
-
 def cancelling(seen: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """The feedback, and w x Jw cancelled."""
-    torque, memory = feedback(seen, gains, craft, memory)
+    torque, memory = mrp.torque(seen, gains, craft, memory)
     return add(torque, gyroscopic_torque(craft.inertia, seen.body_rate)), memory
 
 
@@ -123,7 +118,7 @@ def as_law(name: str, torque: Callable[..., Any]) -> Law:
     return Law(name, module)
 
 
-FEEDBACK = as_law("feedback", feedback)
+FEEDBACK = catalogue()["mrp"]
 FEEDBACK_GAINS = Gains(k_rate=0.09, k_attitude=0.036)
 CANCELLING = as_law("cancelling", cancelling)
 STEADY = as_law("steady", steady)

@@ -5,7 +5,8 @@ many chain shapes, the fastest counts, in explicit vectors of the widest kind th
 arithmetic, as starhold's kernels compute (a product and a sum are two instructions), and once with the two fused, which
 strict arithmetic forbids. Division and square root are measured too: they are far slower, and have a unit of their own.
 
-The operations of a step are those of the kernel's own trace, common subexpressions once and nothing in vain.
+The operations of a step are those of a lane in the kernel's own trace, common subexpressions once and nothing in vain. What
+all lanes share, such as the orbit, is computed once for all of them, and counts as nothing.
 
 Run: python benchmarks/peak.py
 """
@@ -24,10 +25,14 @@ import steps
 from common import header, interleaved, show
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Numbers, make_step, many
+from starhold.loop.kernels import Numbers, make_step
+from starhold.loop.programs import steady
 from starhold.parts.craft import make_craft
+from starhold.simulation.lanes import RunningBatch, carry_columns
 from starhold.trace.bounds import Work, work
 from starhold.trace.llvm import hexadecimal
+from starhold.trace.program import Program
+from starhold.trace.sharing import split
 
 CHAINS, DEPTH, AGAIN = (4, 8, 12, 16), 8, 100_000
 """Independent chains, operations on each in a turn of the loop, and turns."""
@@ -93,10 +98,15 @@ def chain(body: str, chains: int) -> Callable[[], None]:
     return lambda: kernel(ctypes.addressof(out))
 
 
-def operations(loop: ClosedLoop) -> Work:
-    """Operations of one control step of one lane."""
-    numbers = Numbers.of(loop.phases(1)[0])
-    program = many(make_step(loop.composition()), loop.carry(), numbers, loop.substeps, None)
+def operations(loop: ClosedLoop) -> tuple[Work, Work]:
+    """Operations of one control step of lanes with starts of their own: those that all share, and those of each."""
+    batch, numbers = RunningBatch(loop, carry_columns(loop, steps.starts(loop, 2)), 0, 2), Numbers.of(loop.phases(1)[0])
+    program, _ = steady(make_step(loop.composition()), batch.alike, loop.carry(), numbers, loop.substeps, None)
+    shared, lane = split(program, 1)
+    return _of_a_step(shared), _of_a_step(lane)
+
+
+def _of_a_step(program: Program) -> Work:
     counts = {"first": 0, "blocks": 1, "width": 1}
     one, two = (work(program, counts | {"count": count}).work for count in (1, 2))
     return Work(*(b - a for a, b in zip(one, two, strict=True)))
@@ -143,7 +153,7 @@ def main() -> None:
     counts: list[list[str]] = []
     shares: list[list[str]] = []
     for name, loop in loops.items():
-        ops = operations(loop)
+        _, ops = operations(loop)
         cells = (ops.additions, ops.multiplications, ops.divisions, ops.roots, ops.arithmetic)
         counts.append([name, *map(str, (*cells, ops.negations, ops.comparisons, ops.selects))])
         rate = ops.arithmetic / costs[name]

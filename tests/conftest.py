@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from importlib.metadata import EntryPoint
+from unittest.mock import patch
 
 # Before NumPy loads: on small matrices the library's threads only wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -11,7 +12,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
-from tests.tiers import fewer
+from starhold.loop import kernels
+from starhold.trace import calling, machine
+from tests.proofs import share
+from tests.tiers import WHOLE, fewer
 
 # Where modules are not to be kept once compiled, each process that a test starts would compile all of starhold anew.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -63,6 +67,46 @@ def pytest_configure(config):
     # Of workers the one process that starts them counts.
     if not hasattr(config, "workerinput") and getattr(config, "cache", None) is not None:
         config.pluginmanager.register(Stopwatch(config.cache))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _proofs(tmp_path_factory):
+    """Workers keep what they prove in one folder of the run, beside their own."""
+    own = tmp_path_factory.getbasetemp()
+    share((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "proofs")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _plain_code():
+    """Compile kernels without optimisation: the same bits in a tenth of the time. `make test-all` has what users have."""
+    if not WHOLE:
+        _compile_by(_plainly)
+
+
+@pytest.fixture(scope="module")
+def optimised():
+    """Compile kernels as users have them: for tests that what LLVM makes of a program gives its bits."""
+    with pytest.MonkeyPatch.context() as patched:
+        _compile_by(machine.load, patched.setattr)
+        patched.setattr(kernels, "_KERNELS", {})
+        yield
+
+
+def _compile_by(load, put=setattr):
+    for module in (kernels, calling):
+        put(module, "load", load)
+
+
+def _plainly(program, width, passes=None):
+    def target():
+        llvm = machine._llvm()
+        features = llvm.get_host_cpu_features().flatten()
+        return llvm.Target.from_default_triple().create_target_machine(
+            opt=0, cpu=llvm.get_host_cpu_name(), features=features
+        )
+
+    with patch.object(machine, "_machine", target):
+        return machine.load(program, width, passes=False)
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from starhold.errors import InputError, shortly
+from starhold.errors import InputError, optional, shortly
+from starhold.files import passing_folder
 from starhold.scenario import reading
 from starhold.scenario.reading import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from starhold.scenario.designing import Design
     from starhold.simulation.stepper import Stepper
     from starhold.studies.budget import Budget
+    from starhold.studies.environment import Environment, Environments, Reward
     from starhold.studies.failures import Failure
     from starhold.studies.flight import Flight
     from starhold.studies.linear import LinearLoop
@@ -45,20 +47,23 @@ def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
 
 @shortly
 def simulate(
-    scenario: reading.Scenario | str | Path, law: str | None = None, progress: Callable[[int, int], None] | None = None
+    scenario: reading.Scenario | str | Path,
+    law: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    process: str | None = None,
 ) -> xr.Dataset:
-    """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc, with
-    the same attributes; `attrs["diverged_at"]` (s) is there only when the motion was lost."""
+    """Fly one law of a scenario, the first if `law` is None; process: a program that commands in its place. Returns the
+    Dataset that `starhold run` writes to run.nc, with the same attributes; `attrs["diverged_at"]` (s) is there only when the
+    motion was lost."""
     opened = reading.open_scenario(scenario)
     entry = opened.pick(law)
-    return studies.record(opened, studies.build(opened, entry), progress).dataset()
+    return studies.record(opened, studies.build(opened, entry), progress, process).dataset()
 
 
 @shortly
 def stepper(scenario: reading.Scenario | str | Path, law: str | None = None, *, record: bool = True) -> Stepper:
-    """A flight of a scenario that goes on by one control period at a call of `step(command)`, with commands from outside or,
-    where none is given, of the law, the first if `law` is None: then it has the bits of `simulate`. record: whether samples
-    are kept for `dataset()`."""
+    """A flight that goes on by one control period at a call of `step(command)`. Without a command the law decides, the first
+    if `law` is None, and the bits are those of `simulate`. record: whether samples are kept for `dataset()`."""
     return steppers(scenario, None, law, record=record)
 
 
@@ -66,12 +71,28 @@ def stepper(scenario: reading.Scenario | str | Path, law: str | None = None, *, 
 def steppers(
     scenario: reading.Scenario | str | Path, lanes: int | None, law: str | None = None, *, record: bool = False
 ) -> Stepper:
-    """So many flights of a scenario side by side, each with random numbers of its own: what `stepper` tells and takes is an
-    array (lanes,) or (lanes, 3)."""
+    """So many flights side by side, each with its own random numbers: numbers are arrays (lanes,), commands (lanes, 3)."""
     from starhold.simulation.stepper import Stepper
 
     opened = reading.open_scenario(scenario)
     return Stepper(studies.build(opened, opened.pick(law)), lanes, record)
+
+
+@shortly
+def environment(
+    scenario: reading.Scenario | str | Path,
+    law: str | None = None,
+    *,
+    lanes: int | None = None,
+    reward: Reward | None = None,
+) -> Environment | Environments:
+    """A scenario as an environment of Gymnasium (extra `gym`), or of so many lanes. Flight software's readings are observed,
+    actions are commands. reward: by the readings after a period and the command; None: minus the angle to the target."""
+    optional("gymnasium", "environments", "gym")
+    from starhold.studies.environment import Environment, Environments
+
+    opened = reading.open_scenario(scenario)
+    return Environment(opened, law, reward) if lanes is None else Environments(opened, lanes, law, reward)
 
 
 @shortly
@@ -150,19 +171,8 @@ def campaign(
         for key, value in changes.items()
     }
     options = Options(engine_of(threads, workers, scheduler), resume, force, until_decided, search)
-    place = Path(_temporary() if folder is None else folder)
+    place = Path(passing_folder("campaign") if folder is None else folder)
     return fly_campaign(with_campaign(reading.open_scenario(scenario), plain), place, law, options, progress)
-
-
-def _temporary() -> str:
-    """A new folder that goes with this process."""
-    import atexit
-    import shutil
-    import tempfile
-
-    folder = tempfile.mkdtemp(prefix="starhold-campaign-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
 
 
 @shortly
@@ -260,7 +270,7 @@ def export_aem(
 
     into = Path(file)
     about = {"object_name": object_name, "object_id": object_id, "frame": frame, "version": version}
-    write_run(_read_run(run), into, epoch, about)
+    write_run(run, into, epoch, about)
     return into
 
 
@@ -269,8 +279,8 @@ def export_requirements(
     scenario: reading.Scenario | str | Path, file: str | Path, original: str | Path | None = None
 ) -> Path:
     """Write the requirements of a scenario, with their attributes, to a CSV or ReqIF file, by its suffix, and return the
-    path. original: a ReqIF file whose content is kept but for what differs in the requirements. A scenario reads such files
-    where a [[requirement]] names one as its `file`. InputError for another suffix and for what cannot be written."""
+    path. original: a ReqIF file whose content is kept but for what differs. A scenario reads such files where a
+    [[requirement]] names one as its `file`. InputError for another suffix and for what cannot be written."""
     from starhold.scenario.requirement_files import write_requirement_file
 
     into = Path(file)
@@ -296,22 +306,10 @@ def read_aem(file: str | Path) -> Aem:
         raise InputError(str(file), "", str(error), "a CCSDS attitude ephemeris message") from None
 
 
-def _read_run(run: xr.Dataset | str | Path) -> xr.Dataset:
-    if not isinstance(run, str | Path):
-        return run
-    import xarray as xr
-
-    path = Path(run) / "run.nc" if Path(run).is_dir() else Path(run)
-    try:
-        return xr.load_dataset(path, engine="h5netcdf")
-    except OSError as error:
-        raise InputError(str(path), "", error.strerror or "no netCDF-4 file", "a run.nc, or the folder of one") from None
-
-
 @shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
-    """Tell what is left of a scenario on wheels after the loss of any one or two of them, under a law, or the first; proof:
-    how near to its target the loop is proved to stay after each, too, which takes seconds each."""
+    """Tell what is left after the loss of any one or two wheels, under a law, or the first; proof: how near its target the
+    loop is proved to stay after each, too, which takes seconds each."""
     return studied("failures", scenario, law, proof=proof)
 
 

@@ -4,6 +4,7 @@ import signal
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import wraps
+from importlib import import_module
 from typing import Any, TypeVar, cast
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -56,6 +57,19 @@ def shortly(function: _Function) -> _Function:
             raise error.with_traceback(None) from None
 
     return cast(_Function, called)
+
+
+def optional(name: str, user: str, bundle: str) -> Any:
+    """The module of this name; InputError, with the extra that installs it, where its package is missing. user: what needs
+    it."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        # A module missing from inside a package that is installed is another matter.
+        if error.name is None or error.name.partition(".")[0] != name.partition(".")[0]:
+            raise
+        package = name.partition(".")[0]
+        raise InputError(user, "", "", f"need {package}: pip install 'starhold[{bundle}]'") from None
 
 
 def _one_line(text: str) -> str:

@@ -1,5 +1,6 @@
 """Files appear under their names only when they are whole, and only one process at a time writes into a folder."""
 
+import atexit
 import errno
 import os
 import shutil
@@ -77,3 +78,10 @@ def atomic_write(path: Path) -> Generator[Path]:
     finally:
         if hidden is not None:
             shutil.rmtree(hidden, ignore_errors=True)
+
+
+def passing_folder(purpose: str) -> str:
+    """Make a folder that goes when this process ends."""
+    folder = tempfile.mkdtemp(prefix=f"starhold-{purpose}-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder

@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import sympy
-from flint import arb, ctx
+from flint import ctx
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from starhold.loop.kernels import form
 from starhold.trace.calling import Compiled
+from tests.algebra.balls import UNDECIDED, Ball, arb_of
 
 EXACT_BITS = 400
 """Precision of the balls that stand for the exact value."""
@@ -57,14 +58,14 @@ def agree(function: Callable[..., Any], *arguments: Any) -> Any:
     the balls account for.
     """
     plain = same(function, *arguments)
-    balls = list(leaves(function(*convert(arguments, arb))))
+    balls = list(leaves(function(*convert(arguments, Ball))))
     with ctx.workprec(EXACT_BITS):
-        exact = list(leaves(function(*convert(arguments, arb))))
+        exact = list(leaves(function(*convert(arguments, Ball))))
     symbolic = list(leaves(function(*convert(arguments, sympy.Rational))))
     for value, ball, true, symbol in zip(leaves(plain), balls, exact, symbolic, strict=True):
         if value is None or isinstance(value, bool):
-            assert value == true or true is None, (function, arguments, value, true)
-            assert ball is None or ball == true, (function, arguments, ball, true)
+            assert value == true or true is UNDECIDED, (function, arguments, value, true)
+            assert ball in (None, UNDECIDED, true), (function, arguments, ball, true)
             assert symbol is None or bool(symbol) == value, (function, arguments, value, symbol)
         else:
             assert contains(ball, true), (function, arguments, ball, true)
@@ -94,17 +95,17 @@ def leaves(value: Any) -> Iterator[Any]:
 def contains(ball: Any, other: Any) -> bool:
     """Whether a ball contains another (a number stands for itself)."""
     with ctx.workprec(EXACT_BITS):
-        return arb(ball).contains(arb(other))
+        return arb_of(ball).contains(arb_of(other))
 
 
 def middle(ball: Any) -> float:
     """The float nearest to the middle of a ball."""
-    return float(arb(ball).mid())
+    return float(arb_of(ball).mid())
 
 
 def radius(ball: Any) -> float:
     """The radius of a ball."""
-    return float(arb(ball).rad())
+    return float(arb_of(ball).rad())
 
 
 def close(a: Any, b: Any, tolerance: float) -> bool:

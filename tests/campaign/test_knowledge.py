@@ -2,8 +2,10 @@
 
 import re
 
+import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import solve_ivp
 
 import starhold as sh
 from starhold.campaign import lanes as lane_making
@@ -49,6 +51,43 @@ def test_a_drawn_inertia_is_not_told_to_the_law_unless_it_is_said():
         assert frame["effort"].to_numpy() == pytest.approx(efforts, rel=1e-12)
         flown.append(frame["effort"])
     assert (flown[0] != flown[1]).all()
+
+
+def effort_by_scipy(flown, supposed, rate, duration=10.0, period=0.2, limit=0.3):
+    """The integral of |u| over a turn of a rigid body under the law lyapunov, written from the textbook: Euler's equation
+    for the inertia that is flown, the law with the one that it supposes, its torque held for a control period."""
+
+    def rates(_, state, torque):
+        q, w = state[:4], state[4:]
+        turned = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
+        return np.concatenate([turned, (torque - np.cross(w, flown * w)) / flown])
+
+    begun = np.array([0.9, 0.1, -0.3, 0.2])
+    state = np.concatenate([begun / np.linalg.norm(begun), rate])
+    effort = 0.0
+    for _ in range(round(duration / period)):
+        q, w = state[:4], state[4:]
+        torque = np.clip(np.cross(w, supposed * w) - LYAPUNOV["k_rate"] * w - LYAPUNOV["k_attitude"] * q[1:], -limit, limit)
+        effort += np.linalg.norm(torque) * period
+        state = solve_ivp(rates, (0.0, period), state, args=(torque,), rtol=1e-10, atol=1e-12).y[:, -1]
+    return effort
+
+
+def test_flights_of_an_inertia_that_the_law_does_not_know_are_those_of_an_integration_by_others():
+    """The body turns fast, so that the gyroscopic torque matters, which the law cancels for the inertia that it supposes."""
+    fast, nominal = [0.3, -0.2, 0.4], np.array(SMALL["spacecraft"]["inertia"])
+    start = {"attitude": [0.9, 0.1, -0.3, 0.2], "rate": fast}
+    scenario = turn(initial=start, sensor={}, environment={}, spacecraft=SMALL["spacecraft"])
+    scenario = scenario.with_({"simulation.substeps": 4})
+    found = {}
+    for known in (False, True):
+        over = {"spacecraft.inertia": normal("10 %", relative=True, known_to_law=known)}
+        frame = fly(scenario=scenario, over=over, requirement=[], runs=4).frame()
+        flown = [np.array(drawn(row)) for _, row in frame.iterrows()]
+        expected = [effort_by_scipy(inertia, inertia if known else nominal, rate=fast) for inertia in flown]
+        assert frame["effort"].to_numpy() == pytest.approx(expected, rel=1e-6)
+        found[known] = frame["effort"].to_numpy()
+    assert (np.abs(found[True] / found[False] - 1.0) > 1e-4).all()
 
 
 CASES = {
@@ -111,6 +150,10 @@ def test_the_verdict_says_what_the_law_knows():
     assert told.endswith(
         "The law supposes the file's own spacecraft.inertia, and is told each drawn spacecraft.torque_limit."
     )
+    for action, told in (("none", "never learns"), ("reallocate", "learns at the diagnosis each drawn")):
+        scenario = turn(fault=[{"time": 1.0, "inertia": [2.2, 3.1, 4.4], "action": action}])
+        (law,) = fly(scenario=scenario, over={"fault[1].inertia": INERTIA}, requirement=asked, runs=5).laws
+        assert law.verdicts[0].sentence().endswith(f"The law {told} fault[1].inertia.")
     rate = {"initial.rate": normal(0.01)}
     (law,) = fly(scenario=turn(), over=rate, requirement=asked, runs=5).laws
     assert "The law" not in law.verdicts[0].sentence()
@@ -123,11 +166,50 @@ def test_the_verdict_says_what_the_law_knows():
         ({"sensor.rate_noise": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
         ({"law.lyapunov.k_rate": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
         ({"initial.rate[1]": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
+        (
+            {"fault[1].inertia": INERTIA | {"known_to_law": True}},
+            "false, for the action on a fault says what laws learn of it",
+        ),
     ],
 )
 def test_what_no_law_can_know_and_the_old_name_are_refused(over, told):
+    unnoticed = {"time": 1.0, "inertia": [2.2, 3.1, 4.4], "action": "none"}
+    scenario = turn(initial={"rate": [0.01, 0.0, 0.0]}, fault=[unnoticed])
     with pytest.raises(InputError, match=re.escape(told)):
-        begin(with_campaign(turn(initial={"rate": [0.01, 0.0, 0.0]}), {"over": over, "runs": 3}), ["lyapunov"])
+        begin(with_campaign(scenario, {"over": over, "runs": 3}), ["lyapunov"])
+
+
+MODELLED = """
+from typing import Annotated, NamedTuple
+from starhold.parts.contract import Card, Parameter
+CARD = Card("A leak", "M = const", ("none",), ("constant",))
+ROLE = "environment"
+MODELLED = True
+class Params(NamedTuple):
+    torque: Annotated[tuple, Parameter("N m", shape=(3,), text="of the leak")]
+def torque(state, params, craft, memory):
+    return params.torque
+def examples():
+    return [Params((1e-3, 0.0, 0.0))]
+"""
+
+
+def test_what_every_command_is_computed_with_is_drawn_only_as_known(tmp_path):
+    """Else a verdict would be that of a law that is told, and not say so."""
+    (tmp_path / "leak.py").write_text(MODELLED, encoding="utf-8")
+    leak = {"file": "leak.py", "torque": [1e-3, 0.0, 0.0]}
+    thrusters = {"type": "thrusters", "torque": [0.2, 0.2, 0.2]}
+    asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
+    for part, key in ((leak, "part.leak.torque"), (thrusters, "part.thrusters.torque")):
+        scenario = short(4.0, [LYAPUNOV], folder=tmp_path, part=[part])
+        with pytest.raises(InputError, match="known_to_law: found false; allowed: true, for commands of laws are computed"):
+            begin(with_campaign(scenario, {"over": {key: normal(1e-4)}, "runs": 3}), ["lyapunov"])
+        over = {key: normal(1e-4, known_to_law=True)}
+        (law,) = fly(scenario=scenario, over=over, requirement=asked, runs=5).laws
+        assert law.verdicts[0].sentence().endswith(f"The law is told each drawn {key}.")
+    over = {"part.thrusters.lever": normal(0.1)}
+    (law,) = fly(scenario=scenario, over=over, requirement=asked, runs=5).laws
+    assert "The law" not in law.verdicts[0].sentence()
 
 
 def test_a_scenario_may_say_what_its_laws_suppose():

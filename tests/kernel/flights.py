@@ -5,9 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+NEXT, LAST = [1, 2, 0], [2, 0, 1]
+
 
 def cross(a, b):
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return a[NEXT] * b[LAST] - a[LAST] * b[NEXT]
 
 
 def along(v):
@@ -95,6 +97,8 @@ class Around:
         self.kept = 0.7 * (bounds.momentum or 0.0) * along(rng.normal(size=(3, lanes)))
 
     def target(self, q, t):
+        if not self.bounds.rate and not self.bounds.acceleration:
+            return np.zeros((2, *self.axis.shape))
         angle = self.swing * t + self.phase
         rate, slope = self.bounds.rate * np.cos(angle), -self.bounds.acceleration * np.sin(angle)
         return seen(q, rate * self.axis), seen(q, slope * self.axis)

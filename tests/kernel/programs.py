@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 
@@ -21,6 +22,7 @@ PLAIN = {
 }
 
 
+@cache
 def number(text):
     return float.fromhex(text) if "x" in text else float(Fraction(text))
 

@@ -35,7 +35,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     w, q = x[:3], np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]])
     told = [n.get(f"outside.{k}", 0.0) for k in range(3)]
     bounds = Surroundings(told, n["target.rate"], n["target.acceleration"], n["momentum"], 0.0, 0.0)
-    Q, H, F, size, rest = held.fall(region)
+    Q, H, F, size, rest = held.fall(tube)
     Q, H, F = floats(Q), floats(H), floats(F)
     corners = np.array([floats(A) for A in held.corners()])
     linear = [(corners[9 + 2 * k] - corners[8 + 2 * k]) / (2 * 1.4144 * n["momentum"]) for k in range(3)]
@@ -68,7 +68,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
         # All of the motion in A of the momentum, or all of it what noise adds, which is in A without momentum.
         whole, swayed = np.einsum("ijk,jk->ik", A, x), (region.sizes[SPEED], region.sizes[ANGLE])
         for after, radii in ((whole, AT_REST), (floats(held.near.A) @ x, swayed)):
-            left, ((B, b), *others) = y - after, held.linear(region, radii)
+            left, ((B, b), *others) = y - after, held.linear(tube, radii)
             v = np.linalg.solve(floats(B)[:3], left[:3])
             used = float(np.linalg.norm(v, axis=0).max()) / float(b)
             assert used <= 1.0

@@ -92,8 +92,8 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     sizes = np.array([float(region.sizes[name]) for name in STATE])
     assert (np.abs(x).max(axis=1) <= sizes).all()
     assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
-    Q, H, F, pushed, rest = held.fall(region)
-    Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(region, AT_REST)
+    Q, H, F, pushed, rest = held.fall(tube)
+    Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(tube, AT_REST)
     # What F has beside the push is of its growth in a period.
     grown, A = float(pushed / (tube.held + tube.pushed)), held.near.A
     V = oracle.lyapunov(q, w)
@@ -190,7 +190,9 @@ def wide_entry(numbers, told):
     held = held_loop("calm")
     chain = Chain(held, "", 0.0)
     told["levels"] = [told["levels"][0] | {"end": str(Fraction(numbers["level"]) / 2)}]
-    numbers["end.angle"], numbers["end.rate"] = chain.tighten(held.region(Fraction(told["levels"][0]["end"])), AT_REST)
+    numbers["end.angle"], numbers["end.rate"] = chain.tighten(
+        held.tube(held.region(Fraction(told["levels"][0]["end"]))), AT_REST
+    )
     told["ellipsoids"] = [one | {"reach": "1000001/1000000"} for one in chain.ellipsoids]
     numbers["settling"] = 15.0
 

@@ -1,11 +1,15 @@
 """A plant heeds what is valid, counts what is not, and keeps to a clock, which here is a number."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import starhold as sh
 from starhold.link.plant import Ending, Missing, Plant, Rules, summary
 from starhold.link.protocol import Decoder, Fault, Kind, Message, binary, line
+from starhold.simulation.stepper import Stepper
+from tests.export.flown import loop_of
 from tests.tiers import WHOLE
 
 PUSH = (1e-3, 0.0, 0.0)
@@ -87,6 +91,19 @@ def test_the_flight_ends_with_the_command_after_its_last_step():
     assert desk.tell(Kind.COMMAND, 2, (2e-3, 0.0, 0.0)) == [Message(Kind.STOP, 2, (), Ending.FLOWN)]
     assert desk.torques == [1e-3, 0.0, 2e-3]
     assert desk.tell(Kind.COMMAND, 3, PUSH) == []
+
+
+def test_a_motion_that_diverges_ends_the_flight():
+    loop = replace(loop_of("lyapunov"), limit="none")
+    plant, sent, answers = Plant(Stepper(loop), {}, Rules(50)), [], Decoder(by_plant=True)
+    plant.send = lambda data: sent.extend(answers.feed(data))
+    decoder = Decoder()
+    plant.received(binary(Message(Kind.HELLO)), decoder)
+    while plant.ending is None:
+        plant.received(binary(Message(Kind.COMMAND, plant.flight.steps, (1e9, 0.0, 0.0))), decoder)
+    assert plant.ending is Ending.DIVERGED
+    assert sent[-1] == Message(Kind.STOP, plant.flight.steps, (), Ending.DIVERGED)
+    assert plant.flight.recording().attrs["diverged_at"] == plant.flight.time
 
 
 def test_stop_ends_the_flight():

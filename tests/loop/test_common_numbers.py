@@ -5,7 +5,8 @@ import pytest
 from starhold.algebra.structure import flatten
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Numbers, fly_plainly, form, make_step, many
+from starhold.loop.kernels import Numbers, fly_plainly, form, make_step
+from starhold.loop.programs import many
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft

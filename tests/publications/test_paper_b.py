@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from starhold.loop.kernels import Numbers, make_step, replay
+from starhold.loop.kernels import Numbers, make_step
+from starhold.loop.programs import replay
 from starhold.publications.desk import Desk
 from starhold.publications.paper import read_paper
 from starhold.publications.papers.A import measures as wheels

@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from starhold.algebra.structure import flatten
-from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, one, state_of
+from starhold.loop.kernels import Arguments, Numbers, form, make_step, numbers_of, state_of
+from starhold.loop.programs import one
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 from tests.simulation.loops import builtin, choices
 from tests.tiers import fewer, leading
 from tests.trace.machines import LEVELS, Job, on_c, on_node
 
+pytestmark = pytest.mark.usefixtures("optimised")
 STEPS = 450
 """More than the last change of a flight with faults comes after."""
 
@@ -35,10 +37,24 @@ def steps_of(name: str) -> int:
     return COSTLY if is_costly(name) else STEPS if LOOPS[name].events else fewer(STEPS, 15)
 
 
-SCENARIOS = {name.partition(":")[0]: name for name in reversed(LOOPS)}
-FIRST = set(SCENARIOS.values()) | {"three-laws-noise: mpc"}
-SIBLINGS = {name for name in LOOPS if name not in FIRST or name.endswith("example 0, noise") or name.startswith("mpc")}
-"""Of the same parts or the same law as another loop: for `make test-all`."""
+def choices_of(loop: Any) -> set[Any]:
+    """What a loop is made of: its law, its parts with what is constant in a kernel, and what it is told to do."""
+    steps = ("in steps", loop.substeps > 1), ("changes", bool(loop.events))
+    made = [(f.part.name, getattr(f.params, "allocation", None)) for f in loop.parts]
+    return {loop.law.name, loop.sign_policy, loop.limit, loop.body.name, *steps, *made}
+
+
+def siblings() -> set[str]:
+    """Loops that are made of nothing that one before lacks, those of many parts first: for `make test-all`."""
+    seen, found = set[Any](), set[str]()
+    for name in sorted(LOOPS, key=lambda name: -len(LOOPS[name].parts)):
+        own = choices_of(LOOPS[name])
+        found |= {name} if own <= seen else set()
+        seen |= own
+    return found
+
+
+SIBLINGS = siblings()
 
 
 class Leg(NamedTuple):

@@ -14,6 +14,7 @@ from starhold.simulation.lane import fly, simulate
 from starhold.simulation.lanes import carry_columns, simulate_many, stacked
 from tests.making import ORBITAL, aimed, noise
 
+pytestmark = pytest.mark.usefixtures("optimised")
 STEPS, LANES = 60, 300
 TURNED = (0.6, 0.0, 0.8, 0.0)
 

@@ -323,3 +323,32 @@ def values(seed: int) -> dict[str, Any]:
         return np.where(random.random(shape) < 0.3, random.choice(SPECIAL, shape), numbers)
 
     return {"cells": some(CELLS, 16), "table": some(TABLE), "out": some(OUT, 16)}
+
+
+def turns(script: Script) -> Subject:
+    """The script in each turn of a loop, in each block of lanes, with two numbers that all lanes share handed on from turn
+    to turn, and what it leaves."""
+
+    def equation(cells: Buffer, table: Buffer, blocks: Any, count: Any, seed: Any, lane: Any) -> None:
+        def block(b: Any) -> None:
+            mine = cells.part(b * CELLS, CELLS)
+
+            def turn(k: Any, x: Any, y: Any, *state: Any) -> tuple[Any, ...]:
+                scope = _Scope(mine, table, [])
+                scope.indices = [count, 2, k]
+                _take(scope, state)
+                scope.numbers += [mine[0], table[0], x, y]
+                scope.truths.append(less(x, y))
+                scope.words.append(word_xor(seed, word_of(k)))
+                run(script.main, scope)
+                return where(less_equal(x, table[1]), x * table[2] - y, sqrt(y)), x + number_of(k), *_left(scope)
+
+            words = word_add(seed, lane), word_add(seed, word_of(b))
+            x, y, a, b_, truth, word = repeat(count, turn, table[3], 1.0, mine[1], table[4], less(mine[2], 0.0), words[0])
+            mine.put(0, (x, y, a, b_))
+            mine.put(1, (where(truth, 1.0, 0.0), *_numbers_of(word), small_number(shift_right(words[1], 20))))
+
+        repeat(blocks, block)
+
+    memories = (Memory("cells", True, True, 2 * CELLS), Memory("table", False, False, TABLE))
+    return Subject(equation, memories, {"blocks": INDEX, "count": INDEX, "seed": WORD})

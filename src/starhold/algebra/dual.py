@@ -32,7 +32,7 @@ class Dual:
     """A value, and its derivatives (n,) by n variables."""
 
     __slots__ = ("slopes", "value")
-    reader: ClassVar[str] = "dual"
+    reader: ClassVar[str] = "itself"
 
     def __init__(self, value: float, slopes: NDArray[np.float64]) -> None:
         self.value, self.slopes = value, slopes

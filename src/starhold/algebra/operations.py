@@ -1,7 +1,7 @@
 """An operation has a plain meaning, and one for every other reader of an equation.
 
 An operation is written once, as a function of floats under `@operation(...)`, which names its meaning for SymPy, for
-balls, for exact polynomials, and in the languages that a trace is printed in. The type of a number picks the meaning.
+exact polynomials, and in the languages that a trace is printed in. The type of a number picks the meaning.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ and counters of loops) and truths about them. A static argument is a Python numb
 
 PRINTED = ("llvm", "c", "javascript")
 """Languages; a text for each, with {0}, {1}, ... for the operands."""
-EXACT = ("symbolic", "ball", "polynomial")
+EXACT = ("symbolic", "polynomial")
 """Readers that prove; operations on words and indices mean nothing to them."""
 
 _PLAIN = frozenset((float, int, bool))
-_LIBRARIES = {"sympy": "symbolic", "flint": "ball"}
+_LIBRARIES = {"sympy": "symbolic", "flint": "polynomial"}
+"""Whose numbers read as what; those of flint are coefficients."""
 
 
 class Operation(NamedTuple):
@@ -73,21 +74,17 @@ def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
     for value, reader in zip(values, map(_reader, values), strict=True):
         if reader == "record":
             return value.recorder.apply(entry, values)
-        if reader == "dual":
+        if reader == "itself":
             return value.read(entry, values)
-    # SymPy and polynomials keep their own truths; a ball's are True, False and None.
-    reader = next((reader for reader in readers if reader != "ball"), "ball")
-    if reader not in entry.meanings:
-        raise TypeError(f"{entry.name} means nothing to the reader {reader}")
-    return entry.meanings[reader](*values)
+    if readers[0] not in entry.meanings:
+        raise TypeError(f"{entry.name} means nothing to the reader {readers[0]}")
+    return entry.meanings[readers[0]](*values)
 
 
 def _reader(value: Any) -> str | None:
     """Return the reader of a number; None for plain ones."""
     if isinstance(value, (float, int)) or type(value).__name__ == "bool_":
         return None
-    if value is None:
-        return "ball"
     cls = cast(Any, type(value))
     declared: str | None = getattr(cls, "reader", None)
     root = cls.__module__.partition(".")[0]

@@ -1,9 +1,9 @@
 """Every reader of an equation understands these scalar operations.
 
 An equation is a plain function over numbers and tuples of numbers. Python floats, a trace (which is printed as machine
-code, C and JavaScript), SymPy symbols, balls (python-flint `arb`) and exact polynomials all read the same text, so it may
-use only `+ - * /`, other equations, the operations of this module and the loops of `structured`: no `math`, no `if` on a
-number, no NumPy array.
+code, C and JavaScript), SymPy symbols, dual numbers and exact polynomials all read the same text, so it may use only
+`+ - * /`, other equations, the operations of this module and the loops of `structured`: no `math`, no `if` on a number, no
+NumPy array.
 
 A comparison yields a `Truth`; only `where`, `both`, `either` and `opposite` consume it.
 """
@@ -19,7 +19,7 @@ from starhold.algebra.operations import EXACT, library, operation
 Scalar: TypeAlias = float
 """A number of any reader; typed as float, the reader that type checkers can follow."""
 Truth: TypeAlias = Any
-"""The type of a comparison: a bool, a SymPy relation, a recorded truth, or True, False or None of balls."""
+"""The type of a comparison: a bool, a SymPy relation, or a recorded truth."""
 
 
 def _native(operator: Any) -> dict[str, Any]:
@@ -42,14 +42,6 @@ def _of(module: str, name: str) -> Any:
         return getattr(library(module), name)(*values)
 
     return call
-
-
-def _ball(x: Any) -> Any:
-    return library("flint").arb(x)
-
-
-def _ball_sqrt(x: Any) -> Any:
-    return _ball(x).sqrt()
 
 
 @operation("number number", "number", llvm="fadd {number} {0}, {1}", c="{0} + {1}", javascript="{0} + {1}",
@@ -90,33 +82,21 @@ def negative(a: Scalar) -> Scalar:
 
 
 @operation("number", "number", llvm="call {number} @llvm.sqrt.{suffix}({number} {0})", c="sqrt({0})",
-           javascript="Math.sqrt({0})", symbolic=_sympy("sqrt"), ball=_ball_sqrt,
-           polynomial=_polynomial("sqrt"))  # fmt: skip
+           javascript="Math.sqrt({0})", symbolic=_sympy("sqrt"), polynomial=_polynomial("sqrt"))  # fmt: skip
 def sqrt(x: Scalar) -> Scalar:
     """Return the square root; NaN for a negative float, as compiled code gives."""
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
-def _ball_less(a: Any, b: Any) -> bool | None:
-    a, b = _ball(a), _ball(b)
-    return True if a < b else False if a >= b else None
-
-
-def _ball_less_equal(a: Any, b: Any) -> bool | None:
-    return _ball_not(_ball_less(b, a))
-
-
 @operation("number number", "truth", llvm="fcmp olt {number} {0}, {1}", c="{0} < {1}", javascript="{0} < {1}",
-           symbolic=_sympy("StrictLessThan"), ball=_ball_less,
-           polynomial=_polynomial("less"))  # fmt: skip
+           symbolic=_sympy("StrictLessThan"), polynomial=_polynomial("less"))  # fmt: skip
 def less(a: Scalar, b: Scalar) -> Truth:
     """Tell whether a < b."""
     return bool(a < b)
 
 
 @operation("number number", "truth", llvm="fcmp ole {number} {0}, {1}", c="{0} <= {1}", javascript="{0} <= {1}",
-           symbolic=_sympy("LessThan"), ball=_ball_less_equal,
-           polynomial=_polynomial("less_equal"))  # fmt: skip
+           symbolic=_sympy("LessThan"), polynomial=_polynomial("less_equal"))  # fmt: skip
 def less_equal(a: Scalar, b: Scalar) -> Truth:
     """Tell whether a <= b."""
     return bool(a <= b)
@@ -126,16 +106,9 @@ def _symbolic_select(condition: Any, a: Any, b: Any) -> Any:
     return library("sympy").Piecewise((a, condition), (b, True))
 
 
-def _ball_select(condition: bool | None, a: Any, b: Any) -> Any:
-    if condition is None:
-        # Undecided: a ball that holds both branches.
-        return _ball(a).union(_ball(b))
-    return a if condition else b
-
-
 @operation("truth number number", "number", llvm="select {truth} {0}, {number} {1}, {number} {2}", c="{0} ? {1} : {2}",
            javascript="{0} ? {1} : {2}", symbolic=_symbolic_select,
-           ball=_ball_select, polynomial=_polynomial("where"))  # fmt: skip
+           polynomial=_polynomial("where"))  # fmt: skip
 def select(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
     """Do as `where` does, on a condition that is not known while recording."""
     return a if condition else b
@@ -148,37 +121,22 @@ def where(condition: Truth, a: Scalar, b: Scalar) -> Scalar:
     return select(condition, a, b)
 
 
-def _ball_and(a: bool | None, b: bool | None) -> bool | None:
-    if a is False or b is False:
-        return False
-    return None if a is None or b is None else True
-
-
-def _ball_not(a: bool | None) -> bool | None:
-    return None if a is None else not a
-
-
-def _ball_or(a: bool | None, b: bool | None) -> bool | None:
-    return _ball_not(_ball_and(_ball_not(a), _ball_not(b)))
-
-
 @operation("truth truth", "truth", llvm="and {truth} {0}, {1}", c="{0} && {1}", javascript="{0} && {1}",
-           symbolic=_sympy("And"), ball=_ball_and, polynomial=_polynomial("both"))  # fmt: skip
+           symbolic=_sympy("And"), polynomial=_polynomial("both"))  # fmt: skip
 def both(a: Truth, b: Truth) -> Truth:
     """Return the logical and, without short circuit."""
     return a and b
 
 
 @operation("truth truth", "truth", llvm="or {truth} {0}, {1}", c="{0} || {1}", javascript="{0} || {1}",
-           symbolic=_sympy("Or"),
-           ball=_ball_or, polynomial=_polynomial("either"))  # fmt: skip
+           symbolic=_sympy("Or"), polynomial=_polynomial("either"))  # fmt: skip
 def either(a: Truth, b: Truth) -> Truth:
     """Return the logical or, without short circuit."""
     return a or b
 
 
 @operation("truth", "truth", llvm="xor {truth} {0}, {yes}", c="!{0}", javascript="!{0}",
-           symbolic=_sympy("Not"), ball=_ball_not, polynomial=_polynomial("opposite"))  # fmt: skip
+           symbolic=_sympy("Not"), polynomial=_polynomial("opposite"))  # fmt: skip
 def opposite(a: Truth) -> Truth:
     """Return the logical not."""
     return not a

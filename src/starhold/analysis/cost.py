@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Arguments, Numbers, make_kernel, numbers_of, replay
+from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, numbers_of
+from starhold.loop.programs import replay
 from starhold.simulation.lane import Recording, recorded
 
 CALLS = 50_000
@@ -22,17 +23,21 @@ class Replay:
     to call."""
 
     def __init__(self, loop: ClosedLoop, states: NDArray[np.float64]) -> None:
-        # The noise of the simulation is no part of a call.
-        loop = loop.without("random-torque") if loop.used("estimator") else loop.without("random-torque", "sensor")
-        numbers = Numbers.of(loop.phases(1)[0])
-        arguments = Arguments(*numbers)
-        self._kernel, self._seed = make_kernel(replay, loop.composition(), 1, loop.carry(), numbers), loop.seed
+        self._kernel, loop = compile_calls(loop)
+        self._seed, arguments = loop.seed, Arguments(*Numbers.of(loop.phases(1)[0]))
         self._memories = {"states": np.ascontiguousarray(states), "shared": arguments.shared, "own": arguments.shared}
         self._memories |= {"tables": arguments.tables, "carry": np.array(numbers_of(loop.carry()))}
 
     def __call__(self, first: int, last: int) -> None:
         """Call the law on states first .. last-1."""
         self._kernel(self._memories, first, last - first, self._seed, 0)
+
+
+def compile_calls(loop: ClosedLoop) -> tuple[Kernel, ClosedLoop]:
+    """Return the code that repeats the calls of a loop's law, and the loop with what is part of a call."""
+    # The noise of the simulation is no part of one.
+    loop = loop.without("random-torque") if loop.used("estimator") else loop.without("random-torque", "sensor")
+    return make_kernel(replay, loop.composition(), 1, loop.carry(), Numbers.of(loop.phases(1)[0])), loop
 
 
 def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float64]:

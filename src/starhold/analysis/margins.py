@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from starhold.analysis.linear import AXES, Linear
 
@@ -110,6 +109,9 @@ def _log_size(values: Any) -> Any:
 def _roots(w: Any, values: Any, function: Callable[[float], float]) -> list[float]:
     """The frequencies at which a function changes its sign between two of w; not those at which it jumps, as it does across
     a resonance without damping."""
+    # Loaded here, for it takes long and not every loop has margins.
+    from scipy.optimize import brentq
+
     roots: list[float] = []
     for p in np.flatnonzero((values[:-1] < 0.0) != (values[1:] < 0.0)):
         root = float(brentq(function, w[p], w[p + 1], xtol=1e-9 * w[p], rtol=1e-9))  # pyright: ignore

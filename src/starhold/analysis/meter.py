@@ -20,7 +20,8 @@ from starhold.algebra.structure import flatten
 from starhold.algebra.vector import dot, most
 from starhold.algebra.words import number_of
 from starhold.loop.closed_loop import ClosedLoop, Composition
-from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step, over_samples
+from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step
+from starhold.loop.programs import over_samples
 from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
 

@@ -46,6 +46,11 @@ class Dispersion:
         return ", ".join(self.keys)
 
     @property
+    def known(self) -> bool:
+        """Whether what laws suppose has the drawn values too."""
+        return self.distribution.known_to_law or not self.nominal_tables
+
+    @property
     def wordy(self) -> bool:
         """Whether a word is drawn, or a truth by its word."""
         return self.places[0].wordy
@@ -159,11 +164,17 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
     tables, body = read_toml(scenario.text, scenario.where), scenario.hooks
     nominal: dict[str, Any] = {}
     for reading in readings:
-        key, name = reading.place.key, str(reading.place.path[0])
+        key, path = reading.place.key, reading.place.path
+        name = str(path[0])
         modelled = name in body.modelled or (name in body.designed and _designs(tables) and key not in scenario.table.shared)
+        computed = name == "part" and scenario.parts[int(path[1])].part.is_known(str(path[2]))
+        if computed and not table.known_to_law:
+            raise reading.place.refuse("known_to_law", "false", "true, for commands of laws are computed with this number")
+        if name == "fault" and table.known_to_law:
+            raise reading.place.refuse("known_to_law", "true", "false, for the action on a fault says what laws learn of it")
         if name == body.marker and not modelled and not table.known_to_law:
             raise reading.place.refuse("known_to_law", "false", "true, for laws of this body know the numbers of this table")
-        if table.known_to_law and not modelled and name != body.marker:
+        if table.known_to_law and not modelled and not computed and name != body.marker:
             raise reading.place.refuse("known_to_law", "true", "false, for no law is told it or designed with it")
         given = scenario.table.nominal
         if modelled and (name in given or not table.known_to_law):

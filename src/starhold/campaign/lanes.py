@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.structure import flatten, leaves, mapped
 from starhold.campaign.dispersions import Dispersion
+from starhold.campaign.moving import Moving
 from starhold.campaign.sampling import Plan
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop, Phase
@@ -23,9 +24,8 @@ from starhold.scenario.building import build
 from starhold.scenario.making import variants
 from starhold.scenario.reading import Scenario
 from starhold.simulation.lanes import carry_columns, stacked
-from starhold.studies.flat import Flat, named, named_numbers, shown_name
-from starhold.trace.calling import Compiled
-from starhold.trace.handles import Handle
+from starhold.studies.flat import Flat, named_numbers, shown_name
+from starhold.trace.handles import RecordingError
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
@@ -62,6 +62,7 @@ class Lanes:
         self.steps = scenario.table.simulation.steps
         self.first = plan.columns(0, 1)
         self.base = self.exact(self.first)
+        self.moving = Moving(scenario, scenario.pick(law), self.base, plan.dispersions)
         self.moved: dict[str, set[int]] = {}
         self._varied: list[Flat] = []
         more = plan.columns(0, min(TRIES, plan.runs))
@@ -107,7 +108,7 @@ class Lanes:
         """The lanes of runs of these numbers (lanes,), drawn as the columns say, in lots: with the place of each of their
         lanes among all, and the numbers read back. InputError where a run's scenario is refused; where `refused` (lanes,) is
         given such lanes are left out, and marked there."""
-        impossible = self.scenario.hooks.refused(self.scenario, self._by_key(columns))
+        impossible = self.scenario.hooks.refused(self.scenario, self.moving.by_key(columns))
         if impossible is not None and impossible.any():
             if refused is None:
                 place = int(np.flatnonzero(impossible)[0])
@@ -121,8 +122,9 @@ class Lanes:
         looked = left[sorted({0, len(left) // 2})]
         if self.at_once and self._agrees(_some(columns, looked), runs[looked], refused is None):
             lot = self._together(_some(columns, left), runs[left])
-            yield lot, left, self._readings(lot)
-            return
+            if lot is not None:
+                yield lot, left, self._readings(lot)
+                return
         if refused is None:
             flats = dict(enumerate(self._each(columns, runs.tolist())))
         else:
@@ -166,22 +168,13 @@ class Lanes:
     def _agrees(self, columns: Columns, runs: NDArray[np.int64], strict: bool = True) -> bool:
         """Whether the numbers of these runs, made at once, are those of each one's own scenario. InputError where one is
         refused; where that is not strict, they do not agree."""
-        try:
-            numbers = np.array([*_numbers(self._together(columns, runs)).values()])
-        except (ValueError, TypeError):
+        lot = self._together(columns, runs)
+        if lot is None:
             return False
+        numbers = np.array([*_numbers(lot).values()])
         pairs = enumerate(runs.tolist())
         flats = self._each(columns, runs.tolist()) if strict else (self._tried(columns, *pair) for pair in pairs)
         return all(self.base.gives(flat, numbers[:, lane]) for lane, flat in enumerate(flats))
-
-    def _by_key(self, columns: Columns) -> dict[str, Array]:
-        """The values that are numbers, (components..., lanes), by key."""
-        return {
-            key: np.moveaxis(values, 0, -1)
-            for dispersion in self.plan.dispersions
-            if not dispersion.wordy
-            for key, values in dispersion.arrays(columns).items()
-        }
 
     @cached_property
     def _follows(self) -> dict[int, str]:
@@ -195,39 +188,37 @@ class Lanes:
                     followed[place] = equal[0]
         return followed
 
-    @cached_property
-    def _equation(self) -> tuple[Compiled, list[str]]:
-        """Return the loop's numbers that follow from drawn values, and their names in a carry or in a phase."""
-        hooks, names = self.scenario.hooks, list[str]()
-        drawn = hooks.drawn(self.scenario, self._by_key(self.first))
-        first = {key: mapped(value, lambda lanes: float(lanes[0])) for key, value in drawn.items()}
+    def _together(self, columns: Columns, runs: NDArray[np.int64]) -> Lot | None:
+        """Lanes made at once; None where they cannot be."""
+        try:
+            return self._made(columns, runs)
+        except (ValueError, TypeError, RecordingError):
+            return None
 
-        def numbers(*values: Any) -> tuple[Any, ...]:
-            moved = hooks.moved(self.scenario, self.base.loop, dict(zip(first, values, strict=True)))
-            made = {"state": moved.made_with, "craft": moved.craft, "nominal": moved.craft}
-            pairs = [pair for prefix, value in made.items() for pair in named(value, prefix) if isinstance(pair[1], Handle)]
-            names[:] = [name for name, _ in pairs]
-            return tuple(number for _, number in pairs)
-
-        return Compiled(numbers, *first.values()), names
-
-    def _together(self, columns: Columns, runs: NDArray[np.int64]) -> Lot:
-        """Lanes made at once: numbers that are values, and those that the body makes of values."""
-        base, moved = self.base, set[int]().union(*self.moved.values())
+    def _made(self, columns: Columns, runs: NDArray[np.int64]) -> Lot:
+        """Lanes of numbers that are values, and of those that equations make of values."""
+        base, every = self.base, set[int]().union(*self.moved.values())
         rows: dict[int, Array] = {place: columns[name].astype(float) for place, name in self._follows.items()}
-        drawn = self.scenario.hooks.drawn(self.scenario, self._by_key(columns))
-        if drawn:
-            equation, names = self._equation
-            for name, row in zip(names, equation.over(np.array([*leaves(tuple(drawn.values()))])), strict=True):
-                rows |= {place: row for place in base.places(name) if place in moved}
         like = base.loop.carry()
         carried, moving = len(numbers_of(like)), len(flatten((like.state, like.effectors)))
+        numbers = self.moving.numbers(columns)
+        # The carry is not made by the equation where it begins with values themselves, or with a law's memory of them.
+        begun = any(place < len(flatten(like.state)) and base.names[place] not in numbers for place in rows)
+        for name, row in numbers.items():
+            rows |= {place: row for place in base.places(name) if place in every or base.names[place] == name}
         phases = _phases(base.loop.phases(self.steps), carried, rows)
-        starts = np.repeat(base.numbers[:moving, None], len(runs), axis=1)
-        for place in range(moving):
+        if any(base.names[place].startswith("gains.") and place not in rows for place in every):
+            gains = self.moving.gains(columns, phases[0].nominal)
+            rows |= {place: row for name, row in gains.items() for place in base.places(name)}
+            phases = _phases(base.loop.phases(self.steps), carried, rows)
+        carries = np.repeat(base.numbers[:carried, None], len(runs), axis=1)
+        for place in range(carried):
             if place in rows:
-                starts[place] = rows[place]
-        return Lot(runs, base.loop, carry_columns(base.loop, starts, phases[0]), phases)
+                carries[place] = rows[place]
+        varying = any(isinstance(leaf, np.ndarray) for leaf in leaves((phases[0].gains, phases[0].nominal)))
+        if begun or (varying and base.loop.remembers):
+            carries = carry_columns(base.loop, carries[:moving], phases[0])
+        return Lot(runs, base.loop, carries, phases)
 
     def _apart(self, flats: Sequence[Flat], runs: NDArray[np.int64]) -> Lot:
         """Lanes of one form, each made by itself."""

@@ -149,7 +149,7 @@ class Plan:
         for dispersion in self.dispersions:
             changed = dispersion.change(values)
             changes |= changed
-            if dispersion.distribution.known_to_law or not dispersion.nominal_tables:
+            if dispersion.known:
                 changes |= {f"nominal.{key}": value for key, value in changed.items() if path_of(key, {}, "")[0] in nominal}
         return changes
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from starhold.analysis.meter import Meter
 from starhold.campaign import envelopes, sensitivity
 from starhold.campaign.chunk import LEAST, MOST
-from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.drivers import Drivers, find_drivers
 from starhold.campaign.job import Job
 from starhold.campaign.results import QUANTILES, Again, LawResult, Spread
 from starhold.campaign.store import Store
 from starhold.campaign.verdicts import Verdict, judge
+from starhold.scenario.bodies.rigid_body.faults import action_on
 from starhold.studies.requirements import Requirement
 
 BARS, WIDE = 60, 100.0
@@ -118,18 +118,24 @@ def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_d
         columns,
         independent=job.table.sampling == "random",
         until_decided=until_decided,
-        knowledge=_knowledge(job.dispersions),
+        knowledge=_knowledge(job, law),
     )
 
 
-def _knowledge(dispersions: Sequence[Dispersion]) -> str:
+def _knowledge(job: Job, law: str) -> str:
     """A sentence on which drawn values the law is told; none where it is told no number of its craft in any case."""
-    clauses: list[str] = []
-    for known, words in ((False, "supposes the file's own"), (True, "is told each drawn")):
-        among = [one for one in dispersions if one.distribution.known_to_law == known and (known or one.nominal_tables)]
-        keys = [key for one in among for key in one.keys]
-        clauses += [f"{words} {' and '.join(keys)}"] if keys else []
-    return f"The law {', and '.join(clauses)}." if clauses else ""
+    clauses: dict[str, list[str]] = {"supposes the file's own": [], "is told each drawn": []}
+    clauses |= {"learns at the diagnosis each drawn": [], "never learns": []}
+    supposed, known, learnt, missed = clauses.values()
+    for one in job.dispersions:
+        if one.distribution.known_to_law or not one.known:
+            (known if one.known else supposed).extend(one.keys)
+        for place in one.places:
+            if place.path[0] == "fault" and place.path[2] == "inertia":
+                fault = job.scenario.table.fault[int(place.path[1])]
+                (missed if action_on(fault, job.scenario.pick(law)) == "none" else learnt).append(place.key)
+    said = [f"{words} {' and '.join(keys)}" for words, keys in clauses.items() if keys]
+    return f"The law {', and '.join(said)}." if said else ""
 
 
 def _drivers(

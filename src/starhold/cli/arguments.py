@@ -1,5 +1,6 @@
 """Arguments and exit codes that several commands share."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,4 +28,15 @@ Why = Annotated[bool, typer.Option("--why", help="tell how each claim was shown,
 Unstable = Annotated[bool, typer.Option("--allow-unstable", help="take gains that are known to be unstable")]
 Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or fly alone")]
 CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with half the integration step: how much changes?")]
+
+
+class Drawn(StrEnum):
+    """A choice of what is drawn once the table is printed."""
+
+    NONE = "none"
+    PAGE = "page"
+    ALL = "all"
+
+
+Pictures = Annotated[Drawn, typer.Option("--pictures", help="draw nothing, report.html alone, or PNG files too")]
 OneLaw = Annotated[str | None, typer.Option(help="which law of the file; all if not given")]

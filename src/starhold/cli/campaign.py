@@ -12,8 +12,10 @@ from starhold.cli.arguments import (
     REFUTED,
     UNDECIDED,
     CampaignOutput,
+    Drawn,
     Force,
     OneLaw,
+    Pictures,
     RunOutput,
     ScenarioFile,
     Unstable,
@@ -110,14 +112,14 @@ def rerun(
     law: Annotated[str | None, typer.Option(help="which law of the campaign; its first if not given")] = None,
     output: RunOutput = None,
     force: Force = False,
+    pictures: Pictures = Drawn.ALL,
 ) -> None:
     """Fly one run of a campaign again, bit for bit: run.nc, its scenario file, pictures and report.html."""
     from starhold.campaign.again import fly_again
     from starhold.cli.console import console
-    from starhold.cli.show import print_outcome
+    from starhold.cli.show import print_outcome, print_results
     from starhold.files import atomic_write
-    from starhold.report.body import report_of
-    from starhold.report.figures import paint
+    from starhold.report.painter import Painter
     from starhold.report.results import open_folder, write_results, write_run
 
     again = fly_again(folder, run, law)
@@ -126,14 +128,17 @@ def rerun(
     write_run(flight.recording, place / "run.nc")
     with atomic_write(place / "scenario.toml") as hidden:
         hidden.write_text(scenario.text, encoding="utf-8")
-    paint(report_of(scenario.body).picture([flight], scenario), place)
     print_outcome([flight])
-    page = write_results(scenario, [flight], place)
+    with Painter(scenario, [flight], place, pictures is Drawn.ALL) as painter:
+        page = write_results(scenario, [flight], place, pictures is not Drawn.NONE)
+        unpainted = painter.finish()
     if again.differs:
         names = ", ".join(again.differs[:4])
         console.print(f"[red]Other bits than in the campaign, as another machine may compute: {names}[/red]", soft_wrap=True)
     else:
         console.print("The same bits as in the campaign.")
-    console.print(f"Report: {page}", soft_wrap=True)
+    print_results(page)
+    if unpainted is not None:
+        raise unpainted
     if flight.lost is not None:
         raise typer.Exit(DIVERGED)

@@ -21,8 +21,10 @@ from starhold.cli.arguments import (
     USER_ERROR,
     Certified,
     CheckStep,
+    Drawn,
     Force,
     Output,
+    Pictures,
     RunOutput,
     ScenarioFile,
     Unstable,
@@ -37,7 +39,6 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="Design, certify, fly and compare control laws for spacecraft.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -54,6 +55,7 @@ def run(
     allow_unstable: Unstable = False,
     certify: Certified = True,
     check_step: CheckStep = False,
+    pictures: Pictures = Drawn.ALL,
     law_process: Annotated[
         str | None,
         typer.Option(metavar="PROGRAM", help="a program that commands in the law's place: see `export c --shell process`"),
@@ -62,7 +64,9 @@ def run(
     """Fly one law: run.nc, summary.json, pictures and report.html."""
     if law_process is not None and check_step:
         raise InputError("run", "--check-step", "--law-process too", "one of the two")
-    flights = _fly(file, law, output, force, allow_unstable, certify, check_step, nested=False, process=law_process)
+    flights = _fly(
+        file, law, output, force, allow_unstable, certify, check_step, pictures, nested=False, process=law_process
+    )
     if flights[0].lost is not None:
         raise typer.Exit(DIVERGED)
 
@@ -75,9 +79,10 @@ def compare(
     allow_unstable: Unstable = False,
     certify: Certified = True,
     check_step: CheckStep = False,
+    pictures: Pictures = Drawn.ALL,
 ) -> None:
     """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
-    flights = _fly(file, None, output, force, allow_unstable, certify, check_step, nested=True)
+    flights = _fly(file, None, output, force, allow_unstable, certify, check_step, pictures, nested=True)
     if all(flight.lost is not None for flight in flights):
         raise typer.Exit(DIVERGED)
 
@@ -90,29 +95,33 @@ def _fly(
     allow_unstable: bool,
     certify: bool,
     check_step: bool,
+    pictures: Drawn,
     nested: bool,
     process: str | None = None,
 ) -> list[Flight]:
     """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Of a
     process that commands, if there is one, nothing is known that could be proved or timed."""
-    from starhold.report.painter import Painter
+    from starhold.scenario.reading import load
 
-    # First of all, for it takes as long to get ready as the flight takes.
-    with Painter() as painter:
-        from starhold.cli.console import console
-        from starhold.cli.show import flying, print_outcome
-        from starhold.report.body import report_of
-        from starhold.report.results import open_folder, write_results, write_run
-        from starhold.scenario.reading import load
-        from starhold.studies import compare as studies
+    # Before what flies and prints is loaded, so that what is wrong with it is said at once.
+    scenario = load(file, allow_unstable)
+    from starhold.cli.console import console
+    from starhold.cli.show import flying, print_outcome, print_results
+    from starhold.report.results import open_folder, write_results, write_run
+    from starhold.studies import compare as studies
+    from starhold.studies.timing import Stopwatch
 
-        scenario = load(file, allow_unstable)
-        entries = list(scenario.laws) if nested else [scenario.pick(law)]
-        # All of them before the first flight, so that what is wrong with the last is said at once.
-        loops = [studies.build(scenario, entry) for entry in entries]
-        name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
-        folder = open_folder(output or Path("results") / name, force)
-        flights: list[Flight] = []
+    entries = list(scenario.laws) if nested else [scenario.pick(law)]
+    # All of them before the first flight, so that what is wrong with the last is said at once.
+    loops = [studies.build(scenario, entry) for entry in entries]
+    name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
+    folder = open_folder(output or Path("results") / name, force)
+    flights: list[Flight] = []
+
+    def keep(flight: Flight) -> None:
+        write_run(flight.recording, (folder / flight.name if nested else folder) / "run.nc")
+
+    with Stopwatch(scenario, loops if process is None else []) as stopwatch:
         with flying(entries, scenario.table.simulation.steps) as show:
 
             def notice(name: str, done: int, total: int) -> None:
@@ -120,32 +129,36 @@ def _fly(
                 show(name, done, total)
 
             for entry, loop in zip(entries, loops, strict=True):
+                for flight in flights[-1:]:
+                    keep(flight)
                 flights.append(studies.fly_law(scenario, entry, loop, notice, process))
-                if entry is entries[-1]:
-                    painter.start(report_of(scenario.body).picture(flights, scenario), folder)
-                write_run(flights[-1].recording, (folder / entry.name if nested else folder) / "run.nc")
-        # While the pictures are drawn.
-        if check_step:
-            flights = [
-                studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
-                for loop, flight in zip(loops, flights, strict=True)
-            ]
-        if process is None:
-            with painter.paused():
-                flights = [studies.timed(scenario, loop, flight) for loop, flight in zip(loops, flights, strict=True)]
-        print_outcome(flights)
-        if process is not None:
-            console.print(f"The commands came from {process}: nothing is proved of it.", soft_wrap=True, markup=False)
-        elif certify:
-            # What was flown is not kept waiting by proofs.
+        try:
+            if check_step:
+                flights = [
+                    studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
+                    for loop, flight in zip(loops, flights, strict=True)
+                ]
+            if process is None:
+                flights = [stopwatch.timed(place, flight) for place, flight in enumerate(flights)]
+            print_outcome(flights)
+            if process is not None:
+                console.print(f"The commands came from {process}: nothing is proved of it.", soft_wrap=True, markup=False)
+        finally:
+            # The table does not wait for it, and nothing that was flown is lost.
+            keep(flights[-1])
+
+    from starhold.report.painter import Painter
+
+    with Painter(scenario, flights, folder, pictures is Drawn.ALL) as painter:
+        if certify and process is None:
             flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         if any(flight.certificates for flight in flights):
             from starhold.cli.show_certificates import print_proved
 
             print_proved(flights)
-        page = write_results(scenario, flights, folder)
+        page = write_results(scenario, flights, folder, pictures is not Drawn.NONE)
         unpainted = painter.finish()
-    console.print(f"Report: {page}", soft_wrap=True)
+    print_results(page)
     if unpainted is not None:
         raise unpainted
     return flights

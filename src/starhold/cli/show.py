@@ -16,6 +16,8 @@ from starhold.report.commands import Block, Heading
 from starhold.report.commands import Table as Rows
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from starhold.scenario.reading import LawEntry
     from starhold.studies.flight import Flight
 
@@ -64,6 +66,11 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
             said, kept = transient_text(flight), flight.metrics["limits_kept"]
             console.print(f"{flight.name}: {said}", style=None if kept else "yellow", markup=False)
+
+
+def print_results(path: Path) -> None:
+    """Print where to look: at the page, or into the folder where there is none."""
+    console.print(f"{'Results' if path.is_dir() else 'Report'}: {path}", soft_wrap=True)
 
 
 def _step_text(flight: Flight) -> str:

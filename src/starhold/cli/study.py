@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from starhold.cli.arguments import REFUTED, UNDECIDED, Force, Rocq, Unstable, results_in
+from starhold.cli.arguments import REFUTED, UNDECIDED, Drawn, Force, Pictures, Rocq, Unstable, results_in
 from starhold.errors import InputError
 from starhold.report.commands import Command, command
 
@@ -67,7 +67,12 @@ def command_of(name: str) -> Any:
     declared = command(name)
 
     def run(
-        output: Path | None = None, force: bool = False, allow_unstable: bool = False, rocq: bool = False, **given: Any
+        output: Path | None = None,
+        force: bool = False,
+        allow_unstable: bool = False,
+        rocq: bool = False,
+        pictures: Drawn = Drawn.ALL,
+        **given: Any,
     ) -> None:
         from starhold.cli.console import console
         from starhold.cli.show import print_blocks
@@ -97,7 +102,8 @@ def command_of(name: str) -> Any:
         with _progress(declared) as notice:
             result = declared.result(subject, notice, proof)
         print_blocks(result.blocks)
-        written = write_result(result, name, title, folder) if declared.suffix else dict[str, Path]()
+        shown = result if pictures is Drawn.ALL else result._replace(figure=None)
+        written = write_result(shown, name, title, folder) if declared.suffix else dict[str, Path]()
         for key, path in paths.items():
             kind = declared.options[key].file
             written["Table" if kind == "csv" else key.capitalize()] = write_part(result, kind, path)
@@ -110,7 +116,7 @@ def command_of(name: str) -> Any:
     kinds = _parameters(declared)
     defaults: dict[str, Any] = {key: option.default for key, option in declared.options.items()}
     defaults |= {"file": inspect.Parameter.empty} if declared.listed is None else {}
-    defaults |= {"proof": False, "force": False, "allow_unstable": False, "rocq": False}
+    defaults |= {"proof": False, "force": False, "allow_unstable": False, "rocq": False, "pictures": Drawn.ALL}
     parameters = [
         inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=defaults.get(key))
         for key, kind in kinds.items()
@@ -140,6 +146,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
     if declared.suffix:
         subject = "SCENARIO" if declared.read is None else "SYSTEM"
         kinds["output"] = Annotated[Path | None, results_in(f"{subject}-{declared.suffix}")]
+        kinds |= {"pictures": Pictures} if "png" in declared.kinds else {}
     if declared.proofs:
         kinds["rocq"] = Rocq
     if "output" in kinds:

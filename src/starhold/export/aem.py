@@ -53,9 +53,10 @@ class Aem(NamedTuple):
 
 
 def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) -> None:
-    """Write the attitudes of a run, a Dataset, as a message. epoch: UTC at its start, None for its own; about: further
-    arguments of `write_aem`. InputError for a run without attitudes, a word that does not fit, and a file that cannot be
-    written."""
+    """Write the attitudes of a run, a Dataset, a run.nc or its folder, as a message. epoch: UTC at its start, None for its
+    own; about: further arguments of `write_aem`. InputError for a run without attitudes, a word that does not fit, and a
+    file that cannot be written."""
+    run = _opened(run) if isinstance(run, str | Path) else run
     if "attitude" not in run:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
     times, attitudes = run["time"].to_numpy(), run["attitude"].to_numpy()
@@ -66,6 +67,16 @@ def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) ->
         write_aem(path, times, attitudes, epoch=begun, **about)
     except ValueError as error:
         raise InputError("export aem", "", str(error), "what a CCSDS message may hold") from None
+
+
+def _opened(place: str | Path) -> Any:
+    import xarray as xr
+
+    path = Path(place) / "run.nc" if Path(place).is_dir() else Path(place)
+    try:
+        return xr.load_dataset(path, engine="h5netcdf")
+    except OSError as error:
+        raise InputError(str(path), "", error.strerror or "no netCDF-4 file", "a run.nc, or the folder of one") from None
 
 
 def write_aem(

@@ -51,8 +51,10 @@ class Tube:
     """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
     drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
     and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time.
-    Of what is held, `uneven` has not what errors that noise drives add linearly."""
+    Of what is held, `uneven` has not what errors that noise drives add linearly. `bent` bounds the slopes of the
+    gyroscopic acceleration in the rates."""
 
+    region: Region
     sizes: Sizes
     drift: list[Fraction]
     turned: Fraction
@@ -60,6 +62,7 @@ class Tube:
     pushed: Fraction
     stale: Fraction
     uneven: Fraction
+    bent: Rows
 
     @property
     def push(self) -> Fraction:
@@ -232,24 +235,25 @@ class Held:
         turned = self.h / 2 * far[SPEED]
         far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | held
         drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
-        return Tube(far, drift, turned, steady, self.pushed(far)["both"], self.stale(far, self.beside), uneven)
+        pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
+        bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
+        return Tube(region, far, drift, turned, steady, pushed, stale, uneven, bent)
 
-    def fall(self, region: Region) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
+    def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
-        h, tube, L = self.h, self.tube(region), self.rates[0]
+        h, region, L = self.h, tube.region, self.rates[0]
         near = region.sizes | {"v": 1 - region.least}
-        bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
         push = tube.held + tube.pushed
         demand(push > 0, "nothing pushes")
         # How far pushes take the rates from where they go without.
         pushed = [tube.push * norm(row) for row in self.N]
-        away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(bent, d), strict=True)])
+        away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(tube.bent, d), strict=True)])
         slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
         moved = [*tube.drift, *[tube.turned] * 3]
         # What changes of momentum do to V, which is less than what their torques do to the body.
         rest = h**3 / 24 * most(self.rates[3], tube.sizes) + self.stale(tube.sizes, [self.worked])
         # What pushes do to V grows with what the state does in the period: linearly, and what is left.
-        drift = self.astray(region, tube)
+        drift = self.astray(tube)
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
         rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
         # So does what V' has of the rates, which pushes change.
@@ -266,20 +270,18 @@ class Held:
         over = self.form(self.s / (1 + region.least))
         return least_form(-self.mean, region), over, F, push * root(1 + 2 / WEIGHT), rest
 
-    def swing(self, region: Region) -> Fraction:
+    def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""
-        tube = self.tube(region)
         sizes = tube.sizes
         return most(self.rates[0], sizes) + (tube.push + tube.stale) * norm(
             reach(self.felt, [sizes[name] for name in STATE])
         )
 
-    def astray(self, region: Region, tube: Tube) -> list[Fraction]:
+    def astray(self, tube: Tube) -> list[Fraction]:
         """Return how far the rates are in a period from where the acceleration that is linear in the sample takes them."""
-        sizes = region.sizes | {"v": 1 - region.least}
+        sizes = tube.region.sizes | {"v": 1 - tube.region.least}
         left = [most(p, sizes) for p in self.speeding]
-        bent = [[most(p.slope(name), tube.sizes) for name in STATE[RATE]] for p in self.bend]
-        columns = zip(left, reach(bent, tube.drift), self.N, strict=True)
+        columns = zip(left, reach(tube.bent, tube.drift), self.N, strict=True)
         return [self.h * (a + b + tube.push * norm(n)) for a, b, n in columns]
 
     def corners(self) -> list[Rows]:
@@ -299,10 +301,10 @@ class Held:
             found.append(plus(A, more))
         return found
 
-    def linear(self, region: Region, swayed: Radii) -> list[tuple[Rows, Fraction]]:
-        """Return pairs B, b such that samples in the region, less what noise adds linearly, at most `swayed`, are
+    def linear(self, tube: Tube, swayed: Radii) -> list[tuple[Rows, Fraction]]:
+        """Return pairs B, b such that samples in the tube's region, less what noise adds linearly, at most `swayed`, are
         followed by x+ = Ax + the sum of B v, |v| <= b, with A between those of `corners`."""
-        h, N, tube = self.h, self.N, self.tube(region)
+        h, N, region = self.h, self.N, tube.region
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
@@ -312,7 +314,7 @@ class Held:
         # Rates drift from nothing on, too; what noise adds is not in A.
         parts = zip((RATE, TURN), swayed, strict=True)
         swaying = h * sum((stretch([row[k] for row in self.near.rates]) * x for k, x in parts), Fraction(0))
-        drift = norm(self.astray(region, tube)) + swaying
+        drift = norm(self.astray(tube)) + swaying
         mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * drift / 2
         uneven = 2 * mean - tube.pushed - odd
         return [

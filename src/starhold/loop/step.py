@@ -22,8 +22,8 @@ from starhold.parts.roles import Loads, Scene
 
 
 class Step(NamedTuple):
-    """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied;
-    `sense` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` gives
+    """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied,
+    `sense` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` is
     the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
 
     measure: Callable[..., Any]

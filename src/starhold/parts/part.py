@@ -56,6 +56,10 @@ class Part:
         """Readings, by name, that a law or an effector with `switch` cannot do without."""
         return getattr(self.module, "READS", ())
 
+    def is_known(self, name: str) -> bool:
+        """Whether laws, or flight software that shares their command out, compute with this parameter."""
+        return self.flag("MODELLED") or name in getattr(self.module, "KNOWN", ())
+
     @property
     def params(self) -> Any:
         """The class of its parameters, a NamedTuple."""

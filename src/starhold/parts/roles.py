@@ -119,11 +119,13 @@ class Effector(Protocol):
     """A mechanism that moves with the body and shares its momentum. Effectors are independent: each adds its reaction and,
     if needed, its inertia, and takes the body's angular acceleration for its own rates. With `ACTS` it takes the law's
     command. One that decides only at control instants, or without the law, has `switch`; `OUTSIDE`: whether its torque comes
-    from outside, as of a field or of mass that is expelled, and not from momentum of its own. In a mode in which it is
-    inactive, one with `ACTS` gets a zero command, and one with `OUTSIDE` alone has its initial state."""
+    from outside, as of a field or of mass that is expelled, and not from momentum of its own; `KNOWN`: the parameters, by
+    name, that flight software uses to share the command out. In a mode in which it is inactive, one with `ACTS` gets a
+    zero command, and one with `OUTSIDE` alone has its initial state."""
 
     ACTS: bool
     OUTSIDE: bool
+    KNOWN: tuple[str, ...]
 
     def command(self, applied: Vector, params: Any, /) -> Any:
         """The commands of its motors for a desired torque on the body (N m)."""

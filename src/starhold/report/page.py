@@ -65,9 +65,9 @@ FOLDS = {
 
 def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | str:
     """The data of the page's sliders; where nothing can be moved, why not."""
-    made = reflight(scenario)
     numbers = {flight.name: number for number, flight in enumerate(flights)}
-    laws = [law for law in made.laws if law.name in numbers]
+    made = reflight(scenario, numbers)
+    laws = made.laws
     if not any(law.follows for law in laws):
         return "; ".join(sorted({*made.grounded.values(), *(why for law in laws for why in law.unfollowed.values())}))
     table = scenario.table

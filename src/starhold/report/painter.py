@@ -1,4 +1,4 @@
-"""Draws the figures in a process of its own, which loads the plotting library while the laws are still flying."""
+"""Draws the figures in processes of their own, while what was flown is proved and its page is written."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -17,20 +17,29 @@ from typing import TYPE_CHECKING
 
 from starhold.errors import InputError
 from starhold.files import clear_unfinished
+from starhold.report.body import report_of
 
 if TYPE_CHECKING:
-    from starhold.report.figures import Picture
+    from starhold.scenario.reading import Scenario
+    from starhold.studies.flight import Flight
 
 UNWRITABLE = 2
 """Exit code where the files cannot be written; the reason stands on standard error."""
 
 
 class Painter:
-    """A waiting process; `start` sends it what to draw, `finish` waits until it has. Leaving the context ends it."""
+    """Processes that draw the figures of flights into `folder`, which exists; `finish` waits until they have. Leaving the
+    context ends them. Where nothing is to be drawn there are none, and figures from before, which would show other flights,
+    are removed."""
 
-    def __init__(self) -> None:
-        self._sender: Thread | None = None
-        self._folder: Path | None = None
+    def __init__(self, scenario: Scenario, flights: Sequence[Flight], folder: Path, draw: bool = True) -> None:
+        picture = report_of(scenario.body).picture(flights, scenario)
+        self._folder = folder
+        self._process: subprocess.Popen[bytes] | None = None
+        if not draw:
+            for name in picture:
+                (folder / f"{name}.png").unlink(missing_ok=True)
+            return
         self._process = subprocess.Popen(
             # A group of its own, of which half the figures' process is one too.
             [sys.executable, "-m", "starhold.report.painter"],
@@ -38,57 +47,46 @@ class Painter:
             stderr=subprocess.PIPE,
             process_group=0,
         )
+        # On a thread, for it does not listen yet.
+        self._sender = Thread(target=self._send, args=((picture, folder.absolute()),))
+        self._sender.start()
 
     def __enter__(self) -> Painter:
         return self
 
     def __exit__(self, *failure: object) -> None:
+        if self._process is None:
+            return
         killed = self._process.poll() is None
         if killed:
-            self._signal("SIGKILL")
-        self._sent()
+            self._kill()
+        self._sender.join()
         self._process.communicate()
-        if killed and self._folder is not None:
+        if killed:
             clear_unfinished(self._folder)
 
-    def _signal(self, name: str) -> None:
-        """Send a signal to all that draw; on a system without groups of processes only its end is asked for."""
+    def _kill(self) -> None:
+        """End all that draw; on a system without groups of processes the one that was started."""
+        assert self._process is not None
         if hasattr(os, "killpg"):
             with suppress(ProcessLookupError):
-                os.killpg(self._process.pid, getattr(signal, name))
-        elif name == "SIGKILL":
+                os.killpg(self._process.pid, signal.SIGKILL)
+        else:
             self._process.kill()
 
-    @contextmanager
-    def paused(self) -> Generator[None]:
-        """Draw nothing for a while, so that a timed call has the machine to itself."""
-        self._signal("SIGSTOP")
-        try:
-            yield
-        finally:
-            self._signal("SIGCONT")
-
-    def start(self, picture: Picture, folder: Path) -> None:
-        """Let it draw into `folder`, which exists."""
-        self._folder = folder
-        # On a thread, for it may not listen yet.
-        self._sender = Thread(target=self._send, args=((picture, folder.absolute()),))
-        self._sender.start()
-
     def _send(self, what: object) -> None:
+        assert self._process is not None
         assert self._process.stdin is not None
         # Where it has died, `finish` tells why.
         with suppress(OSError):
             pickle.dump(what, self._process.stdin)
             self._process.stdin.flush()
 
-    def _sent(self) -> None:
-        if self._sender is not None:
-            self._sender.join()
-
     def finish(self) -> InputError | None:
         """Wait for the files. Returns why they cannot be written; RuntimeError for any other failure."""
-        self._sent()
+        if self._process is None:
+            return None
+        self._sender.join()
         _, said = self._process.communicate()
         message = said.decode(errors="replace").strip()
         if self._process.returncode == UNWRITABLE:
@@ -99,7 +97,7 @@ class Painter:
 
 
 def main() -> None:
-    """The waiting process: load what drawing needs, read what to draw, draw it."""
+    """The process that draws: load what that needs, read what to draw, draw it."""
     # Ctrl-C goes to the parent alone, which ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.disable()

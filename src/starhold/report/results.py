@@ -223,18 +223,19 @@ def _write_kernel(folder: Path) -> None:
         hidden.write_bytes(kernel_bundle())
 
 
-def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path) -> Path:
-    """Summary, certificates and page into an existing folder; returns the page's path. The runs are written as they are
-    flown, by `write_run`, and the pictures by a `Painter`."""
-    from starhold.report.page import write_page
-
+def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, drawn: bool = True) -> Path:
+    """Summary, certificates and, if it is to be drawn, the page into an existing folder; returns the path of the page,
+    or the folder where there is none. The runs are written by `write_run`, and the pictures by a `Painter`."""
     write_summary(scenario.name, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
     if certificates := [certificate for flight in flights for certificate in flight.certificates]:
         write_proofs(certificates, scenario.name, folder)
-    page = folder / PAGE
-    with atomic_write(page) as hidden:
+    if not drawn:
+        return folder
+    from starhold.report.page import write_page
+
+    with atomic_write(folder / PAGE) as hidden:
         write_page(hidden, scenario, flights)
-    return page
+    return folder / PAGE
 
 
 BLOCK = 65_536

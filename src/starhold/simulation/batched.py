@@ -11,18 +11,8 @@ from numpy.typing import NDArray
 
 from starhold.algebra.structure import buffers, flatten, mapped, places
 from starhold.loop.closed_loop import ClosedLoop, Phase
-from starhold.loop.kernels import (
-    Arguments,
-    Kernel,
-    Numbers,
-    Observer,
-    form,
-    make_kernel,
-    make_step,
-    numbers_of,
-    one,
-    state_of,
-)
+from starhold.loop.kernels import Arguments, Kernel, Numbers, Observer, form, make_kernel, make_step, numbers_of, state_of
+from starhold.loop.programs import one
 from starhold.simulation.lane import Progress, fly
 from starhold.simulation.lanes import RunningBatch, ThreadPool, stacked
 from starhold.trace.machine import aligned, widest

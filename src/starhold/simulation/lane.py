@@ -18,7 +18,8 @@ from starhold.algebra.structure import flatten
 from starhold.errors import InputError
 from starhold.laws.program import law_digest
 from starhold.loop.closed_loop import Carry, ClosedLoop, is_recorded
-from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, one, state_of
+from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, state_of
+from starhold.loop.programs import one
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import flatten, leaves, mapped, places, rebuild, unflatten
 from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Phase
-from starhold.loop.kernels import Arguments, Numbers, Observer, make_kernel, many, numbers_of
+from starhold.loop.kernels import Arguments, Numbers, Observer, numbers_of
+from starhold.loop.programs import CHUNK, make_halves
 from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
-PIECES = 16
-"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect."""
+PIECES = 4
+"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect. Each flies what all
+lanes share, too."""
 
 
 class ThreadPool:
@@ -104,7 +106,8 @@ def simulate_many(
 
 
 class RunningBatch:
-    """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it.
+    """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it. `alike` are
+    the places of the carry's numbers that are equal in all lanes, bit for bit, and stay so: they are flown once for all.
 
     carries: (numbers, lanes), see `carry_columns`; first_run: the run number of lane 0, or those of all lanes (lanes,);
     noted: (numbers, lanes)."""
@@ -125,6 +128,8 @@ class RunningBatch:
         self.count = -(-self.lanes // width)
         self.like = loop.carry()
         self.rows = places(self.like)
+        bits = np.ascontiguousarray(carries[: len(flatten(self.like))]).view(np.int64)
+        self.alike = tuple(np.flatnonzero((bits == bits[:, :1]).all(axis=1)).tolist())
         self.x = self._packed(carries)
         self.noted = self._packed(np.empty((0, self.lanes)) if noted is None else noted)
         self._ready: dict[tuple[int, int], Any] = {}
@@ -174,38 +179,40 @@ class RunningBatch:
     ) -> None:
         """Fly the blocks of a piece through a phase, or through `count` control steps of it from `first` on. observer: in
         place of the batch's, with notes of the same shape."""
-        _, kernel, arguments, varying, turn = self.prepare(phase, observer)
+        _, halves, alike, arguments, varying, turn = self.prepare(phase, observer)
         part = self.x[piece.start : piece.stop]
         if turn is not None and first in (None, phase.first):
             rows = list(self.rows.state.rate)
             rates = part[:, rows].swapaxes(0, 1).reshape(len(rows), -1)
             turned = np.array(turn(tuple(rates), piece))
             part[:, rows] = turned.reshape(len(rows), len(piece), self.width).swapaxes(0, 1)
-        memories = {
-            "carry": part,
-            "noted": self.noted[piece.start : piece.stop],
-            "shared": arguments.shared,
-            "own": varying[piece.start : piece.stop],
-            "tables": arguments.tables,
-        }
         begin = phase.first if first is None else first
-        steps = phase.last - phase.first if count is None else count
+        end = phase.last if count is None else begin + count
+        memories = {memory.name: np.empty(memory.size or 0) for memory in halves[0].program.memories}
+        memories |= {"carry": part, "noted": self.noted[piece.start : piece.stop], "own": varying[piece.start : piece.stop]}
+        memories |= {"shared": arguments.shared, "tables": arguments.tables}
         run = self.first_run + piece.start * self.width
-        kernel(memories, begin, steps, len(piece), self.width, self.loop.seed, run)
+        # Without a step they are looked at all the same.
+        for step in range(begin, max(end, begin + 1), CHUNK):
+            memories["common"] = np.ascontiguousarray(part[0, alike, 0])
+            for half in halves:
+                half(memories, step, min(CHUNK, end - step), len(piece), self.width, self.loop.seed, run)
 
     def prepare(self, phase: Phase, observer: Observer | None = None) -> Any:
-        """Compile the kernel of a phase once, before threads use it."""
+        """Compile the kernel of a phase once, before threads use it; phases in the order in which they are flown."""
         observer = observer or self.observer
         key = (id(phase), id(observer))
         if key not in self._ready:
             numbers = Numbers.of(phase)
             arguments = Arguments(*numbers, () if observer is None else observer.numbers, self.runs)
-            more = (numbers, self.loop.substeps, observer, self.runs)
-            kernel = make_kernel(many, self.loop.composition(), self.width, self.like, *more)
             turn = self._turned(phase) if phase.jumps else None
+            if turn is not None:
+                self.alike = tuple(row for row in self.alike if row not in self.rows.state.rate)
+            more = (self.like, numbers, self.loop.substeps, observer, self.runs)
+            halves, self.alike = make_halves(self.loop.composition(), self.width, self.alike, *more)
             # The key's objects are kept, lest others get their ids.
             kept = (phase, observer)
-            self._ready[key] = (kept, kernel, arguments, self._packed(arguments.rows(self.lanes)), turn)
+            self._ready[key] = (kept, halves, list(self.alike), arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[key]
 
     def _turned(self, phase: Phase) -> Any:
@@ -237,10 +244,9 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
     rows = places(first)
     moving = len(flatten((first.state, first.effectors)))
     if _differ(loop) or (varies and loop.remembers):
-        gains, nominal = (None, None) if phase is None else (phase.gains, phase.nominal)
-        setup = loop.setup()
+        given = (None, None, loop.setup()) if phase is None else (phase.gains, phase.nominal, phase.setup)
         carries = (
-            loop.carry(unflatten(start[:, lane], loop.start), _of_lane(gains, lane), _of_lane(nominal, lane), setup)
+            loop.carry(unflatten(start[:, lane], loop.start), *(_of_lane(value, lane) for value in given))
             for lane in range(lanes)
         )
         columns = np.array([numbers_of(carry) for carry in carries]).T

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from starhold.algebra.structure import flatten, unflatten
 from starhold.loop.closed_loop import ClosedLoop, Phase
-from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, state_of, stepping
+from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, state_of
+from starhold.loop.programs import stepping
 from starhold.simulation.lane import Recording, label
 from starhold.simulation.lanes import RunningBatch, carry_columns
 from starhold.trace.machine import widest, word

@@ -81,6 +81,9 @@ class BodyStudy:
         """List what a law has beside its gains."""
         return {}
 
+    def compile_calls(self, loop: Any) -> None:
+        """Make code of the law's calls, so that `call_costs` times them at once."""
+
     def call_costs(self, loop: Any, run: Recording) -> dict[str, float]:
         """Time the law's calls; empty where that is not worth telling."""
         return {}

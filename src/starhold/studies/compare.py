@@ -37,7 +37,12 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
 
 def timed(scenario: Scenario, loop: Any, flight: Flight) -> Flight:
     """The flight with the cost of a call of its law, measured truly only on a machine that does nothing else."""
-    return replace(flight, metrics=flight.metrics | study_of(scenario.body).call_costs(loop, flight.recording))
+    return costing(flight, study_of(scenario.body).call_costs(loop, flight.recording))
+
+
+def costing(flight: Flight, costs: dict[str, float]) -> Flight:
+    """The flight with these costs of a call of its law among its metrics."""
+    return replace(flight, metrics=flight.metrics | costs)
 
 
 def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight) -> Flight:
@@ -57,9 +62,9 @@ def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress
     return replace(flight, metrics=flight.metrics | {"step_error": errors})
 
 
-def record(scenario: Scenario, loop: Any, progress: Progress | None = None) -> Recording:
-    """The run of a loop."""
-    return _flown(scenario, loop, progress)[0]
+def record(scenario: Scenario, loop: Any, progress: Progress | None = None, process: str | None = None) -> Recording:
+    """The run of a loop, with the commands of a process if there is one."""
+    return _flown(scenario, loop, progress, process)[0]
 
 
 def _flown(

@@ -7,7 +7,7 @@ What follows a key by no equation, such as a law's matrices, holds the key.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
@@ -21,7 +21,8 @@ from starhold.errors import InputError
 from starhold.laws.interface import Field
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import Arguments, Numbers, make_step, numbers_of, one
+from starhold.loop.kernels import Arguments, Numbers, make_program, numbers_of
+from starhold.loop.programs import one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
 from starhold.scenario.making import changed, plain, variants
@@ -102,8 +103,9 @@ class Piece(NamedTuple):
     only: str = ""
 
 
-def reflight(scenario: Scenario) -> Reflight:
-    """Make what flies a scenario again. Designed gains are held as they are: the scenario has them as numbers."""
+def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Reflight:
+    """Make what flies the laws of these names again, all of the scenario if there are none, which is read and checked with
+    the others. Designed gains are held as they are: the scenario has them as numbers."""
     explicit = _explicit(scenario)
     dials = dict(explicit.hooks.dials(explicit))
     shared = list(dials)
@@ -120,12 +122,12 @@ def reflight(scenario: Scenario) -> Reflight:
     # An attitude that is given by angles is moved as a quaternion.
     explicit = changed(explicit, _changes(explicit, {key: dials[key] for key in shared if key == "initial.attitude"}))
     tried = _Tried(explicit, dials)
-    laws: list[Reflown] = []
+    reflown: list[Reflown] = []
     loops = {entry.name: build(explicit, entry) for entry in explicit.laws}
     checks = ask(explicit, loops, dials)
     for entry in explicit.laws:
         loop = loops[entry.name]
-        if entry.name in grounded:
+        if entry.name in grounded or not (laws is None or entry.name in laws):
             continue
         if loop.events:
             grounded[entry.name] = FAULTS
@@ -135,10 +137,10 @@ def reflight(scenario: Scenario) -> Reflight:
             gain_keys = [
                 key for key in gains if key.startswith(f"law.{entry.name}.") and key[len(entry.name) + 5 :] in _names(entry)
             ]
-            laws.append(
+            reflown.append(
                 _reflown(explicit, entry, loop, {key: dials[key] for key in (*shared, *gain_keys)}, tried, checks.fixed)
             )
-    return Reflight(explicit, dials, gains, tuple(laws), grounded, tuple(_pieces(explicit, dials)), checks)
+    return Reflight(explicit, dials, gains, tuple(reflown), grounded, tuple(_pieces(explicit, dials)), checks)
 
 
 def _names(entry: LawEntry) -> list[str]:
@@ -243,8 +245,7 @@ def _reflown(
             kept = []
     derive, places = _recorded(scenario, loop, {key: by_key[key] for key in kept}) if kept else (None, ())
     carry, phase = loop.carry(), loop.phases(steps)[0]
-    step = make_step(loop.composition())
-    program = one(step, carry, Numbers.of(phase), loop.substeps)
+    program = make_program(one, loop.composition(), carry, Numbers.of(phase), loop.substeps)
     lost = len(flatten(carry)) - 1
     return Reflown(
         entry.name,

@@ -103,10 +103,10 @@ def feedback(craft: Craft, bandwidth: float, damping: float) -> tuple[float, flo
     return gains
 
 
-def fastest(craft: Craft, gains: Any) -> float:
-    """Return a bound on the fastest rate (1/s) of the linear loop with k_rate and k_attitude."""
+def fastest(craft: Craft, share: float, gains: Any) -> float:
+    """Return a bound on the fastest rate (1/s) of the linear loop with k_rate and this share of k_attitude against q."""
     least = float(np.linalg.eigvalsh(tensor(craft.inertia))[0])
-    return max(gains.k_rate / least, math.sqrt(0.5 * gains.k_attitude / least))
+    return max(gains.k_rate / least, math.sqrt(0.5 * share * gains.k_attitude / least))
 
 
 def settle(
@@ -262,27 +262,31 @@ def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -
 
 
 def designs(
-    make: Callable[[float, float], Any], torque: Callable[..., Any]
+    make: Callable[[float, float], Any], torque: Callable[..., Any], share: float = 1.0
 ) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Return `design` and `explain` of a law with these two forms: `make` gives its gains of damping and stiffness (N m s, N
-    m)."""
+    """Return `design` and `explain` of a law with these two forms. `make` gives its gains of k_rate (N m s) and k_attitude
+    (N m), of which the law acts with this share against q near rest."""
+
+    def gains_at(craft: Craft, bandwidth: float, damping: float) -> Any:
+        k_rate, stiffness = feedback(craft, bandwidth, damping)
+        return make(k_rate, stiffness / share)
 
     @lru_cache(maxsize=64)
     def settled(craft: Craft, spec: Settling) -> tuple[Any, Turn]:
         def gains_of(x: float) -> Any:
-            return make(*feedback(craft, x, spec.damping))
+            return gains_at(craft, x, spec.damping)
 
-        return settle(torque, gains_of, partial(fastest, craft), craft, spec)
+        return settle(torque, gains_of, partial(fastest, craft, share), craft, spec)
 
     def design(craft: Craft, spec: Bandwidth | Settling) -> Any:
         if isinstance(spec, Bandwidth):
-            return make(*feedback(craft, spec.bandwidth, spec.damping))
+            return gains_at(craft, spec.bandwidth, spec.damping)
         return settled(craft, spec)[0]
 
     def explain(craft: Craft, spec: Bandwidth | Settling) -> list[tuple[str, Any]]:
         gains = design(craft, spec)
         turned = slew_figures(settled(craft, spec)[1]) if isinstance(spec, Settling) else []
-        return turned + explained(craft, gains.k_rate, gains.k_attitude)
+        return turned + explained(craft, gains.k_rate, share * gains.k_attitude)
 
     return design, explain
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -12,7 +13,7 @@ import numpy as np
 
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.recorded import TURNS, RecordedLoop, curvature, sign_words
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, solved, squares
+from starhold.certification.evidence.squares import cofactors, largest_number, once, posed, solved, squares
 from starhold.kernel.loops import HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
@@ -184,7 +185,9 @@ class Loop(RecordedLoop):
                     return False
         claim = self.claim(theorem, words, V, level=1, **numbers)
         cap = self.cap(theorem, words, V)
-        level = self.largest_level(claim, V, cap)
+        known = self.known
+        scaled_by = [float(x) for x in (known.target_rate, known.target_acceleration, known.total_momentum)]
+        level = once(json.dumps(["level", claim, cap, *scaled_by]), lambda: self.largest_level(claim, V, cap))
         if level is None:
             self.failed[f"{theorem}, limits"] = "no level was found"
             return False

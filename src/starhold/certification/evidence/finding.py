@@ -1,5 +1,6 @@
 """Finds the evidence for what a theorem asks to be shown about a claim."""
 
+import json
 import warnings
 from collections.abc import Mapping
 from fractions import Fraction
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.certification.evidence.reduced import Reduced
-from starhold.certification.evidence.squares import plainly, rounded, squares, text
+from starhold.certification.evidence.squares import once, plainly, rounded, squares, text
 from starhold.kernel import rules
 from starhold.kernel.numbers import Account, RefusedError, Rows, inverse, rational
 from starhold.kernel.polynomials import Poly, multiple
@@ -47,6 +48,21 @@ def obligations(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> tuple[
 def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping[str, float]) -> dict[str, Any]:
     """Return a claim with evidence, without the numbers and programs that it does not need. NotFoundError where an
     obligation does not hold, or no evidence for it was found."""
+
+    def found() -> dict[str, Any] | NotFoundError:
+        try:
+            return _completed(claim, programs, scales)
+        except NotFoundError as reason:
+            return reason
+
+    # A claim names its programs by digests of all that stands in them.
+    completed = once(json.dumps(["complete", claim, dict(scales)]), found)
+    if isinstance(completed, NotFoundError):
+        raise NotFoundError(str(completed))
+    return completed
+
+
+def _completed(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping[str, float]) -> dict[str, Any]:
     try:
         wanted, known = obligations(claim, programs)
         with warnings.catch_warnings():

@@ -21,7 +21,6 @@ from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, dr
 from starhold.parts.contract import DEVIATIONS
 
 linalg: Any = import_module("scipy.linalg")
-optimize: Any = import_module("scipy.optimize")
 Array = NDArray[np.float64]
 
 RARELY = Fraction(27, 10_000)
@@ -59,6 +58,8 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
         shapes.append((shape + shape.T) / 2.0)
     deviations = [(width + LEAST) ** 0.5 * MORE for width in widths]
     samples = samples_of(loop.loop)
+
+    optimize: Any = import_module("scipy.optimize")
 
     def radius(width: float, share: float) -> float:
         # Less, for what noise of the magnetic field takes.

@@ -21,17 +21,16 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.openness import Pushes, driven_errors, pushes
 from starhold.certification.subject import above
-from starhold.kernel.held import Held, near_target
+from starhold.kernel.held import Held, Tube, near_target
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
-from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Region, widened
+from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, widened
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import image, periods, points
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
 linalg: Any = import_module("scipy.linalg")
-optimize: Any = import_module("scipy.optimize")
 Array = NDArray[np.float64]
 
 POINTS = "points"
@@ -103,8 +102,7 @@ class Chain:
         """Find what `lower` returns."""
         held = self.held
         try:
-            region = held.region(c)
-            exact, above, felt, push, rest = held.fall(region)
+            exact, above, felt, push, rest = held.fall(held.tube(held.region(c)))
         except RefusedError:
             return None
         Q, H, F = floats(exact), floats(above), floats(felt)
@@ -125,13 +123,13 @@ class Chain:
         t, b = Fraction(tau), Fraction(beta)
         return t, b, (push * push / (4 * t) + rest) / b
 
-    def tighten(self, region: Region, swayed: Radii) -> tuple[float, float]:
+    def tighten(self, tube: Tube, swayed: Radii) -> tuple[float, float]:
         """Find the ellipsoids, and return the angle (rad) and the rate (rad/s) where motions end. swayed: what noise
         adds."""
-        angle, fastest = self.ends(region, region.X)
-        heed = HEED
+        angle, fastest = self.ends(tube, tube.region.X)
+        heed, corners = HEED, self.held.corners()
         for _ in range(ELLIPSOIDS):
-            pushes, corners = self.held.linear(region, swayed), self.held.corners()
+            pushes = self.held.linear(tube, swayed)
             own = [floats(B) * float(b) for B, b in pushes]
             found = smallest(floats(self.held.near.A), np.array(list(map(floats, corners))), own, heed)
             if found is None:
@@ -139,8 +137,8 @@ class Chain:
             shape, shares = found
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
             rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
-            reach = highest_ratio(widened(region.X, swayed), X)
-            inner = region.within(X, swayed)
+            reach = highest_ratio(widened(tube.region.X, swayed), X)
+            inner = self.held.tube(tube.region.within(X, swayed))
             end = self.ends(inner, X, swayed)
             if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
@@ -158,7 +156,7 @@ class Chain:
             room = 1 - sum(a)
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
-            region, (angle, fastest) = inner, end
+            tube, (angle, fastest) = inner, end
         return angle, fastest
 
     def asks_more(self, limits: dict[str, float]) -> bool:
@@ -182,10 +180,10 @@ class Chain:
         size = np.linalg.norm(u, axis=0) if "limit.norm" in limits else np.abs(u).max(axis=0)
         return bool(size[inside].max(initial=0.0) > most)
 
-    def ends(self, region: Region, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
-        """Return the angle (rad) and the rate (rad/s) that motions of a region do not exceed, between samples either, which
+    def ends(self, tube: Tube, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
+        """Return the angle (rad) and the rate (rad/s) that motions of a tube do not exceed, between samples either, which
         at samples are no further than `swayed` from an ellipsoid."""
-        shape, drift = floats(X), float(norm(self.held.tube(region).drift))
+        shape, drift = floats(X), float(norm(tube.drift))
         wide, turned = (
             sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
         )
@@ -292,9 +290,9 @@ class Pushed:
             loop.failed[POINTS] = "V does not fall on the set from which motions start"
             return False
         held, start = chain.held, Fraction(chain.level)
-        angle, fastest = chain.tighten(held.region(Fraction(chain.levels[-1]["end"])), self.swayed)
+        angle, fastest = chain.tighten(held.tube(held.region(Fraction(chain.levels[-1]["end"]))), self.swayed)
         told["level"] = chain.level
-        told["highest"] = float(start + held.h / 2 * held.swing(held.region(start))) * MORE
+        told["highest"] = float(start + held.h / 2 * held.swing(held.tube(held.region(start)))) * MORE
         told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
         if not isfinite(angle) or angle > NEARER * told.get("angle", told.get("start.angle", 0.0)):
             loop.failed[POINTS] = "motions do not come near the target"
@@ -352,6 +350,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
     weight = np.log(np.array([x / sizes[0] + 1e-12 for x in sizes] + [NEARLY]))
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
     options = {"maxfev": 400, "initial_simplex": begun}
+    optimize: Any = import_module("scipy.optimize")
     found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
     least, X, shares = shape(found.x)
     return (X * LARGER, [float(a) for a in shares]) if isfinite(least) else None

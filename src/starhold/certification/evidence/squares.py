@@ -4,13 +4,13 @@ All of them are linear in the polynomial. In floats the matrix is made as defini
 are about one; rounded to short numbers, what is then amiss is put on the matrix, monomial by monomial.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from importlib import import_module
 from itertools import combinations_with_replacement
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -20,6 +20,7 @@ from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
 sparse: Any = import_module("scipy.sparse")
+T = TypeVar("T")
 TOLERANCE = 1e-11
 LIMIT = 30.0
 """Seconds that the interior point may take."""
@@ -179,6 +180,21 @@ def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly
     return A, b, largest
 
 
+_KNOWN: dict[Any, Any] = {}
+MOST_KNOWN = 256
+
+
+def once(key: Any, make: Callable[[], T]) -> T:
+    """Return what `make` finds for this key, which tells all that it depends on. Modes of a law often differ in nothing that
+    is proved, and limits of axes in their signs alone: what was found of one is kept for the next. The kernel checks it each
+    time."""
+    if key not in _KNOWN:
+        if len(_KNOWN) >= MOST_KNOWN:
+            _KNOWN.clear()
+        _KNOWN[key] = make()
+    return _KNOWN[key]
+
+
 def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
     """Minimise cost.x with A x + s = b, s in the cones; None where that fails."""
     # Not every command certifies.
@@ -187,9 +203,14 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.time_limit = False, LIMIT
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    solver = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, sparse.csc_matrix(A), b, cones, settings)
-    found = solver.solve()
-    return np.array(found.x) if "Solved" in str(found.status) or "Insufficient" in str(found.status) else None
+    matrix = sparse.csc_matrix(A)
+
+    def solve() -> Any | None:
+        found = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, matrix, b, cones, settings).solve()
+        return np.array(found.x) if "Solved" in str(found.status) or "Insufficient" in str(found.status) else None
+
+    numbers = tuple(x.tobytes() for x in (cost, matrix.data, matrix.indices, matrix.indptr, b))
+    return once((numbers, matrix.shape, equal, signed, *sides), solve)
 
 
 def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:

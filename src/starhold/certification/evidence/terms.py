@@ -15,9 +15,6 @@ from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Sum
 
-linprog: Any = import_module("scipy.optimize").linprog
-
-
 PAIRED = 10
 """Products of two known things are tried, of so many of them at most."""
 
@@ -113,6 +110,7 @@ def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list
     if not p.terms:
         return []
     cost = np.r_[np.zeros(len(free)), np.ones(len(made))]
+    linprog: Any = import_module("scipy.optimize").linprog
     found = linprog(cost, A_eq=A, b_eq=b, bounds=[(None, None)] * len(free) + [(0, None)] * len(made))
     return [own for own, v in zip(made, found.x[len(free) :], strict=True) if v > 1e-9] if found.status == 0 else None
 

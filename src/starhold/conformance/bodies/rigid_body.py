@@ -202,13 +202,10 @@ def can_be_certified(law: Law) -> None:
     for gains in law.examples():
         plain = sample_loop(law, gains)
         for loop in (
-            plain,
             plain.without("target").with_parts(fit("target", "orbital")),
             replace(plain, limit="norm", sign_policy="as_published"),
         ):
-            certificate = certify(loop)
-            require(certificate.outcome in ("proved", "refuted", "undecided"), f"outcome {certificate.outcome}")
-            gives_reasons(certificate)
+            gives_reasons(certify(loop))
 
 
 def flies_a_scenario(law: Law) -> None:
@@ -223,7 +220,9 @@ def flies_a_scenario(law: Law) -> None:
         # Timing records a kernel of its own.
         if gains == law.examples()[0]:
             require(call_costs(loop, samples, calls=100)["cost_median"] >= 0.0, "a call cannot be timed")
-        fly_claims(loop, certify(loop, law.name), flights=FEW)
+        certificate = certify(loop, law.name)
+        gives_reasons(certificate)
+        fly_claims(loop, certificate, flights=FEW)
 
 
 def _slope(law: Law, measurement: Measurement, gains: Any) -> float:

@@ -28,9 +28,6 @@ def points(claim: Claim) -> Proof:
     loop = AttitudeLoop(claim)
     yield from loop.sound()
     held, numbers, samples = Held(loop), claim.numbers, 0
-    noise, swayed = Statement("", ()), AT_REST
-    if SHARE in numbers:
-        noise, swayed = yield from within_radii(claim, held.near)
     c, h = numbers["level"], held.h
     start = yield from contents(loop, loop.lyapunov)
     region = held.region(c)
@@ -38,38 +35,41 @@ def points(claim: Claim) -> Proof:
     signs = {SHORTEST, HYSTERESIS} & claim.taken.content.keys()
     if any(claim.taken.get(word) for word in (SHORTEST, HYSTERESIS)):
         yield "the sign never changes", Exceeds(region.least, held.turned / 2)
-    yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(region))
+    tube = held.tube(region)
+    yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(tube))
+    noise, swayed = Statement("", ()), AT_REST
+    if SHARE in numbers:
+        noise, swayed = yield from within_radii(claim, held.near)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
-    within = [(Fraction(0), held.tube(region).sizes[ANGLE])]
+    within = [(Fraction(0), tube.sizes[ANGLE])]
     for k, told in enumerate(levels):
         end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
         demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
-        Q, H, F, push, rest = held.fall(region)
+        Q, H, F, push, rest = held.fall(tube)
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(F), F), -tau), H, -beta)
         yield f"V falls by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
-        c, region = end, held.region(end)
-        within.append((h * samples, held.tube(region).sizes[ANGLE]))
-    last, beside = region.X, AT_REST
+        c, tube = end, held.tube(held.region(end))
+        within.append((h * samples, tube.sizes[ANGLE]))
+    last, beside, corners = tube.region.X, AT_REST, held.corners()
     for k, told in enumerate(ellipsoids):
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        pushed = held.linear(region, swayed)
-        for corner, A in enumerate(held.corners()):
+        pushed = held.linear(tube, swayed)
+        for corner, A in enumerate(corners):
             after = image(X, shares, A, pushed)
             yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
-        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(region.X, swayed), -1))
+        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(tube.region.X, swayed), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
-        region, last, beside = region.within(X, swayed), X, swayed
-        within.append((h * samples, held.tube(region).sizes[ANGLE]))
+        tube, last, beside = held.tube(tube.region.within(X, swayed)), X, swayed
+        within.append((h * samples, tube.sizes[ANGLE]))
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
-    tube = held.tube(region)
     # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.
     near, slow = angle / 2 - angle**3 / 48 - h / 4 * fastest - beside[1], fastest - norm(tube.drift) / 2 - beside[0]
     for name, most_of, part in (("angle", near, TURN), ("rate", slow, RATE)):

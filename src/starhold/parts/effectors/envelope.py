@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import Vector
+from starhold.parts.effectors.wheel_arrays import most_of_each
 
 if TYPE_CHECKING:
     from starhold.parts.effectors.wheels import Wheels
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 COPLANAR = 1e-9
 """Sine of the angle below which axes count as parallel, or as lying in a plane."""
-_WORST_CONDITION = 1e3
+WORST_CONDITION = 1e3
 
 
 def facets_of(axes: tuple[Vector, ...], least: tuple[Vector, ...]) -> Buffer:
@@ -36,14 +37,9 @@ def authority(wheels: Wheels, kind: Literal["axis", "norm"] = "norm", *, peak: b
     limits = [wheels.torque_limit[k] for k in _counted(wheels.least)]
     if peak:
         pieces = np.array(facets_of(wheels.axes, wheels.least).cells).reshape(-1, 6 + 3 * len(wheels.axes))
-        return min(limits) / float(_sizes(pieces[:, :3], kind).max())
-    shares = _sizes(np.array(wheels.least)[list(_counted(wheels.least))], kind)
+        return min(limits) / float(most_of_each(pieces[:, :3], kind).max())
+    shares = most_of_each(np.array(wheels.least)[list(_counted(wheels.least))], kind)
     return min(limit / share for limit, share in zip(limits, shares.tolist(), strict=True))
-
-
-def _sizes(rows: Array, kind: str) -> Array:
-    """The most that each row (n, 3) gives of a vector within the unit ball or box."""
-    return np.linalg.norm(rows, axis=1, ord=1 if kind == "axis" else 2)
 
 
 def _counted(least: tuple[Vector, ...]) -> tuple[int, ...]:
@@ -117,10 +113,10 @@ def check_authority(axes: Array, who: str) -> None:
         shown = " and ".join(_shown(direction) for direction in lacking.T)
         raise ValueError(f"{who} no torque about the body direction {shown}: three independent axes are needed")
     condition = float(sizes[0] / sizes[2])
-    if condition > _WORST_CONDITION:
+    if condition > WORST_CONDITION:
         raise ValueError(
             f"{who} hardly any torque about the body direction {_shown(directions[:, 2])}: "
-            f"the condition number of the axes is {condition:.3g}, above {_WORST_CONDITION:g}"
+            f"the condition number of the axes is {condition:.3g}, above {WORST_CONDITION:g}"
         )
 
 

@@ -23,6 +23,8 @@ CARD = Card(
 )
 ROLE = "effector"
 ACTS = OUTSIDE = True
+KNOWN = ("torque",)
+"""The width of a pulse is computed with it."""
 GRAVITY = 9.80665
 """Standard gravity (m/s2), by which a specific impulse is given in seconds."""
 

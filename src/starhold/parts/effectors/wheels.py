@@ -25,6 +25,7 @@ from starhold.parts.contract import Card, Envelope, Push
 from starhold.parts.craft import vector
 from starhold.parts.effectors.envelope import authority, check_authority, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
+from starhold.parts.effectors.wheel_arrays import axial, least_squares, unit_axes
 
 CARD = Card(
     title="Reaction wheels",
@@ -290,7 +291,7 @@ def make_wheels(
     )
     working = [i for i in range(count) if columns[1][i] > 0.0]
     check_authority(matrix[working], "the wheels give" if len(working) == count else "the working wheels give")
-    return Wheels(_rows(matrix), *columns, _least_squares(matrix, working))
+    return Wheels(_rows(matrix), *columns, _rows(least_squares(matrix, working)))
 
 
 def lose(wheels: Wheels, index: int) -> Wheels:
@@ -307,7 +308,7 @@ def lose(wheels: Wheels, index: int) -> Wheels:
     working = [i for i in range(count) if limits[i] > 0.0]
     matrix = np.array(wheels.axes)
     check_authority(matrix[working], f"without wheel {index + 1} the others give")
-    return wheels._replace(torque_limit=limits, least=_least_squares(matrix, working), facets=())
+    return wheels._replace(torque_limit=limits, least=_rows(least_squares(matrix, working)), facets=())
 
 
 def capacity(state: State, params: Wheels) -> float:
@@ -332,7 +333,7 @@ def shared_as(params: Wheels, known: Wheels) -> Wheels:
 
 def axial_inertia(params: Wheels) -> NDArray[np.float64]:
     """The inertia of the rotors about their own axes (3, 3; kg m2)."""
-    return (np.transpose(params.axes) * np.array(params.inertia)) @ np.array(params.axes)
+    return axial(np.array(params.axes), np.array(params.inertia))
 
 
 def gives_allocated_torque(wheels: Wheels) -> bool:
@@ -355,7 +356,7 @@ def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:
     for i, length in enumerate(lengths.tolist()):
         if not 0.0 < length < math.inf:
             raise ValueError(f"the axis of wheel {i + 1} must have a finite length above zero, not {length:g}")
-    return matrix / lengths[:, None]
+    return unit_axes(matrix)
 
 
 def _column(name: str, value: Any, count: int, least: float | None, infinite: bool = False) -> Numbers:
@@ -376,9 +377,3 @@ def _column(name: str, value: Any, count: int, least: float | None, infinite: bo
 
 def _rows(matrix: NDArray[np.float64]) -> tuple[Vector, ...]:
     return tuple(vector(row) for row in matrix)
-
-
-def _least_squares(axes: NDArray[np.float64], working: list[int]) -> Rows:
-    rows = np.zeros_like(axes)
-    rows[working] = -np.linalg.pinv(axes[working].T)
-    return _rows(rows)

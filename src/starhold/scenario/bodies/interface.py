@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -29,13 +30,15 @@ class Made(Protocol):
 
 class Moved(NamedTuple):
     """The numbers of a loop that values of a file's keys give: the body's first state as its motion begins and as the loop
-    is made with it, the craft that flies, the nominal model that the law has, and the saturation limit of the command."""
+    is made with it, the craft that flies, the nominal model that the law has, the saturation limit of the command, and the
+    loop's parts."""
 
     start: Any
     made_with: Any
     craft: Any
     nominal: Any
     limit: Any
+    parts: tuple[Fitted, ...]
 
 
 class Body(Protocol):
@@ -138,7 +141,19 @@ class Body(Protocol):
     def moved(self, scenario: Scenario, loop: Any, values: Mapping[str, Any]) -> Moved:
         """The numbers of a law's loop under other values of the keys of `dials`: an equation, with the bits that `build`
         gives of the scenario that `changes` tells."""
-        return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.saturation_limit())
+        return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.saturation_limit(), loop.parts)
+
+    def flown(self, scenario: Scenario, loop: Any, values: Mapping[str, Any], known: Mapping[str, Any]) -> Moved:
+        """The numbers of a loop that flies with values of which laws know others, or not all: an equation."""
+        true = self.moved(scenario, loop, values)
+        supposed = self.moved(scenario.known, replace(loop, craft=loop.known), known)
+
+        def shared(one: Fitted, other: Fitted) -> Fitted:
+            share = one.part.hook("shared_as")
+            return one if share is None else replace(one, params=share(one.params, other.params))
+
+        parts = (shared(*pair) for pair in zip(true.parts, supposed.parts, strict=True))
+        return true._replace(nominal=supposed.craft, parts=tuple(parts))
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
         """The body's numbers as laws know them under these values of the keys of `dials`, which may be recorded numbers;

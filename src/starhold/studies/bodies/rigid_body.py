@@ -84,6 +84,11 @@ class RigidBodyStudy(BodyStudy):
         wheels = ("wheel_momentum",) if "wheel_momentum" in run.arrays else ()
         return ("attitude", "rate", "position", "velocity", *wheels)
 
+    def compile_calls(self, loop: ClosedLoop) -> None:
+        from starhold.analysis.cost import compile_calls
+
+        compile_calls(loop)
+
     def call_costs(self, loop: ClosedLoop, run: Recording) -> dict[str, float]:
         from starhold.analysis.cost import call_costs, recorded_states
 

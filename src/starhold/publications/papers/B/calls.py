@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.analysis.cost import CALLS, Replay, recorded_states
-from starhold.loop.kernels import Numbers, make_step, replay
+from starhold.loop.kernels import Numbers, make_step
+from starhold.loop.programs import replay
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding

@@ -52,29 +52,35 @@ def _where(there: bool, role: str, name: str, *numbers: float) -> tuple[Fitted, 
 
 def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
     """The effectors of the tables: their reaction wheels, if any. ValueError says what is missing or cannot be."""
-    shared, single = table.wheels or WheelsTable(), table.wheel
-    if table.wheels is None and not single:
+    if table.wheels is None and not table.wheel:
         return ()
+    axes, columns, momenta = rotors_in(table)
+    wheels = make_wheels(axes, **columns)._replace(allocation=ALLOCATIONS.index((table.wheels or WheelsTable()).allocation))
+    return (Fitted(find("effector", "wheels"), wheels, start=State(tuple(momenta))),)
+
+
+def rotors_in(table: RigidBodyTable) -> tuple[list[Any], dict[str, list[Any]], list[Any]]:
+    """The axes of the wheels of tables, their numbers by name, and their momenta (N m s), of each wheel in order. ValueError
+    says what is missing."""
+    shared, single = table.wheels or WheelsTable(), table.wheel
     axes = [wheel.axis for wheel in single] or list(LAYOUTS[shared.layout or ""]())
     rotors: list[Rotor] = [*single] or [shared] * len(axes)
     columns = {name: [_number(name, rotor, shared, place) for place, rotor in enumerate(rotors, 1)] for name in NUMBERS}
-    wheels = make_wheels(axes, **columns)._replace(allocation=ALLOCATIONS.index(shared.allocation))
-    momenta = tuple((rotor if "momentum" in rotor.model_fields_set else shared).momentum for rotor in rotors)
-    return (Fitted(find("effector", "wheels"), wheels, start=State(momenta)),)
+    return axes, columns, [(rotor if "momentum" in rotor.model_fields_set else shared).momentum for rotor in rotors]
 
 
-def _number(name: str, table: Rotor, shared: Rotor, place: int) -> float:
+def _number(name: str, table: Rotor, shared: Rotor, place: int) -> Any:
     """A number of a wheel: its own, its unit's, what all share, or their unit's."""
     for given in (table, shared):
         value: Any = getattr(given, name)
         if value is not None:
-            return float(value)
+            return value
         if given.unit is not None:
             if given.unit not in WHEEL_UNITS:
                 raise ValueError(f"no wheel unit {given.unit!r}; one of {', '.join(WHEEL_UNITS)}")
             wheel_unit = getattr(WHEEL_UNITS[given.unit], name, None)
             if wheel_unit is not None:
-                return float(wheel_unit)
+                return wheel_unit
     if name in ("viscous", "coulomb"):
         return 0.0
     raise ValueError(f"wheel {place} has no {name}: give it, or a unit")

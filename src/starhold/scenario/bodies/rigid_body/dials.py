@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import reduce
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -18,10 +19,11 @@ from starhold.algebra.structure import leaves
 from starhold.algebra.vector import apply
 from starhold.errors import input_at
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse
+from starhold.parts.craft import Craft, check_moments, check_rest, compact, inverse, total_inertia
 from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.craft import axial_inertia, effectors_of, sure_torque
+from starhold.scenario.bodies.rigid_body.rotors import Rotors, impossible, rotors_over, stacked
 from starhold.scenario.bodies.rigid_body.start import start_of, stated, target_of, unit_of
 
 if TYPE_CHECKING:
@@ -34,6 +36,8 @@ KNOWN, TRUE = "spacecraft.inertia", "fault[1].inertia"
 LIMIT, ATTITUDE, RATE = "spacecraft.torque_limit", "initial.attitude", "initial.rate"
 ANGLES = "initial.angles"
 """No key that may be moved, for sines are no operation: `moved` takes the quaternion of the angles."""
+ROTORS = "wheels"
+"""Neither: `moved` takes the wheels that the keys of their tables give."""
 
 
 class Dials(Body):
@@ -67,7 +71,7 @@ class Dials(Body):
 
     def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
         """The numbers of a loop under these values, as `build` and `make_events` give them."""
-        nominal, flown = _crafts(scenario, values)
+        nominal, flown = _crafts(scenario, values, loop.craft)
         cutoff = values.get(LIMIT, loop.saturation_limit())
         attitude = unit_of(values[ATTITUDE]) if ATTITUDE in values else values.get(ANGLES)
         begun = start_of(scenario, target_of(scenario), attitude, values.get(RATE))
@@ -76,12 +80,15 @@ class Dials(Body):
         same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
         jumped = apply(flown.inverse_inertia, apply(nominal.inertia, begun.rate))
         rate: Any = tuple(where(same, kept, other) for kept, other in zip(begun.rate, jumped, strict=True))
-        return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff)
+        rotors, parts = values.get(ROTORS), loop.parts
+        if rotors is not None:
+            parts = tuple(replace(f, params=rotors.wheels) if f.part.name == "wheels" else f for f in parts)
+        return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff, parts)
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Craft:
         """The craft that laws know under these values, which may be recorded ones; InputError where no file may have
         them."""
-        crafts = _crafts(scenario, values)
+        crafts = _crafts(scenario, values, scenario.craft)
         for key, craft in zip((KNOWN, TRUE), crafts, strict=True):
             with input_at("", key):
                 if key in values:
@@ -95,7 +102,7 @@ class Dials(Body):
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Array]) -> dict[str, Any]:
         """Return the arguments of `moved`, with an array (lanes,) in place of each number; columns: values (components...,
-        lanes) by key, of whole vectors or of single components. An inertia beside wheels is left out."""
+        lanes) by key, of whole vectors or of single components. ValueError where lanes differ in more than numbers."""
         initial, moved = scenario.table.initial, dict[str, Any]()
         for key, given in ((ATTITUDE, initial.attitude), (ANGLES, initial.angles), (RATE, initial.rate)):
             values = _whole(columns, key, given)
@@ -104,48 +111,63 @@ class Dials(Body):
                 values = np.array([from_angles(*lane) for lane in values.T.tolist()]).T
             if values is not None:
                 moved[key] = tuple(values)
-        moments = _moments(scenario, columns)
-        if moments is not None and not effectors_of(scenario):
-            moved[KNOWN] = _inertia(moments, isinstance(scenario.craft.inertia[0], tuple))
-        return moved
+        moments, rotors = _moments(scenario, columns), rotors_over(scenario, columns)
+        if moments is not None:
+            moved[KNOWN] = _inertia(moments, isinstance(total_inertia(scenario.craft)[0], tuple))
+        if LIMIT in columns:
+            moved[LIMIT] = columns[LIMIT]
+        if rotors is not None and rotors.sure is None:
+            raise ValueError("lanes differ in how their wheels share a torque out")
+        return moved if rotors is None else moved | {ROTORS: rotors}
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
-        """Which lanes have an inertia that no body has, (lanes,); None where that is not drawn."""
-        moments = _moments(scenario, columns)
-        if moments is None:
+        """Which lanes have an inertia that no body has, or wheels that no craft can have, (lanes,); None where neither is
+        drawn."""
+        moments, rotors = _moments(scenario, columns), rotors_over(scenario, columns)
+        if moments is None and rotors is None:
             return None
-        if moments.ndim == 2:
-            ordered = np.sort(moments, axis=0).T
-        else:
-            full = np.moveaxis(moments, -1, 0)
-            ordered = np.linalg.eigvalsh(0.5 * (full + full.swapaxes(1, 2)))
-        return (ordered[:, 0] <= 0.0) | (ordered[:, 2] > (ordered[:, 0] + ordered[:, 1]) * (1.0 + 1e-9))
+        lanes = next(iter(columns.values())).shape[-1]
+        moments = np.asarray(scenario.table.spacecraft.inertia)[..., None] if moments is None else moments
+        full = np.moveaxis(moments * np.eye(3)[:, :, None] if moments.ndim == 2 else moments, -1, 0)
+        ordered = np.sort(moments, axis=0).T if moments.ndim == 2 else _principal(full)
+        no_body = (ordered[:, 0] <= 0.0) | (ordered[:, 2] > (ordered[:, 0] + ordered[:, 1]) * (1.0 + 1e-9))
+        if not effectors_of(scenario):
+            return no_body
+        axial = axial_inertia(effectors_of(scenario)) if rotors is None else stacked(rotors.axial, lanes)
+        no_rest = _principal(full - axial)[:, 0] <= 0.0
+        return no_body | no_rest | (False if rotors is None else impossible(scenario, rotors.wheels, lanes))
 
 
-def _crafts(scenario: Scenario, values: Mapping[str, Any]) -> tuple[Craft, Craft]:
-    """The craft that laws know, and the one that flies."""
-    craft, limit = scenario.craft, values.get(LIMIT)
-    if limit is not None:
-        sure = sure_torque(scenario.table, effectors_of(scenario))
-        craft = craft._replace(torque_limit=minimum(limit, sure) if sure < math.inf else limit)
-    nominal = _with_inertia(scenario, craft, values[KNOWN]) if KNOWN in values else craft
-    return nominal, _with_inertia(scenario, craft, values[TRUE]) if TRUE in values else nominal
+def _crafts(scenario: Scenario, values: Mapping[str, Any], like: Craft) -> tuple[Craft, Craft]:
+    """The craft that laws know, and the one that flies; formed as one like it."""
+    craft, rotors = scenario.craft, values.get(ROTORS)
+    if LIMIT in values or rotors is not None:
+        table = scenario.table
+        limit = values.get(LIMIT, table.spacecraft.torque_limit)
+        sure = sure_torque(table, effectors_of(scenario)) if rotors is None else rotors.sure
+        if rotors is not None or sure < math.inf:
+            limit = sure if table.spacecraft.limit == "none" else minimum(limit, sure)
+        craft = craft._replace(torque_limit=limit)
+    nominal = craft
+    if KNOWN in values or rotors is not None:
+        nominal = _with_inertia(scenario, craft, values.get(KNOWN, total_inertia(craft)), like, rotors)
+    return nominal, _with_inertia(scenario, craft, values[TRUE], like) if TRUE in values else nominal
 
 
-def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any) -> Craft:
-    """The craft with another inertia of the same form, its wheels included."""
+def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any, like: Craft, rotors: Rotors | None = None) -> Craft:
+    """The craft with another inertia of the form of one like it, its wheels included."""
     if not craft.with_rotors:
         return craft._replace(inertia=inertia, inverse_inertia=inverse(inertia))
-    rotors = axial_inertia(effectors_of(scenario)).tolist()
-    like: Any = craft.inertia
+    axial: Any = axial_inertia(effectors_of(scenario)).tolist() if rotors is None else rotors.axial
+    form: Any = like.inertia
 
     def left(i: int, j: int) -> Any:
         whole = inertia[i][j] if isinstance(inertia[0], tuple) else inertia[i] if i == j else 0.0
-        return whole - rotors[i][j]
+        return whole - axial[i][j]
 
-    # What is zero of the nominal one stays so, for it is but rounding.
+    # What is zero of the one like it stays so, for it is but rounding.
     without_rotors: Any = tuple(
-        tuple(left(i, j) if like[i][j] != 0.0 else 0.0 for j in range(3)) if isinstance(like[0], tuple) else left(i, i)
+        tuple(left(i, j) if form[i][j] != 0.0 else 0.0 for j in range(3)) if isinstance(form[0], tuple) else left(i, i)
         for i in range(3)
     )
     return craft._replace(inertia=without_rotors, inverse_inertia=inverse(without_rotors), with_rotors=inertia)
@@ -175,3 +197,8 @@ def _inertia(moments: Array, matrix: bool) -> Any:
         moments = np.eye(3)[:, :, None] * moments
     rows = 0.5 * (moments + moments.swapaxes(0, 1))
     return tuple(tuple(row) for row in rows) if matrix else tuple(rows[k, k] for k in range(3))
+
+
+def _principal(inertias: Array) -> NDArray[np.floating[Any]]:
+    """The principal moments (lanes, 3) of inertias (lanes, 3, 3), the least first."""
+    return np.linalg.eigvalsh(0.5 * (inertias + inertias.swapaxes(1, 2)))

@@ -1,0 +1,125 @@
+"""From drawn values to a loop's numbers by one equation, which is recorded once and evaluated for all lanes at once; and
+gains by their law's own formula, lane by lane."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.structure import leaves, mapped, rebuild
+from starhold.campaign.dispersions import Dispersion
+from starhold.loop.kernels import numbers_of
+from starhold.scenario.reading import LawEntry, Scenario
+from starhold.studies.flat import Flat, named
+from starhold.trace.calling import Compiled
+from starhold.trace.handles import Handle
+
+Array: TypeAlias = NDArray[np.float64]
+Columns: TypeAlias = Mapping[str, NDArray[Any]]
+
+
+class Moving:
+    """The numbers that a law's loop has under the values of dispersions."""
+
+    def __init__(self, scenario: Scenario, law: LawEntry, base: Flat, dispersions: tuple[Dispersion, ...]) -> None:
+        self.scenario, self.law, self.base = scenario, law, base
+        self.drawn = [one for one in dispersions if not one.wordy]
+        self._paths: dict[str, tuple[Any, ...]] = {place.key: place.path for one in self.drawn for place in one.places}
+        self._names: tuple[tuple[str, ...], ...] = ()
+        self._compiled: tuple[Compiled, list[str]] | None = None
+
+    def by_key(self, columns: Columns, known: bool = False) -> dict[str, Array]:
+        """The values that are numbers, (components..., lanes), by key; `known`: only those that laws are told."""
+        return {
+            key: np.moveaxis(values, 0, -1)
+            for one in self.drawn
+            if one.known or not known
+            for key, values in one.arrays(columns).items()
+        }
+
+    def numbers(self, columns: Columns) -> dict[str, Array]:
+        """The numbers that differ, (lanes,), by their names in a carry or in a phase. ValueError or RecordingError where
+        they follow from no equation."""
+        arguments = self._arguments(columns)
+        varying = [leaf for leaf in leaves(arguments) if isinstance(leaf, np.ndarray)]
+        if not varying:
+            return {}
+        equation, names = self._equation(arguments, len(varying))
+        return dict(zip(names, equation.over(np.array(varying)), strict=True))
+
+    def _arguments(self, columns: Columns) -> tuple[Any, ...]:
+        """The arguments of the equation: what flies, what laws suppose, and the parameters of parts."""
+        hooks, every = self.scenario.hooks, self.by_key(columns)
+        true = hooks.drawn(self.scenario, every)
+        supposed = hooks.drawn(self.scenario.known, self.by_key(columns, known=True))
+        parts = dict[str, Any]()
+        for key, path in self._paths.items():
+            if path[0] == "part":
+                fitted = self.scenario.parts[path[1]]
+                parts[fitted.called] = _put(parts.get(fitted.called, fitted.params), path[2:], every[key])
+        self._names = tuple(true), tuple(supposed), tuple(parts)
+        return tuple(true.values()), tuple(supposed.values()), tuple(parts.values())
+
+    def _equation(self, arguments: Any, count: int) -> tuple[Compiled, list[str]]:
+        if self._compiled is None:
+            names = list[str]()
+
+            def equation(*given: Any) -> tuple[Any, ...]:
+                values = iter(given)
+                bound = mapped(arguments, lambda leaf: next(values) if isinstance(leaf, np.ndarray) else leaf)
+                by_name = (dict(zip(*pair, strict=True)) for pair in zip(self._names, bound, strict=True))
+                pairs = [pair for pair in self._named(*by_name) if isinstance(pair[1], Handle)]
+                names[:] = [name for name, _ in pairs]
+                return tuple(number for _, number in pairs)
+
+            self._compiled = Compiled(equation, *[0.0] * count), names
+        return self._compiled
+
+    def _named(self, true: Any, supposed: Any, params: Mapping[str, Any]) -> list[tuple[str, Any]]:
+        """The numbers of the loop with their names: the carry as it begins, and what phases have."""
+        loop = self.base.loop
+        moved = self.scenario.hooks.flown(self.scenario, loop, true, supposed)
+        parts = tuple(replace(one, params=params[one.name]) if one.name in params else one for one in moved.parts)
+        setup = replace(loop, parts=parts).setup()._replace(limit=moved.limit)
+        carry = loop.carry(moved.made_with, setup=setup)
+        phase = {"nominal": moved.nominal, "craft": moved.craft, "setup": setup}
+        return [
+            *zip(self.base.names, numbers_of(carry), strict=False),
+            *(pair for name, value in phase.items() for pair in named(value, name)),
+        ]
+
+    def gains(self, columns: Columns, nominal: Any) -> dict[str, Array]:
+        """The gains that the law's form gives each lane for the nominal craft, in which arrays (lanes,) stand where lanes
+        differ, by name; none of a law without a form. ValueError where a lane has none."""
+        spec, law = self.law.spec, self.law.law
+        if self.law.form is None:
+            return {}
+        every = self.by_key(columns)
+        for key, path in self._paths.items():
+            if path[0] == "law" and self.scenario.laws[path[1]] is self.law:
+                spec = _put(spec, path[2:], every[key])
+        lanes = len(next(iter(columns.values())))
+        rows: list[list[float]] = []
+        for lane in range(lanes):
+            craft, inputs = (mapped(value, partial(_at, lane)) for value in (nominal, spec))
+            gains = law.design(craft, inputs)
+            if not self.scenario.allow_unstable:
+                law.check(gains, craft)
+            rows.append([number for _, number in named(gains, "gains")])
+        names = [name for name, _ in named(self.base.loop.gains, "gains")]
+        return dict(zip(names, np.array(rows).T, strict=True))
+
+
+def _at(lane: int, leaf: Any) -> Any:
+    return float(leaf[lane]) if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
+
+
+def _put(value: Any, path: tuple[str | int, ...], new: Array) -> Any:
+    """A structure with an array (lanes,) in place of each number at a path."""
+    if not path:
+        return tuple(_put(None, (), row) for row in new) if new.ndim > 1 else new
+    place = value._fields.index(path[0]) if isinstance(path[0], str) else path[0]
+    return rebuild(value, [_put(item, path[1:], new) if k == place else item for k, item in enumerate(value)])

@@ -1,0 +1,243 @@
+"""The programs that repeat the step of a closed loop, recorded: over one lane or many, a step at a time, over samples, and
+over the calls of a law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from starhold.algebra.scalar import less
+from starhold.algebra.structure import flatten, mapped, move
+from starhold.algebra.structured import Buffer, at, repeat
+from starhold.algebra.words import number_of, whole_word, word_add, word_of
+from starhold.loop.closed_loop import Composition
+from starhold.loop.kernels import Arguments, Kernel, Numbers, Observer, form, make_step, numbers_of
+from starhold.loop.step import Step
+from starhold.trace.program import Loop, Program, Store
+from starhold.trace.recording import Cells, Recorder
+from starhold.trace.sharing import differing, split
+
+_HALVES: dict[Any, tuple[tuple[Kernel, Kernel], tuple[int, ...]]] = {}
+CHUNK = 1024
+"""Control steps for which the numbers that all lanes share are made at once, before lanes fly them."""
+
+
+def _state(like: Any, cells: Cells, base: Any, known: dict[int, Any] | None = None) -> Any:
+    """The state that lies in memory from `base` on, as `numbers_of` orders it; known: its numbers that lie elsewhere, by
+    place."""
+    place, start = 0, len(flatten(like))
+
+    def leaf(value: Any) -> Any:
+        nonlocal place, start
+        if isinstance(value, Buffer):
+            start += value.size
+            return Buffer(cells, base + start - value.size, value.size)
+        place += 1
+        return known[place - 1] if known and place - 1 in known else cells[base + place - 1]
+
+    return mapped(like, leaf)
+
+
+def _put(cells: Cells, base: Any, state: Any) -> None:
+    for place, number in enumerate(flatten(state)):
+        cells[base + place] = number
+
+
+def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
+    """The flight of one lane, or of a vector of lanes that draw the same random numbers, recorded: `groups` times
+    `each` control steps from `first` on, with a sample of the step number `place` of every group, written from the row
+    `row` on. A lane stops when its motion diverges; its last carry stays in `carry`."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells = recorder.memory("carry", lanes=True, writable=True)
+        record = recorder.memory("record", lanes=True, writable=True)
+        counts = [recorder.input(name, "index") for name in ("first", "groups", "each", "place", "row")]
+        first, groups, each, place, row = counts
+        key = (recorder.input("seed", "word"), recorder.input("run", "word"))
+        gains, nominal, craft, setup = Arguments(*numbers).bound(recorder, 0)
+        state = _state(carry, cells, 0)
+
+        def lost(carry: Any) -> Any:
+            return less(-1.0, carry.lost_at)
+
+        def group(g: Any, carry: Any) -> Any:
+            def turn(k: Any, carry: Any) -> Any:
+                now = first + (g * each + k)
+                updated = step.update(carry, now, key, gains, nominal, setup)
+
+                def write() -> None:
+                    sample = flatten(step.sample(updated, now, setup))
+                    for i, number in enumerate(sample):
+                        record[(row + g) * len(sample) + i] = number
+
+                at(k, place, write)
+                return (step.check(_propagated(step, updated, craft, setup, substeps), now + 1, setup),)
+
+            return repeat(each, turn, carry, stop=lost)
+
+        _put(cells, 0, repeat(groups, group, step.check(state, first, setup), stop=lost)[0])
+    return recorder.program("fly", "Flies a closed loop.")
+
+
+def many(
+    step: Step,
+    carry: Any,
+    numbers: Numbers,
+    substeps: int,
+    observer: Observer | None,
+    runs: Any = (),
+    alike: tuple[int, ...] = (),
+) -> Program:
+    """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
+    place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. The observer's notes lie
+    in `noted`. alike: places of numbers of the carry that are equal in all lanes; they lie in `common`, in this order."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells = recorder.memory("carry", lanes=True, writable=True)
+        common = recorder.memory("common")
+        seen = recorder.memory("noted", lanes=True, writable=True)
+        first, count, blocks, width = (recorder.input(name, "index") for name in ("first", "count", "blocks", "width"))
+        seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
+        first_noted, more = ((), ()) if observer is None else (observer.first, observer.numbers)
+        arguments = Arguments(*numbers, more, runs)
+
+        def block(b: Any) -> None:
+            gains, nominal, craft, setup, noting, own_run = arguments.bound(recorder, b * len(arguments.varying))
+            along = word_add(word_add(run, word_of(b * width)), recorder.lane())
+            key = (seed, along if isinstance(runs, tuple) else whole_word(own_run))
+            base, place = b * len(numbers_of(carry)), b * len(flatten(first_noted))
+            known = {row: common[k] for k, row in enumerate(alike)}
+            state, noted = _state(carry, cells, base, known), _state(first_noted, seen, place)
+
+            def turn(k: Any, carry: Any, noted: Any) -> Any:
+                now = first + k
+                updated = step.update(carry, now, key, gains, nominal, setup)
+                after = step.check(_propagated(step, updated, craft, setup, substeps), now + 1, setup)
+                if observer is not None:
+                    noted = observer.note(noted, updated, after, now, setup, noting)
+                return after, noted
+
+            end, noted = repeat(count, turn, step.check(state, first, setup), noted)
+            _put(cells, base, end)
+            _put(seen, place, noted)
+
+        repeat(blocks, block)
+    return recorder.program("fly", "Flies many closed loops.")
+
+
+def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: bool) -> Program:
+    """One control step, or none if `count` is 0, of each lane of `blocks` blocks of lanes, recorded. The law decides or, if
+    `outside`, the command lies in `given`. What the law is told at the end lies in `sensed`, the step's sample in `record`.
+    Lane 0 is run number `run` and the others follow."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, record, sensed = (recorder.memory(name, lanes=True, writable=True) for name in ("carry", "record", "sensed"))
+        given = recorder.memory("given", lanes=True)
+        now, count, blocks, width = (recorder.input(name, "index") for name in ("now", "count", "blocks", "width"))
+        seed, run = recorder.input("seed", "word"), recorder.input("run", "word")
+        arguments = Arguments(*numbers)
+        carried, size = len(numbers_of(carry)), len(carry.command)
+
+        def block(b: Any) -> None:
+            gains, nominal, craft, setup = arguments.bound(recorder, 0)
+            key = (seed, word_add(word_add(run, word_of(b * width)), recorder.lane()))
+            command = tuple(given[b * size + i] for i in range(size)) if outside else None
+
+            def turn(k: Any, carry: Any) -> Any:
+                updated = step.update(carry, now + k, key, gains, nominal, setup, command)
+                _put_row(record, b, step.sample(updated, now + k, setup))
+                return (step.check(_propagated(step, updated, craft, setup, substeps), now + k + 1, setup),)
+
+            end = repeat(count, turn, step.check(_state(carry, cells, b * carried), now, setup))[0]
+            _put(cells, b * carried, end)
+            _put_row(sensed, b, step.sense(end, now + count, key, gains, nominal, setup)[:3])
+
+        repeat(blocks, block)
+    return recorder.program("fly", "Flies a step of closed loops.")
+
+
+def _put_row(cells: Cells, row: Any, values: Any) -> None:
+    _put(cells, row * len(flatten(values)), values)
+
+
+def steady(step: Step, alike: tuple[int, ...], *arguments: Any) -> tuple[Program, tuple[int, ...]]:
+    """The program many(step, *arguments) with what is left of `alike`, and that: the places at which the carry is equal in
+    all lanes before the flight and after it."""
+    while True:
+        program = many(step, *arguments, alike=alike)
+        names, (block,) = differing(program), [s for s in program.main.body if isinstance(s, Loop)]
+        ends = [s.value for s in block.body if isinstance(s, Store) and s.memory == "carry"]
+        stay = tuple(row for row in alike if ends[row] not in names)
+        if stay == alike:
+            return program, alike
+        alike = stay
+
+
+def make_halves(
+    parts: Composition, width: int, alike: tuple[int, ...], *arguments: Any
+) -> tuple[tuple[Kernel, Kernel], tuple[int, ...]]:
+    """The kernels of `steady`: that of what all lanes share, and that of what is a lane's own; and what is left of `alike`.
+    They are called one after the other for at most `CHUNK` control steps."""
+    key = (parts, width, form(arguments))
+    if (*key, alike) not in _HALVES:
+        program, stay = steady(make_step(parts), alike, *arguments)
+        if (*key, stay) not in _HALVES:
+            shared, lane = split(program, CHUNK)
+            _HALVES[*key, stay] = (Kernel(shared, 1), Kernel(lane, width)), stay
+        _HALVES[*key, alike] = _HALVES[*key, stay]
+    return _HALVES[*key, alike]
+
+
+def _propagated(step: Step, carry: Any, craft: Any, setup: Any, substeps: int) -> Any:
+    """The carry after the substeps of a control step."""
+    if substeps == 1:
+        return step.propagate(carry, craft, setup)
+    return repeat(substeps, lambda _, carry: (step.propagate(carry, craft, setup),), carry)[0]
+
+
+def over_samples(
+    note: Callable[..., Any], first: Any, numbers: tuple[Any, Any], columns: tuple[tuple[str, tuple[int, ...]], ...]
+) -> Program:
+    """The program that takes notes of `count` samples in `record`, from the instant `first` on, and keeps them in `noted`.
+
+    note(noted, quantities, instant, limit, numbers) -> noted; first: the shape of the notes; numbers: those of the
+    notes, and the limit; columns: the recorded quantities with their shapes, () or (components,), in order."""
+    recorder = Recorder()
+    with recorder.recording():
+        record, noted = recorder.memory("record"), recorder.memory("noted", writable=True)
+        begin, count = recorder.input("first", "index"), recorder.input("count", "index")
+        given, limit = Arguments(*numbers).bound(recorder, 0)
+        width = sum(shape[0] if shape else 1 for _, shape in columns)
+
+        def turn(k: Any, seen: Any) -> Any:
+            place, quantities = k * width, dict[str, Any]()
+            for name, shape in columns:
+                values = tuple(record[place + i] for i in range(shape[0] if shape else 1))
+                quantities[name], place = values if shape else values[0], place + len(values)
+            return (note(seen, quantities, number_of(begin + k), limit, given),)
+
+        _put(noted, 0, repeat(count, turn, _state(first, noted, 0))[0])
+    return recorder.program("note", "Takes notes of samples.")
+
+
+def replay(step: Step, carry: Any, numbers: Numbers) -> Program:
+    """The control calls of a run, recorded for timing: updates on the states first .. first+count-1, one after another."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, states = recorder.memory("carry", lanes=True, writable=True), recorder.memory("states")
+        first, count = recorder.input("first", "index"), recorder.input("count", "index")
+        key = (recorder.input("seed", "word"), recorder.input("run", "word"))
+        gains, nominal, _, setup = Arguments(*numbers).bound(recorder, 0)
+        like = (carry.state, carry.effectors)
+        begun, width = _state(carry, cells, 0), len(flatten(like))
+
+        def turn(k: Any, carry: Any) -> Any:
+            # Each call waits for the torque of the call before.
+            u = carry.command
+            wait = 0.0 * (u[0] + u[1] + u[2])
+            state, effectors = _state(like, states, (first + k) * width)
+            carry = carry._replace(state=move(state, wait, state), effectors=effectors)
+            return (step.update(carry, first + k, key, gains, nominal, setup),)
+
+        _put(cells, 0, repeat(count, turn, begun)[0])
+    return recorder.program("replay", "Repeats the control calls of a run.")

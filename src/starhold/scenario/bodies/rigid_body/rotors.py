@@ -1,0 +1,103 @@
+"""The reaction wheels of many runs at once, from what is drawn for the keys of [wheels] and [[wheel]]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.parts.effectors.envelope import WORST_CONDITION
+from starhold.parts.effectors.wheel_arrays import axial, least_squares, most_of_each, unit_axes
+from starhold.parts.effectors.wheels import CREEP, Wheels
+from starhold.scenario.bodies.rigid_body.craft import axial_inertia, effectors_of, rotors_in, sure_torque, wheels_of
+from starhold.scenario.checking import RESOLVED
+from starhold.scenario.making import path_of
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+class Rotors(NamedTuple):
+    """Wheels, the inertia of their rotors about their own axes (3, 3; kg m2), and the torque that they surely give (N m),
+    with an array (lanes,) in place of each number that differs; None where lanes differ in how they share it out."""
+
+    wheels: Wheels
+    axial: Any
+    sure: Any
+
+
+def rotors_over(scenario: Scenario, columns: Mapping[str, Array]) -> Rotors | None:
+    """The wheels of lanes that differ in the values of some keys, (components..., lanes) by key; None where none of these is
+    a wheel's."""
+    like, table = wheels_of(scenario), scenario.table
+    paths = {key: path_of(key, {}, "") for key in columns}
+    drawn = {key: path for key, path in paths.items() if path[0] in ("wheels", "wheel")}
+    if not drawn or like is None:
+        return None
+    for key, path in drawn.items():
+        table = _with(table, path, columns[key] if columns[key].ndim == 1 else tuple(columns[key]))
+    rows, numbers, _ = rotors_in(table)
+    lanes = len(columns[next(iter(drawn))].T)
+    wheels = like._replace(**{name: tuple(values) for name, values in numbers.items()})
+    turned, limited = _differ(rows), _differ(wheels.torque_limit)
+    limits = stacked(wheels.torque_limit, lanes)
+    working = np.flatnonzero(np.array(like.torque_limit) > 0.0).tolist()
+    axes = unit_axes(stacked(rows, lanes)) if turned else np.array(like.axes)
+    if turned:
+        units = _numbers(axes)
+        pairs = zip(like.axes, rows, units, strict=True)
+        wheels = wheels._replace(
+            axes=tuple(unit if _differ(row) else axis for axis, row, unit in pairs),
+            least=_numbers(least_squares(axes, working)),
+        )
+    around: Any = axial_inertia(effectors_of(scenario)).tolist()
+    if turned or _differ(wheels.inertia):
+        around = _numbers(axial(axes, stacked(wheels.inertia, lanes)))
+    sure: Any = sure_torque(scenario.table, effectors_of(scenario))
+    if limited or turned:
+        least = stacked(wheels.least, lanes)[:, working]
+        kind = "norm" if scenario.table.spacecraft.limit == "norm" else "axis"
+        alike = not like.allocation and ((limits > 0.0) == (np.array(like.torque_limit) > 0.0)).all()
+        sure = (limits[:, working] / most_of_each(least, kind)).min(axis=1) if alike else None
+    return Rotors(wheels, tuple(map(tuple, around)), sure)
+
+
+def impossible(scenario: Scenario, wheels: Wheels, lanes: int) -> NDArray[np.bool_]:
+    """Which lanes, (lanes,), have wheels that `check_authority` refuses, or whose friction `check_substeps` does."""
+    viscous, coulomb, inertia = (stacked(column, lanes) for column in (wheels.viscous, wheels.coulomb, wheels.inertia))
+    timing = scenario.table.simulation
+    least = timing.control_period * ((viscous + coulomb / CREEP) / inertia).max(axis=1) / RESOLVED * (1.0 - 1e-12)
+    working = np.flatnonzero([np.all(limit) for limit in wheels.torque_limit])
+    sizes = np.linalg.svd(stacked(wheels.axes, lanes)[:, working], compute_uv=False)
+    return (sizes[:, 0] > WORST_CONDITION * sizes[:, 2]) | (timing.substeps < least)
+
+
+def stacked(values: Any, lanes: int) -> Array:
+    """Numbers, each of all lanes or (lanes,), or tuples of them, as an array (lanes, ...)."""
+    if isinstance(values, list | tuple):
+        return np.stack([stacked(value, lanes) for value in values], axis=1)
+    return np.broadcast_to(np.asarray(values, dtype=float), (lanes,))
+
+
+def _with(table: Any, path: Sequence[str | int], value: Any) -> Any:
+    """A validated table with another value at a path."""
+    if not path:
+        return value
+    name, rest = path[0], path[1:]
+    if isinstance(name, str):
+        return table.model_copy(update={name: _with(getattr(table, name), rest, value)})
+    return type(table)([_with(item, rest, value) if place == name else item for place, item in enumerate(table)])
+
+
+def _differ(values: Any) -> bool:
+    """Whether lanes differ in one of these numbers."""
+    return any(_differ(value) if isinstance(value, list | tuple) else isinstance(value, np.ndarray) for value in values)
+
+
+def _numbers(array: Array) -> tuple[Any, ...]:
+    """The tuples of arrays (lanes,) in an array (lanes, m, n)."""
+    return tuple(tuple(array[:, i, j] for j in range(array.shape[2])) for i in range(array.shape[1]))

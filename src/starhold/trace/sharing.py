@@ -1,0 +1,123 @@
+"""A program of many lanes is split in two, so that what all lanes share is computed once: the shared part runs first and
+leaves a row of numbers for each turn of the loop, which the part of a lane reads.
+
+A value differs where it comes from the number of the lane or of the block of lanes, from a lane's own memory, or from
+another that differs. Only numbers are handed over: truths, words and indices are cheap, and computed in both parts.
+"""
+
+from typing import Any
+
+from starhold.algebra.operations import NUMBER, OPERATIONS
+from starhold.trace.program import (
+    Block,
+    Call,
+    Load,
+    Loop,
+    Memory,
+    Op,
+    Program,
+    Store,
+    Value,
+    live_names,
+    prune,
+    statements,
+    writes,
+)
+
+ROWS, ENDS = "rows", "ends"
+"""Memories between the parts: the numbers of each turn, row after row, and those after the last turn."""
+
+
+def differing(program: Program) -> set[Value]:
+    """Return the names of the values that differ between the lanes of a program that is a loop over blocks of lanes."""
+    of_lanes = {memory.name for memory in program.memories if memory.lanes}
+    blocks, place = _loops(program)
+    names, before = {blocks.counter}, -1
+    # What the end of a turn gives is the start of the next.
+    while before != (before := len(names)):
+        for s in statements(program.main.body):
+            if isinstance(s, Op):
+                if s.operation.name == "lane" or not names.isdisjoint(s.args):
+                    names.add(s.ref)
+            elif isinstance(s, Load):
+                if s.memory in of_lanes or s.index in names:
+                    names.add(s.ref)
+            elif isinstance(s, Call):
+                names.update(name for name, _ in s.refs)
+            elif isinstance(s, Loop):
+                # One that writes for each lane stays with the lanes as a whole.
+                apart = s is not blocks and s is not blocks.body[place] and writes(s.body)
+                for slot in s.slots:
+                    if apart or not names.isdisjoint((s.most, s.done, slot.before, slot.after)):
+                        names.update((slot.name, slot.end))
+    return names
+
+
+def split(program: Program, most: int) -> tuple[Program, Program]:
+    """Split a loop over blocks of lanes, in each of which the lanes go through a loop of a given count of turns, of at most
+    so many: into the program of what all lanes share, which runs first, and that of a lane."""
+    names, (blocks, place), main = differing(program), _loops(program), program.main
+    loop: Loop = blocks.body[place]
+    before, after = blocks.body[:place], blocks.body[place + 1 :]
+    around = tuple(s for s in main.body if s is not blocks)
+
+    def same(block: Block) -> Block:
+        """Return what a block computes for all lanes; of a loop the slots that all share."""
+        shared = (
+            s._replace(slots=tuple(slot for slot in s.slots if slot.name not in names)) if isinstance(s, Loop) else s
+            for s in block
+            if not writes((s,))
+        )
+        return tuple(s for s in shared if (made := _made(s)) and names.isdisjoint(name for name, _ in made))
+
+    slots = [slot for slot in loop.slots if slot.name not in names and slot.kind == NUMBER]
+    wholly = (_made(s) for s in loop.body if s in same((s,)) and not isinstance(s, Load))
+    moved = {name for made in wholly if all(kind == NUMBER for _, kind in made) for name, _ in made}
+
+    def lane(handed: list[str], last: list[str]) -> Block:
+        body = tuple(s for s in loop.body if moved.isdisjoint(name for name, _ in _made(s)))
+        loads = (Load(name, ROWS, f"row.{k}") for k, name in enumerate(handed))
+        differ = tuple(slot for slot in loop.slots if slot not in slots)
+        turn = loop._replace(slots=differ, body=(*_places(loop, len(handed)), *loads, *body))
+        ends = (Load(name, ENDS, k) for k, name in enumerate(last))
+        return (*around, blocks._replace(body=(*before, turn, *ends, *after)))
+
+    handed, last = [*(slot.name for slot in slots), *sorted(moved)], [slot.end for slot in slots]
+    live = live_names(lane(handed, last), ())
+    handed, last = [name for name in handed if name in live], [name for name in last if name in live]
+    rows = (Store(ROWS, f"row.{k}", name) for k, name in enumerate(handed))
+    turn = loop._replace(
+        slots=tuple(slot for slot in loop.slots if slot.name not in names),
+        body=(*same(loop.body), *_places(loop, len(handed)), *rows),
+    )
+    ends = (Store(ENDS, k, name) for k, name in enumerate(last))
+    sizes = {ROWS: most * len(handed), ENDS: len(last)}
+
+    def part(body: Block, writable: bool) -> Program:
+        between = (Memory(name, False, writable, size) for name, size in sizes.items())
+        functions = (*program.functions[:-1], main._replace(body=prune(body, ())[0]))
+        return Program(functions, (*program.memories, *between))
+
+    return part((*around, *same(before), turn, *ends), True), part(lane(handed, last), False)
+
+
+def _loops(program: Program) -> tuple[Loop, int]:
+    """Return the loop over blocks of lanes, and the place in it of the loop that each lane goes through."""
+    (blocks,) = (s for s in program.main.body if isinstance(s, Loop))
+    counts = {name for name, _ in program.main.params}
+    return blocks, next(k for k, s in enumerate(blocks.body) if isinstance(s, Loop) and s.most in counts)
+
+
+def _made(s: Any) -> list[tuple[str, str]]:
+    """Return the names and kinds of what a statement makes."""
+    if isinstance(s, Op):
+        return [(s.ref, s.operation.gives)]
+    if isinstance(s, Load):
+        return [(s.ref, NUMBER)]
+    return [(slot.end, slot.kind) for slot in s.slots] if isinstance(s, Loop) else list(getattr(s, "refs", ()))
+
+
+def _places(loop: Loop, width: int) -> list[Op]:
+    """Return the places of a turn's row; no other name has a dot."""
+    begin = Op("row.", OPERATIONS["index_product"], (loop.counter, width))
+    return [begin, *(Op(f"row.{k}", OPERATIONS["index_plus"], ("row.", k)) for k in range(width))]
