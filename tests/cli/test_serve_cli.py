@@ -31,7 +31,8 @@ from tests.running import starhold
     ],
 )
 def test_a_wrong_argument_is_one_line(words, message, tmp_path):
-    done = starhold("serve", "three-laws", *words, cwd=tmp_path, code=2)
+    done = starhold("serve", "three-laws", "-o", "out", *words, cwd=tmp_path, code=2)
+    assert not (tmp_path / "out").exists()
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
 
@@ -43,6 +44,12 @@ def test_a_port_in_use_and_a_time_without_seconds(tmp_path):
     assert f"found 127.0.0.1:{port}" in done.stderr
     done = starhold("serve", "l2-circle", "--rate", "1", cwd=tmp_path, code=2)
     assert "a scenario whose time is in 1/Omega" in done.stderr
+
+
+def test_results_that_are_there_are_kept(tmp_path):
+    (tmp_path / "run.nc").touch()
+    done = starhold("serve", "three-laws", "--port", "0", "-o", ".", cwd=tmp_path, code=2)
+    assert "results already there (run.nc)" in done.stderr
 
 
 def test_interrupted_tells_where_and_keeps_the_recording(tmp_path):

@@ -36,9 +36,11 @@ def serve(
     from starhold.scenario.reading import load
 
     scenario = load(file, allow_unstable)
-    folder = None if output is None else open_folder(output, force)
 
     def announce(address: str) -> None:
+        # What else could be refused was, and nothing has been flown.
+        if output is not None:
+            open_folder(output, force)
         console.print(f"Listening on {address}. Ctrl-C ends it.", soft_wrap=True, markup=False)
         # Whoever waits for this line reads a pipe.
         console.file.flush()
@@ -46,9 +48,9 @@ def serve(
     served = serve_plant(scenario, law, host=host, port=port, udp=udp, rate=rate, missing=missing, announce=announce)
     for line in served.lines:
         console.print(line, soft_wrap=True, markup=False)
-    if folder is not None:
-        write_run(served.recording, folder / "run.nc")
-        console.print(f"Recording: {folder / 'run.nc'}", soft_wrap=True, markup=False)
+    if output is not None:
+        write_run(served.recording, output / "run.nc")
+        console.print(f"Recording: {output / 'run.nc'}", soft_wrap=True, markup=False)
     codes = {Ending.DIVERGED: DIVERGED, Ending.GONE: FAILED_CHECK, Ending.MISSED: FAILED_CHECK}
     codes[Ending.INTERRUPTED] = 128 + served.signal
     if code := codes.get(served.ending, 0):
