@@ -23,7 +23,7 @@ from starhold.parts.catalogue import as_part, from_file, parts, read_module, rol
 from starhold.parts.contract import UNBOUNDED, Card, Errors, Push
 from starhold.parts.craft import make_craft
 from starhold.parts.part import Fitted, Part
-from starhold.parts.random import Dice
+from starhold.parts.random import Dice, Silent
 from starhold.scenario.bodies import bodies
 from starhold.scenario.bodies.any_body import tables_of
 from starhold.scenario.checking import nearest
@@ -244,11 +244,7 @@ def keeps_what_it_says(part: Part) -> None:
 def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:
     """Yield torques and errors of a part at states of a flight and at other attitudes, and their bounds."""
 
-    class Silent(Dice):
-        def vector(self, place: int, deviation: Any) -> Any:
-            return ZERO
-
-    dice = (Silent if part.hook("noise") else Dice)((1, 2), 3, 0)
+    dice = Silent() if part.hook("noise") else Dice((1, 2), 3, 0)
     fitted, module = next(f for f in loop.parts if f.part == part), part.module
     numbers, random = fitted.prepared(loop.period), np.random.default_rng(1)
 

@@ -161,5 +161,20 @@ class Dice:
         return normals(self._key, self._step, self._first + place, count)
 
 
+class Silent(Dice):
+    """Random numbers that are all 0, for readings without noise."""
+
+    def __init__(self) -> None:
+        super().__init__((0, 0), 0, 0)
+
+    def vector(self, place: int, deviation: Scalar) -> Vector:
+        """Three zeros."""
+        return (0.0, 0.0, 0.0)
+
+    def normals(self, place: int, count: int) -> tuple[Scalar, ...]:
+        """So many zeros."""
+        return (0.0,) * count
+
+
 RANGE = 64
 """Random numbers that a part may use at a control step."""

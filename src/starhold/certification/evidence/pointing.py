@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -203,19 +204,19 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
         begun = loop.loop.without("sensor", "estimator")
         shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
         rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
-        tried = [(radians(turn), rate, limits) for limits in (loop.limits, {}) for rate in rates for turn in ANGLES]
+        tried = [(list(map(radians, ANGLES)), rate, limits) for limits in (loop.limits, {}) for rate in rates]
         # Against more noise than can be shown, without it.
         kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
-        tried = [(turn, rate, {name: x for name, x in loop.limits.items() if name in like})]
+        tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like})]
         kinds = [SHARE in like]
     for noisy in kinds:
         own = pushes(loop.loop, loop.known.envelope(noisy))
         against = own._replace(outside=own.outside + float(loop.known.disturbance))
         try:
             pushed = Pushed(loop, against, noisy)
-            if any(pushed.find(*one) for one in tried):
+            if any(pushed.find_largest(*one) for one in tried):
                 return True
         except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
             # Floats may be too far apart in size, or too large.
@@ -263,24 +264,39 @@ class Pushed:
         """Return the claim with what is told, and evidence beside that about noise."""
         return self.loop.claim(POINTS, self.words, V, **told) | {"evidence": self.evidence | evidence}
 
-    def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
-        """Find the claim of how near to its target the loop comes, and add it. The set holds turns of up to `angle` (rad) at
-        up to `rate` (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
+    def find_largest(self, angles: list[float], rate: float, limits: dict[str, float]) -> bool:
+        """Find the claim from the largest of these turns, of which each is less than the one before, that can be had."""
+        # What may start within a set may start within a smaller one.
+        first = bisect_left(angles, True, key=lambda angle: self.begun(angle, rate, limits) is not None)
+        return any(self.find(angle, rate, limits) for angle in angles[first:])
+
+    def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
+        """Return what the claim tells of the set from which motions start, and a chain that begins there for each lean of V;
+        None, and the reason in `failed`, where V does not decrease on it or the torque exceeds its limits."""
         loop, J, begun = self.loop, self.J, list[Chain]()
-        told = self.told | (limits or {})
+        told = self.told | limits
         told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
         for epsilon, V, held, found in self.leans:
             lean = epsilon * sin(min(angle, pi) / 2.0)
             level = 4.0 * self.stiffness * sin(angle / 4.0) ** 2 + J * rate * (rate / 2.0 + lean)
             begun.append(Chain(held, V, level * (1.0 + 1e-6), found))
-        if begun[0].asks_more(limits or {}):
+        if begun[0].asks_more(limits):
             loop.failed[POINTS] = "the torque exceeds its limit"
-            return False
+            return None
         if not any(chain.decreases() for chain in begun):
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
-            return False
+            return None
         if not begins(loop, self.claim(begun[0].V, told | {"level": begun[0].level}), self.scales):
+            return None
+        return told, begun
+
+    def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
+        """Find the claim of how near to its target the loop comes, and add it. The set holds turns of up to `angle` (rad) at
+        up to `rate` (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
+        loop, start_of = self.loop, self.begun(angle, rate, limits or {})
+        if start_of is None:
             return False
+        told, begun = start_of
         for chain in begun:
             if chain.descend() < 4.0 * chain.aim():
                 break

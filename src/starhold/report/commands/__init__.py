@@ -96,13 +96,15 @@ class Result(NamedTuple):
 
 class Option(NamedTuple):
     """An option. key: the key of the scenario whose value it replaces, a whole number if `whole`, else a time; "" for a text
-    that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure."""
+    that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure. content: reads the file
+    that the text names, which `study` takes after the law, None without the option."""
 
     key: str
     help: str
     whole: bool = False
     default: str | None = None
     file: Literal["", "csv", "png"] = ""
+    content: Callable[[str], Any] | None = None
 
 
 def number_or_text(value: str | float) -> str | float:
@@ -158,9 +160,12 @@ class Command(NamedTuple):
             defaults = {name: option.default for name, option in self.options.items() if not option.file}
             return self.read(*about, **defaults | given)
         scenario: Scenario = about[0].about(self.body) if self.body else about[0]
+        readers = {name: option.content for name, option in self.options.items() if option.content is not None}
+        texts = [(read, given.pop(name, None)) for name, read in readers.items()]
         if given:
             scenario = scenario.with_({self.options[name].key: number_or_text(value) for name, value in given.items()})
-        return scenario, self.pick(scenario, *about[1:] or (None,))
+        files = [None if text is None else read(text) for read, text in texts]
+        return scenario, self.pick(scenario, *about[1:] or (None,)), *files
 
     def studying(self, proof: bool) -> Callable[..., Any]:
         """Return what computes, with what is proved beside if that is asked for."""

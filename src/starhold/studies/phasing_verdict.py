@@ -1,0 +1,337 @@
+"""A sheet of signs and axes that was filled in is judged: which mistakes of which parts explain what was seen."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations, permutations, product
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from starhold.errors import InputError
+from starhold.scenario.building import build
+from starhold.scenario.checking import nearest
+from starhold.scenario.reading import LawEntry, Scenario
+from starhold.studies.phasing import ACTUATORS, AXES, MOTORS, ORDER, STATED, Array, Cell, Sheet, Stage, Stimulus, sheet_of
+
+Test: TypeAlias = Callable[[Array], Any]
+"""Which of some vectors (n, k) agree with what was seen."""
+SEEN = "seen"
+MOST = 2
+"""Stages that may be mistaken at once."""
+NEAR = 0.35
+"""Numbers agree that differ by at most this share of the largest of their vector; the craft is turned by hand."""
+CLEAR = 0.15
+"""A number has a sign from this share of the largest of its vector on."""
+FLOOR = 0.1
+"""Vectors shorter than this share of the expected one are not taken for longer."""
+FAR = 3.0
+"""A vector this many times longer or shorter than it should be has another size."""
+SIGNS = {"+": 1.0, "-": -1.0, "\N{MINUS SIGN}": -1.0, "0": 0.0}
+SHOWN = 12
+"""Explanations that are listed."""
+ALIKE = 1
+"""Decimals of a vector, relative to its largest number, in which stages are told apart while they are searched."""
+
+
+class Seen(NamedTuple):
+    """A sheet as a file has it: its name, and its rows with the numbers of their lines."""
+
+    where: str
+    rows: list[tuple[int, dict[str, str]]]
+
+
+class Mistake(NamedTuple):
+    """A stage shows a signed permutation of what it should."""
+
+    stage: Stage
+    place: int
+    """Its number among `mistakes_of(stage)`."""
+
+    @property
+    def sentence(self) -> str:
+        """The part and its mistake in words."""
+        stage = self.stage
+        matrix = mistakes_of(stage)[self.place][: stage.blocks[0].size, : stage.blocks[0].size]
+        whose = {
+            "estimate": f"estimate of {stage.part}",
+            "command": f"command of {stage.part}",
+            "share": f"{stage.part}, by {'wheel' if stage.blocks[0].name == MOTORS else stage.blocks[0].name}",
+            "torque": f"{stage.part} as mounted" if stage.part != ACTUATORS else stage.part,
+        }
+        return f"{whose.get(stage.kind, stage.part)}: {described(matrix, stage.blocks[0].labels)}"
+
+
+@dataclass(frozen=True)
+class Phasing:
+    """A sheet, and if one was filled in what was seen (None: nothing), the explanations with the fewest mistakes, and
+    sentences about sizes."""
+
+    sheet: Sheet
+    seen: list[float | str | None] | None
+    explanations: list[tuple[Mistake, ...]]
+    sizes: list[str]
+
+    @property
+    def outcome(self) -> Literal["met", "missed", "undecided"]:
+        """Whether all signs are right ("met") or one is wrong ("missed"); "undecided" where rows are empty or a size is
+        another."""
+        if self.seen is None:
+            return "met"
+        if self.explanations != [()]:
+            return "missed"
+        return "undecided" if None in self.seen or self.sizes else "met"
+
+    @property
+    def verdict(self) -> list[str]:
+        """Sentences: what was found."""
+        if self.seen is None:
+            return []
+        empty = sum(value is None for value in self.seen)
+        left = [f"{empty} of {len(self.seen)} rows are empty: what they would show is not decided."] if empty else []
+        if self.explanations == [()]:
+            return ["All signs that were seen are right." if empty else "All signs are right.", *left, *self.sizes]
+        listed = [" and ".join(one.sentence for one in every) + "." for every in self.explanations]
+        if not listed:
+            return ["A sign is wrong, and no mistake of one or two parts explains what was seen.", *left, *self.sizes]
+        if len(listed) == 1:
+            return [f"A sign is wrong. {listed[0]}", *left, *self.sizes]
+        rest = [f"and {len(listed) - SHOWN} more."] * (len(listed) > SHOWN)
+        head = f"A sign is wrong. {len(listed)} explanations fit equally; the rows do not tell them apart:"
+        return [head, *listed[:SHOWN], *rest, *left, *self.sizes]
+
+
+def study(scenario: Scenario, entry: LawEntry, seen: Seen | None = None) -> Phasing:
+    """The sheet of a law of a scenario, and what one that was filled in shows. InputError for a file that is not this
+    sheet."""
+    sheet = sheet_of(build(scenario, entry), entry.name)
+    if seen is None:
+        return Phasing(sheet, None, [()], [])
+    values = filled(sheet, seen)
+    return Phasing(sheet, values, explained(sheet, values), _sizes(sheet, values))
+
+
+# --- Mistakes ---------------------------------------------------------------------------------------------------------
+
+
+@cache
+def mistakes_of(stage: Stage) -> Array:
+    """Matrices (n, k, k) that a stage's vector (k) may be multiplied by, the identity first: all 48 signed permutations of
+    three axes, alike for each of its vectors; of N units any two exchanges and reversals, and all reversed."""
+    size = stage.blocks[0].size
+    if size == 3:
+        signs = product((1.0, -1.0), repeat=3)
+        plain = [np.diag(sign) @ np.eye(3)[list(order)] for order, sign in product(permutations(range(3)), list(signs))]
+        return np.array([np.kron(np.eye(len(stage.blocks)), matrix) for matrix in plain])
+    unit = np.eye(size)
+    once = [np.diag(1.0 - 2.0 * row) for row in unit]
+    for i, j in combinations(range(size), 2):
+        order = np.arange(size)
+        order[[i, j]] = j, i
+        once.append(unit[order])
+    twice = [a @ b for a in once for b in once]
+    return np.array(list({matrix.tobytes(): matrix for matrix in (unit, *once, -unit, *twice)}.values()))
+
+
+def described(matrix: Array, labels: Sequence[str]) -> str:
+    """A signed permutation in words: what is exchanged and then reversed; of three axes as a turn, where it is one about
+    an axis."""
+    order, reversed_ = np.abs(matrix).argmax(axis=1), matrix.sum(axis=1) < 0.0
+    words: list[str] = []
+    if (order[order] == np.arange(len(order))).all():
+        words += [f"{labels[i]} and {labels[j]} swapped" for i, j in enumerate(order) if i < j]
+    else:
+        words.append(f"{', '.join(labels)} show {', '.join(labels[j] for j in order)}")
+    if reversed_.all():
+        words.append("all reversed")
+    elif reversed_.any():
+        words.append(f"{' and '.join(label for label, back in zip(labels, reversed_, strict=True) if back)} reversed")
+    text = "; ".join(words)
+    if list(labels) != list(AXES) or np.linalg.det(matrix) < 0.0:
+        return text
+    fixed = [k for k in range(3) if matrix[k, k] > 0.0]
+    if len(fixed) != 1:
+        return text
+    i, j = (fixed[0] + 1) % 3, (fixed[0] + 2) % 3
+    angle = "180" if order[i] == i else f"{90.0 * matrix[i, j]:+.0f}"
+    return f"turned by {angle} deg about {AXES[fixed[0]]} ({text})"
+
+
+# --- The search -------------------------------------------------------------------------------------------------------
+
+
+def explained(sheet: Sheet, values: Sequence[float | str | None]) -> list[tuple[Mistake, ...]]:
+    """The sets of mistakes, at most one a stage and MOST in all, that explain what was seen; those with the fewest."""
+    tests = _tests(sheet, values)
+    for most in range(MOST + 1):
+        if found := list(_fitting(sheet, tests, most)):
+            return found
+    return []
+
+
+def _fitting(sheet: Sheet, tests: Mapping[tuple[int, int], Sequence[Test]], most: int) -> Iterator[tuple[Mistake, ...]]:
+    """All sets of so many mistakes that pass the tests, tried at once stage by stage along the loop. For each stimulus a
+    set has the number of a state, which is what the stages before show; the equations are called once for each state."""
+    states: list[list[dict[Stage, Array]]] = [[{}] for _ in sheet.stimuli]
+    shown = {cell.at[1] for cell in sheet.cells}
+    sets, ids = np.zeros((1, 0), dtype=int), np.zeros((1, len(sheet.stimuli)), dtype=int)
+    for number, stage in enumerate(sheet.stages):
+        count = len(mistakes_of(stage)) if number in shown else 1
+        free = np.flatnonzero((sets > 0).sum(axis=1) < most)
+        rows = np.concatenate([np.arange(len(sets)), np.repeat(free, count - 1)])
+        picks = np.concatenate([np.zeros(len(sets), dtype=int), np.tile(np.arange(1, count), len(free))])
+        for place, stimulus in enumerate(sheet.stimuli):
+            if stage not in stimulus.live:
+                continue
+            pairs, back = np.unique(ids[rows, place] * count + picks, return_inverse=True)
+            fits, new = np.ones(len(pairs), dtype=bool), np.zeros(len(pairs), dtype=int)
+            known: dict[Any, int] = {}
+            after: list[dict[Stage, Array]] = []
+            for state in np.unique(pairs // count):
+                here = np.flatnonzero(pairs // count == state)
+                before = states[place][state]
+                vectors = outputs(stimulus, stage, before, pairs[here] % count)
+                for test in tests.get((place, number), ()):
+                    fits[here] &= test(vectors)
+                for k, vector in zip(here, vectors, strict=True):
+                    left = _left(before | {stage: vector}, stage)
+                    key = tuple((one, *np.round(v / max(np.abs(v).max(), 1e-300), ALIKE) + 0.0) for one, v in left.items())
+                    if key not in known:
+                        known[key] = len(after)
+                        after.append(left)
+                    new[k] = known[key]
+            states[place] = after
+            ids = ids[rows][fits[back]]
+            ids[:, place] = new[back][fits[back]]
+            sets, picks = sets[rows][fits[back]], picks[fits[back]]
+            rows = np.arange(len(picks))
+        sets, ids = np.column_stack([sets[rows], picks]), ids[rows]
+    for row in sets[(sets > 0).sum(axis=1) == most]:
+        yield tuple(Mistake(stage, int(k)) for stage, k in zip(sheet.stages, row, strict=True) if k)
+
+
+def outputs(stimulus: Stimulus, stage: Stage, before: Mapping[Stage, Array], picks: Sequence[int]) -> Array:
+    """What a stage shows (n, k) after those before it, with each of the mistakes of these numbers."""
+    vector = stimulus.bench.vectors(stimulus, before)[stage]
+    matrices = mistakes_of(stage)[np.asarray(picks)]
+    if stage.kind == "torque" and stage.part != ACTUATORS:
+        return np.array([stimulus.bench.mounts[stage](matrix) for matrix in matrices])
+    return matrices @ vector
+
+
+def _left(state: dict[Stage, Array], stage: Stage) -> dict[Stage, Array]:
+    """The part of a state that stages after this one ask for."""
+    passed = ORDER[: ORDER.index(stage.kind)]
+    gone = {
+        "reading": lambda one: "reading" in passed and one.blocks[0].name in STATED,
+        "estimate": lambda one: "estimate" in passed,
+        "command": lambda one: False,
+        "share": lambda one: stage.kind == "torque" and one.part == stage.part,
+        "torque": lambda one: True,
+    }
+    return {one: vector for one, vector in state.items() if not gone[one.kind](one)}
+
+
+def _tests(sheet: Sheet, values: Sequence[float | str | None]) -> dict[tuple[int, int], list[Test]]:
+    """For a stimulus and a stage, tests of what vectors (n, k) of the stage agree with what was seen."""
+    tests: dict[tuple[int, int], list[Test]] = {}
+    for (at, (first, last)), cells in _blocks(sheet, values).items():
+        expected = max(abs(cell.value) for cell, _ in cells)
+        seen = {cell.place: value for cell, value in cells if value is not None}
+        numbers = [abs(value) for value in seen.values() if not isinstance(value, str)]
+        least, scale = FLOOR * expected, max([*numbers, FLOOR * expected])
+        factor = math.degrees(1.0) if "deg" in cells[0][0].unit else 1.0
+
+        def test(vectors: Array, seen: Any = seen, ends: Any = (first, last, factor, least, scale)) -> Any:
+            first, last, factor, least, scale = ends
+            sizes = np.abs(factor * vectors[:, first:last]).max(axis=1)
+            shares = factor * vectors / np.maximum(sizes, least)[:, None]
+            good = np.ones(len(vectors), dtype=bool)
+            for place, value in seen.items():
+                if isinstance(value, str):
+                    good &= abs(shares[:, place]) < NEAR if value == "0" else shares[:, place] * SIGNS[value] > CLEAR
+                else:
+                    good &= abs(shares[:, place] - value / scale) <= NEAR
+            return good
+
+        if seen:
+            tests.setdefault(at, []).append(test)
+    return tests
+
+
+def _blocks(sheet: Sheet, values: Sequence[float | str | None]) -> dict[Any, list[tuple[Cell, float | str | None]]]:
+    """The cells of each vector with what was seen."""
+    blocks: dict[Any, list[tuple[Cell, float | str | None]]] = {}
+    for cell, value in zip(sheet.cells, values, strict=True):
+        blocks.setdefault((cell.at, cell.block), []).append((cell, value))
+    return blocks
+
+
+def _sizes(sheet: Sheet, values: Sequence[float | str | None]) -> list[str]:
+    """Sentences about vectors of another size than expected."""
+    told: list[str] = []
+    for cells in _blocks(sheet, values).values():
+        numbers = [abs(value) for _, value in cells if isinstance(value, float)]
+        ratio = max(numbers) / max(abs(cell.value) for cell, _ in cells) if len(numbers) == len(cells) else 1.0
+        if not 1.0 / FAR <= ratio <= FAR:
+            first = cells[0][0]
+            told.append(f"{first.stimulus}, {first.stage}: {ratio:.2g} times the size that is expected.")
+    return told
+
+
+# --- The file ---------------------------------------------------------------------------------------------------------
+
+KEYS = ("stimulus", "stage", "axis")
+
+
+def opened(path: str) -> Seen:
+    """A sheet that was filled in. InputError for a file that is no table with the columns of a sheet."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+        rows = csv.DictReader(text.splitlines(), strict=True)
+        heads = rows.fieldnames or []
+        for name in (*KEYS, SEEN):
+            if name not in heads:
+                raise InputError(path, "", f"no column {name}", f"the columns of phasing.csv: {', '.join((*KEYS, SEEN))}")
+        return Seen(path, [(rows.line_num, {name: (row[name] or "").strip() for name in (*KEYS, SEEN)}) for row in rows])
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, "", getattr(error, "strerror", None) or str(error), "phasing.csv, filled in") from None
+
+
+def filled(sheet: Sheet, seen: Seen) -> list[float | str | None]:
+    """What was seen in each cell of a sheet: a number, a sign, or None. InputError for rows that are not of this sheet."""
+    places = {(cell.stimulus, cell.stage, cell.axis): place for place, cell in enumerate(sheet.cells)}
+    values: list[float | str | None] = [None] * len(sheet.cells)
+    met: set[int] = set()
+    for line, row in seen.rows:
+        where = f"row {line}"
+        for name, known in zip(KEYS, map(list, zip(*places, strict=True)), strict=True):
+            if row[name] not in known:
+                raise InputError(
+                    seen.where, f"{where}, {name}", row[name] or "nothing", nearest(row[name], sorted({*known}))
+                )
+        place = places.get((row["stimulus"], row["stage"], row["axis"]))
+        if place is None or place in met:
+            found = "a row that is there twice" if place is not None else f"{row['stage']} {row['axis']} under this stimulus"
+            raise InputError(seen.where, f"{where}, {row['stimulus']}", found, "each row of the sheet once")
+        met.add(place)
+        values[place] = _read(row[SEEN], seen.where, where)
+    if all(value is None for value in values):
+        raise InputError(seen.where, SEEN, "nothing filled in", "numbers, or the signs +, - and 0")
+    return values
+
+
+def _read(text: str, where: str, key: str) -> float | str | None:
+    if text in SIGNS or not text:
+        return text.replace("\N{MINUS SIGN}", "-") or None
+    try:
+        if math.isfinite(number := float(text)):
+            return number
+    except ValueError:
+        pass
+    raise InputError(where, f"{key}, {SEEN}", text, "a number, or a sign: +, - or 0")
