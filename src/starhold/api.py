@@ -12,6 +12,7 @@ from starhold.scenario import reading
 from starhold.scenario.reading import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
 from starhold.studies import compare as studies
+from starhold.studies.serving import serve as serve
 from starhold.synthesis.pole_placement import place as place
 
 if TYPE_CHECKING:
@@ -46,13 +47,17 @@ def load(source: str | Path, allow_unstable: bool = False) -> reading.Scenario:
 
 @shortly
 def simulate(
-    scenario: reading.Scenario | str | Path, law: str | None = None, progress: Callable[[int, int], None] | None = None
+    scenario: reading.Scenario | str | Path,
+    law: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    process: str | None = None,
 ) -> xr.Dataset:
-    """Fly one law of a scenario, the first if `law` is None. Returns the Dataset that `starhold run` writes to run.nc, with
-    the same attributes; `attrs["diverged_at"]` (s) is there only when the motion was lost."""
+    """Fly one law of a scenario, the first if `law` is None; process: a program that commands in its place. Returns the
+    Dataset that `starhold run` writes to run.nc, with the same attributes; `attrs["diverged_at"]` (s) is there only when the
+    motion was lost."""
     opened = reading.open_scenario(scenario)
     entry = opened.pick(law)
-    return studies.record(opened, studies.build(opened, entry), progress).dataset()
+    return studies.record(opened, studies.build(opened, entry), progress, process).dataset()
 
 
 @shortly
@@ -216,7 +221,7 @@ def export_c(
     the simulation's bits, CMakeLists.txt, and the certificate whose digest the header has.
 
     name: what functions and files begin with, the law's if None; shells: what else is to call it, of "basilisk",
-    "fmu", "cfs", "fprime".
+    "fmu", "cfs", "fprime", "process".
     InputError for what has no form in C, a name that is no identifier, and a folder that holds results (unless `force`) or
     cannot be written."""
     import hashlib

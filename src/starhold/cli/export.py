@@ -25,7 +25,7 @@ def c(
     ] = None,
     shell: Annotated[
         list[str] | None,
-        typer.Option(metavar="SHELL", help="basilisk, fmu, cfs or fprime: what else is to call it; repeatable"),
+        typer.Option(metavar="SHELL", help="basilisk, fmu, cfs, fprime or process: what else is to call it; repeatable"),
     ] = None,
     force: Force = False,
     certify: Certified = True,
@@ -62,12 +62,38 @@ def aem(
     """Write the attitudes of a run as a CCSDS attitude ephemeris message."""
     from starhold.api import export_aem
     from starhold.cli.console import console
+
+    _refuse_present(output, force)
+    words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
+    console.print(f"{export_aem(run, output, version=version, **words)}", soft_wrap=True)  # type: ignore
+
+
+@app.command()
+def link(
+    file: ScenarioFile,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the header, such as starhold_link.h")],
+    law: Annotated[str | None, typer.Option(help="whose measurement readings have; the first law if not given")] = None,
+    force: Force = False,
+) -> None:
+    """Write the messages of `starhold serve` and the places of a scenario's readings as a header in C."""
+    from starhold.cli.console import console
+    from starhold.files import atomic_write
+    from starhold.link.header import header
+    from starhold.scenario.building import build
+    from starhold.scenario.reading import load
+
+    _refuse_present(output, force)
+    scenario = load(file)
+    with atomic_write(output) as hidden:
+        hidden.write_text(header(build(scenario, scenario.pick(law)), scenario.name), encoding="utf-8")
+    console.print(f"{output}", soft_wrap=True)
+
+
+def _refuse_present(output: Path, force: bool) -> None:
     from starhold.errors import InputError
 
     if output.exists() and not force:
         raise InputError(str(output), "", "a file already there", "another one with -o, or --force")
-    words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
-    console.print(f"{export_aem(run, output, version=version, **words)}", soft_wrap=True)  # type: ignore
 
 
 @app.command()
@@ -82,10 +108,8 @@ def requirements(
     """Write the requirements of a scenario for other tools: CSV or ReqIF."""
     from starhold.api import export_requirements
     from starhold.cli.console import console
-    from starhold.errors import InputError
 
-    if output.exists() and not force:
-        raise InputError(str(output), "", "a file already there", "another one with -o, or --force")
+    _refuse_present(output, force)
     console.print(f"{export_requirements(file, output, original)}", soft_wrap=True)
 
 

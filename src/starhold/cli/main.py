@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from starhold.cli import campaign, certifying, export, parts, reproduce, studio, study
+from starhold.cli import campaign, certifying, export, parts, reproduce, serve, studio, study
 from starhold.cli.arguments import (
     DIVERGED,
     INTERNAL_ERROR,
@@ -56,9 +56,17 @@ def run(
     certify: Certified = True,
     check_step: CheckStep = False,
     pictures: Pictures = Drawn.ALL,
+    law_process: Annotated[
+        str | None,
+        typer.Option(metavar="PROGRAM", help="a program that commands in the law's place: see `export c --shell process`"),
+    ] = None,
 ) -> None:
     """Fly one law: run.nc, summary.json, pictures and report.html."""
-    flights = _fly(file, law, output, force, allow_unstable, certify, check_step, pictures, nested=False)
+    if law_process is not None and check_step:
+        raise InputError("run", "--check-step", "--law-process too", "one of the two")
+    flights = _fly(
+        file, law, output, force, allow_unstable, certify, check_step, pictures, nested=False, process=law_process
+    )
     if flights[0].lost is not None:
         raise typer.Exit(DIVERGED)
 
@@ -89,12 +97,15 @@ def _fly(
     check_step: bool,
     pictures: Drawn,
     nested: bool,
+    process: str | None = None,
 ) -> list[Flight]:
-    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own."""
+    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Of a
+    process that commands, if there is one, nothing is known that could be proved or timed."""
     from starhold.scenario.reading import load
 
     # Before what flies and prints is loaded, so that what is wrong with it is said at once.
     scenario = load(file, allow_unstable)
+    from starhold.cli.console import console
     from starhold.cli.show import flying, print_outcome, print_results
     from starhold.report.results import open_folder, write_results, write_run
     from starhold.studies import compare as studies
@@ -110,7 +121,7 @@ def _fly(
     def keep(flight: Flight) -> None:
         write_run(flight.recording, (folder / flight.name if nested else folder) / "run.nc")
 
-    with Stopwatch(scenario, loops) as stopwatch:
+    with Stopwatch(scenario, loops if process is None else []) as stopwatch:
         with flying(entries, scenario.table.simulation.steps) as show:
 
             def notice(name: str, done: int, total: int) -> None:
@@ -120,15 +131,18 @@ def _fly(
             for entry, loop in zip(entries, loops, strict=True):
                 for flight in flights[-1:]:
                     keep(flight)
-                flights.append(studies.fly_law(scenario, entry, loop, notice))
+                flights.append(studies.fly_law(scenario, entry, loop, notice, process))
         try:
             if check_step:
                 flights = [
                     studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
                     for loop, flight in zip(loops, flights, strict=True)
                 ]
-            flights = [stopwatch.timed(place, flight) for place, flight in enumerate(flights)]
+            if process is None:
+                flights = [stopwatch.timed(place, flight) for place, flight in enumerate(flights)]
             print_outcome(flights)
+            if process is not None:
+                console.print(f"The commands came from {process}: nothing is proved of it.", soft_wrap=True, markup=False)
         finally:
             # The table does not wait for it, and nothing that was flown is lost.
             keep(flights[-1])
@@ -136,7 +150,7 @@ def _fly(
     from starhold.report.painter import Painter
 
     with Painter(scenario, flights, folder, pictures is Drawn.ALL) as painter:
-        if certify:
+        if certify and process is None:
             flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
         if any(flight.certificates for flight in flights):
             from starhold.cli.show_certificates import print_proved
@@ -159,6 +173,7 @@ for studied in names():
     app.command(studied)(study.command_of(studied))
 app.command()(reproduce.reproduce)
 app.add_typer(export.app, name="export")
+app.command()(serve.serve)
 app.command()(studio.studio)
 app.command()(parts.parts)
 app.command("check-part")(parts.check_part)

@@ -12,6 +12,9 @@ from starhold.errors import InputError
 from starhold.export.code import Code
 from starhold.export.law import numbers
 from starhold.export.source import texts
+from starhold.export.vectors import kept_inputs
+from starhold.link.header import HEADER, header
+from starhold.link.layout import Layout
 from starhold.version import __version__
 
 SOURCES = {
@@ -100,6 +103,22 @@ def _fmu(code: Code) -> dict[str, bytes]:
     return {f"{code.name}.fmu": made.getvalue()}
 
 
+def _process(code: Code) -> dict[str, str]:
+    """Return a law as a process that commands the plant of its scenario, by the messages of `starhold.link`."""
+    loop, layout = code.flight.loop, Layout(code.flight.loop)
+    acting = [f"effectors.{one.called}" for one in loop.used("effector") if one.part.flag("ACTS")]
+    places: list[int] = []
+    for name, value in code.flight.inputs._asdict().items():
+        # The last sensor that tells of something is believed, as in the simulation.
+        known = [f"sensors.{one.called}.{name}" for one in reversed(loop.used("sensor"))]
+        known += {"target": ["target"], "wheels": acting[:1]}.get(name, [f"state.{name}"])
+        begin = next(one.first for wanted in known for one in layout.fields if f"{one.name}.".startswith(f"{wanted}."))
+        places += range(1 + begin, 1 + begin + len(numbers(value)))
+    rows = [f"    {places[kept]}" for kept in kept_inputs(code)] or ["    0"]
+    files = filled("process", code, PLACES=",\n".join(rows), PLACED=len(rows))
+    return files | {HEADER: header(loop, loop.law.name)}
+
+
 def _refused(match: re.Match[str]) -> str:
     """Return functions of FMI 3.0 that refuse: of one name, or with each of some words in place of ~."""
     words = [param.replace("[]", "").split()[-1].lstrip("*") for param in match[2].split(",")]
@@ -113,6 +132,7 @@ SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
     "fmu": _fmu,
     "cfs": lambda code: filled("cfs", code),
     "fprime": lambda code: filled("fprime", code),
+    "process": _process,
 }
 """Functions that make the files of a shell over the C, by its name."""
 

@@ -36,7 +36,8 @@ def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
     """Tell how long was flown, and how often the laws act."""
     run = flights[0].recording.attrs
     period, end = (x * run.get("time_unit_s", 1.0) for x in (run["control_period"], scenario.table.simulation.duration))
-    return f"{span_text(end)}, {f'{1.0 / period:.4g} Hz' if period <= 1.0 else f'a step every {span_text(period)}'}"
+    whose = f", commands from {run['law_process']}" if "law_process" in run else ""
+    return f"{span_text(end)}, {f'{1.0 / period:.4g} Hz' if period <= 1.0 else f'a step every {span_text(period)}'}{whose}"
 
 
 def lost_alarm(flights: Sequence[Flight]) -> str:

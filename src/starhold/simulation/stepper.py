@@ -56,6 +56,13 @@ class Readings:
         return _shaped(self.numbers[begin : begin + len(flatten(self.like[place]))], self.like[place])
 
 
+def sensed_of(loop: ClosedLoop) -> tuple[Any, Any, Any]:
+    """Return what the law of a loop is given at the start: its measurement, the readings of the sensors, the estimate."""
+    first = loop.phases(1)[0]
+    step = make_step(loop.composition())
+    return step.sense(loop.carry(), 0, (loop.seed, loop.run), first.gains, first.nominal, first.setup)[:3]
+
+
 def _shaped(numbers: NDArray[np.float64], like: Any) -> Any:
     """Numbers, or rows of lanes, in the shape of `like`."""
     return unflatten(list(numbers) if numbers.ndim > 1 else numbers, like)
@@ -71,11 +78,9 @@ class Stepper:
         self.loop, self.lanes, self.record = loop, lanes, record
         self._step, self._like = make_step(loop.composition()), loop.carry()
         self._phases = loop.phases(LAST)
-        first = self._phases[0]
-        sensed = self._step.sense(self._like, 0, (loop.seed, loop.run), first.gains, first.nominal, first.setup)
-        self._sensed_like = tuple(sensed[:3])
+        self._sensed_like = sensed_of(loop)
         self._names = tuple(fitted.called for fitted in loop.used("sensor"))
-        self._sample = len(flatten(self._step.sample(self._like, 0, first.setup)))
+        self._sample = len(flatten(self._step.sample(self._like, 0, self._phases[0].setup)))
         self._kernels: dict[tuple[int, bool], tuple[Kernel, Arguments]] = {}
         self.reset()
 
@@ -98,6 +103,7 @@ class Stepper:
         self._hold(RunningBatch(loop, columns, self.run, width))
         self.steps, self._phase = 0, 0
         self._rows: list[NDArray[np.float64]] = []
+        self._ending: NDArray[np.float64] | None = None
         self._closed = True
         return self._fly(0, False)
 
@@ -117,6 +123,16 @@ class Stepper:
     def state(self) -> Any:
         """The true state of the body now: numbers, or arrays (lanes,)."""
         return _shaped(self._read("carry")[: len(flatten(self._like.state))], self._like.state)
+
+    @property
+    def truth(self) -> NDArray[np.float64]:
+        """The numbers of the body's true state and of the effectors' in a row, (numbers,) or (numbers, lanes)."""
+        return self._read("carry")[: len(flatten((self._like.state, self._like.effectors)))]
+
+    @property
+    def setup(self) -> Any:
+        """The numbers of the parts now."""
+        return self._phases[self._phase].setup
 
     @property
     def diverged(self) -> Any:
@@ -141,8 +157,14 @@ class Stepper:
         readings = self._fly(1, command is not None)
         if self.record:
             self._rows.append(self._memories["record"].copy())
-        self._closed = command is None
+        self._closed, self._ending = command is None, None
         return readings
+
+    def close(self, command: ArrayLike | None = None) -> None:
+        """Record this instant with the command that would be given now, and stay. ValueError as of `step`."""
+        ahead = self.copy()
+        ahead.step(command)
+        self._ending = ahead._rows[-1] if self.record else None
 
     def copy(self) -> Self:
         """Another flight that goes on from here by itself."""
@@ -151,18 +173,23 @@ class Stepper:
         other._rows = list(self._rows)
         return other
 
-    def recording(self, lane: int = 0) -> Recording:
-        """The flight since the start, as `simulate` records it; without the last instant where its command would have come
-        from outside. ValueError where nothing was recorded."""
-        rows = list(self._rows)
-        if self._closed:
-            ahead = self.copy()
-            ahead.step()
-            rows += ahead._rows[-1:]
+    def samples(self, record_every: int = 1, lane: int = 0) -> tuple[NDArray[np.float64], Any]:
+        """The samples (number, sample) since the start, and the carry at the end, as `fly` gives them; without the last
+        instant where its command would have come from outside. ValueError where nothing was recorded."""
+        if self._closed and self._ending is None:
+            self.close()
+        rows = self._rows if self._ending is None else [*self._rows, self._ending]
         if not rows:
             raise ValueError("recording: found no sample; allowed: a stepper that records, after a step")
-        samples = np.array([self._batch.unpacked(row)[:, lane] for row in rows]).reshape(len(rows), self._sample)
-        return label(self.loop, samples.T, state_of(self._batch.carries()[:, lane], self._like), 1)
+        samples = np.array([self._batch.unpacked(row)[:, lane] for row in rows[::record_every]])
+        carry = state_of(self._batch.carries()[:, lane], self._like)
+        if carry.lost_at >= 0.0:
+            samples = samples[: max(1, int(np.ceil(carry.lost_at / record_every)))]
+        return samples.reshape(len(samples), self._sample).T, carry
+
+    def recording(self, lane: int = 0) -> Recording:
+        """The flight since the start, as `simulate` records it: the `samples` under their names."""
+        return label(self.loop, *self.samples(lane=lane), 1)
 
     def dataset(self, lane: int = 0) -> xr.Dataset:
         """The recording as a Dataset with units, as `simulate` gives it."""

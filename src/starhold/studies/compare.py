@@ -20,12 +20,12 @@ Notice: TypeAlias = Callable[[str, int, int], None]
 """Called with a law's name, the control steps done and those in all."""
 
 
-def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = None) -> Flight:
-    """One law of the scenario, with the loop that `build` gives for it, flown and measured."""
-    study, timing = study_of(scenario.body), scenario.table.simulation
+def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = None, process: str | None = None) -> Flight:
+    """One law of the scenario, with the loop that `build` gives for it, flown and measured; process: a program that commands
+    in place of the law."""
+    study = study_of(scenario.body)
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
-    samples, carry = fly(loop, timing.steps, timing.record_every, progress=progress)
-    run = name_samples(scenario, loop, samples, carry)
+    run, carry = _flown(scenario, loop, progress, process)
     metrics = study.metrics_of(run) | _law_counters(entry, carry.memory)
     gains = {
         item.name: (item.written(value), "1" if item.gain.choices else item.gain.unit)
@@ -62,10 +62,30 @@ def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress
     return replace(flight, metrics=flight.metrics | {"step_error": errors})
 
 
-def record(scenario: Scenario, loop: Any, progress: Progress | None = None) -> Recording:
-    """The run of a loop."""
+def record(scenario: Scenario, loop: Any, progress: Progress | None = None, process: str | None = None) -> Recording:
+    """The run of a loop, with the commands of a process if there is one."""
+    return _flown(scenario, loop, progress, process)[0]
+
+
+def _flown(
+    scenario: Scenario, loop: Any, progress: Progress | None = None, process: str | None = None
+) -> tuple[Recording, Any]:
+    """The run of a loop, with the commands of a process if there is one, and the carry at its end."""
     timing = scenario.table.simulation
-    return name_samples(scenario, loop, *fly(loop, timing.steps, timing.record_every, progress=progress))
+    if process is None:
+        samples, carry = fly(loop, timing.steps, timing.record_every, progress=progress)
+        return name_samples(scenario, loop, samples, carry), carry
+    from starhold.link.process import fly_by_process
+
+    samples, carry = fly_by_process(process, loop, timing.steps, timing.record_every, progress)
+    return commanded_by(process, name_samples(scenario, loop, samples, carry)), carry
+
+
+def commanded_by(process: str, run: Recording) -> Recording:
+    """The recording of a flight whose commands came from a process, which stands among its attributes where the program of
+    the law would."""
+    attrs = {name: value for name, value in run.attrs.items() if name != "law_program"}
+    return replace(run, attrs=attrs | {"law_process": process})
 
 
 def name_samples(scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:

@@ -1,0 +1,57 @@
+"""The command that serves a plant to flight software."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from starhold.cli.arguments import DIVERGED, FAILED_CHECK, Force, ScenarioFile, Unstable
+
+
+def serve(
+    file: ScenarioFile,
+    law: Annotated[str | None, typer.Option(help="whose measurement readings have; the first law if not given")] = None,
+    host: Annotated[
+        str, typer.Option(help="the address on which it listens; others than this machine's own are open")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="the port on which it listens; 0: any that is free")] = 5750,
+    udp: Annotated[bool, typer.Option("--udp", help="listen on UDP; TCP if not given")] = False,
+    rate: Annotated[
+        float | None, typer.Option(help="real time: how many times faster than the clock; lockstep if not given")
+    ] = None,
+    missing: Annotated[
+        str, typer.Option(metavar="hold|zero|stop", help="what flies a period of real time without a command")
+    ] = "hold",
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for run.nc, created")] = None,
+    force: Force = False,
+    allow_unstable: Unstable = False,
+) -> None:
+    """Serve the plant of a scenario: flight software connects, reads and commands, in lockstep or in real time."""
+    from starhold.api import serve as serve_plant
+    from starhold.cli.console import console
+    from starhold.link.plant import Ending
+    from starhold.report.results import open_folder, write_run
+    from starhold.scenario.reading import load
+
+    scenario = load(file, allow_unstable)
+
+    def announce(address: str) -> None:
+        # What else could be refused was, and nothing has been flown.
+        if output is not None:
+            open_folder(output, force)
+        console.print(f"Listening on {address}. Ctrl-C ends it.", soft_wrap=True, markup=False)
+        # Whoever waits for this line reads a pipe.
+        console.file.flush()
+
+    served = serve_plant(scenario, law, host=host, port=port, udp=udp, rate=rate, missing=missing, announce=announce)
+    for line in served.lines:
+        console.print(line, soft_wrap=True, markup=False)
+    if output is not None:
+        write_run(served.recording, output / "run.nc")
+        console.print(f"Recording: {output / 'run.nc'}", soft_wrap=True, markup=False)
+    codes = {Ending.DIVERGED: DIVERGED, Ending.GONE: FAILED_CHECK, Ending.MISSED: FAILED_CHECK}
+    codes[Ending.INTERRUPTED] = 128 + served.signal
+    if code := codes.get(served.ending, 0):
+        raise typer.Exit(code)

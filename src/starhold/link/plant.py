@@ -1,0 +1,237 @@
+"""A flight that one peer commands by messages: bytes in, bytes out, without a network or a clock of its own."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from starhold.link.layout import Layout
+from starhold.link.protocol import COMMANDS, STEPS, Decoder, Fault, Kind, Message, binary, line
+from starhold.simulation.stepper import Stepper
+
+KEPT = 1000
+"""Readings whose time of sending is remembered, for commands that come late."""
+
+
+class Missing(StrEnum):
+    """In real time, this flies a period for which no command came: the one before, none, or the flight ends."""
+
+    HOLD = "hold"
+    ZERO = "zero"
+    STOP = "stop"
+
+
+class Ending(StrEnum):
+    """A flight ends because of one of these."""
+
+    FLOWN = "flown to its end"
+    STOPPED = "stopped by the flight software"
+    GONE = "the flight software is gone"
+    MISSED = "no command in time"
+    DIVERGED = "the motion diverged"
+    INTERRUPTED = "interrupted"
+
+
+class Rules(NamedTuple):
+    """The flight has so many control steps. rate: how many times faster than the clock it goes, None for lockstep, in which
+    the plant waits; missing: what flies a period without a command in real time."""
+
+    steps: int
+    rate: float | None = None
+    missing: Missing = Missing.HOLD
+
+
+class Plant:
+    """A plant that its flight software commands.
+
+    `received` takes the bytes that came; `send`, which the owner sets, takes those to be sent. In real time the owner calls
+    `tick` at the time `due` by `clock`. After the end, which `ending` tells, nothing moves."""
+
+    def __init__(
+        self, flight: Stepper, about: dict[str, Any], rules: Rules, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        if not 0 < rules.steps < STEPS:
+            raise ValueError(f"steps: found {rules.steps}; allowed: 1 to {STEPS - 1}")
+        self.flight, self.rules, self.clock = flight, rules, clock
+        self.layout = Layout(flight.loop)
+        fields = [[one.name, one.size] for one in self.layout.fields]
+        self._about = json.dumps(about | {"steps": rules.steps, "fields": fields})
+        self._readings = flight.reset()
+        self.send: Callable[[bytes], None] = lambda data: None
+        self._is_text = False
+        self.ending: Ending | None = None
+        self.greeted = False
+        self.faults = Counter[str]()
+        self.latencies: list[float] = []
+        """From readings that were sent to the command for their step (s)."""
+        self.missed = 0
+        """Periods of real time for which no command came in time."""
+        self.commanded = 0
+        self.behind = 0.0
+        """How late the plant itself has begun a period at most (s)."""
+        self._sent: dict[int, float] = {}
+        self._begin()
+
+    @property
+    def due(self) -> float | None:
+        """When the present period ends in real time, by `clock` (s); None in lockstep and before the first hello."""
+        if self.rules.rate is None or self._begun is None or self.ending is not None:
+            return None
+        return self._begun + (self.flight.steps + 1) * self.flight.loop.period / self.rules.rate
+
+    def received(self, data: bytes, decoder: Decoder) -> None:
+        """Heed the messages in these bytes of a stream, which has a decoder of its own, as far as they are valid."""
+        for message in decoder.feed(data):
+            self._heed(message, decoder)
+
+    def datagram(self, data: bytes) -> None:
+        """Heed the messages in a datagram, which holds whole ones; a line of JSON may lack its end."""
+        decoder = Decoder()
+        self.received(data + b"\n" if data.startswith(b"{") else data, decoder)
+        for fault in decoder.end():
+            self._heed(fault, decoder)
+
+    def hang_up(self, decoder: Decoder) -> None:
+        """Note that the peer, whose stream had this decoder, is gone, in the middle of a message perhaps."""
+        self.faults.update(decoder.end())
+        self.end(Ending.GONE)
+
+    def tick(self) -> None:
+        """Fly the period that is over, with the command that came for it or by the rule for none."""
+        if self.due is None:
+            return
+        self.behind = max(self.behind, self.clock() - self.due)
+        command, self._next = self._next, None
+        if command is None:
+            self.missed += 1
+            if self.rules.missing is Missing.STOP:
+                self.end(Ending.MISSED)
+                return
+            command = self._last if self.rules.missing is Missing.HOLD else self._nothing
+        self._fly(command)
+
+    def end(self, ending: Ending) -> None:
+        """End the flight, once."""
+        if self.ending is None:
+            self.ending = ending
+            if self.greeted and ending is not Ending.GONE:
+                self._tell(Message(Kind.STOP, self.flight.steps, text=ending))
+
+    def strange(self) -> None:
+        """Count a message of somebody else."""
+        self.faults[Fault.STRANGER] += 1
+
+    def _begin(self) -> None:
+        self._begun = None if not self.greeted else self.clock()
+        self._nothing = np.zeros(COMMANDS)
+        self._last, self._next = self._nothing, None
+        self._sent.clear()
+
+    def _heed(self, message: Message | Fault, decoder: Decoder) -> None:
+        if self.ending is not None:
+            return
+        if isinstance(message, Message) or not self.greeted:
+            # Answers have the form of the last valid message.
+            self._is_text = bool(decoder.is_text)
+        if isinstance(message, Fault):
+            self._refuse(message)
+        elif message.kind is Kind.HELLO:
+            self._greet()
+        elif not self.greeted:
+            self._refuse(Fault.ORDER)
+        elif message.kind is Kind.COMMAND:
+            self._command(message)
+        elif message.kind is Kind.RESET:
+            self._readings = self.flight.reset(*map(int, message.numbers))
+            self._begin()
+            self._read_out()
+        else:
+            self.end(Ending.STOPPED)
+
+    def _greet(self) -> None:
+        if not self.greeted:
+            self.greeted = True
+            self._begin()
+        numbers = (self.flight.loop.period, 1 + self.layout.size, self.layout.check)
+        self._tell(Message(Kind.HELLO, self.flight.steps, numbers, self._about))
+        self._read_out()
+
+    def _command(self, message: Message) -> None:
+        now, wanted = self.clock(), self.flight.steps
+        if message.step == wanted and self._next is None:
+            self._note_latency(message.step, now)
+            self.commanded += 1
+            self._last = np.array(message.numbers)
+            if self.rules.rate is None:
+                self._fly(self._last)
+            else:
+                self._next = self._last
+        elif message.step == wanted:
+            self._refuse(Fault.DOUBLED)
+        elif message.step > wanted:
+            self._refuse(Fault.ORDER)
+        elif self.rules.rate is None and message.step == wanted - 1:
+            # Where the readings were lost, the command comes again until they arrive.
+            self.faults[Fault.DOUBLED] += 1
+            self._read_out()
+        else:
+            self._note_latency(message.step, now)
+            self._refuse(Fault.LATE)
+
+    def _note_latency(self, step: int, now: float) -> None:
+        if (begun := self._sent.pop(step, None)) is not None:
+            self.latencies.append(now - begun)
+
+    def _fly(self, command: Any) -> None:
+        if self.flight.steps >= self.rules.steps:
+            # The last sample shows the command that comes after the end.
+            self.flight.close(command)
+            self.end(Ending.FLOWN)
+            return
+        self._readings = self.flight.step(command)
+        if self.flight.diverged:
+            self.end(Ending.DIVERGED)
+        else:
+            self._read_out()
+
+    def _read_out(self) -> None:
+        step = self.flight.steps
+        self._sent[step] = self.clock()
+        self._sent.pop(step - KEPT, None)
+        self._tell(Message(Kind.READINGS, step, self.layout.numbers(self.flight, self._readings).tolist()))
+
+    def _refuse(self, fault: Fault) -> None:
+        self.faults[fault] += 1
+        self._tell(Message(Kind.REFUSED, self.flight.steps, text=fault))
+
+    def _tell(self, message: Message) -> None:
+        self.send(line(message) if self._is_text else binary(message))
+
+
+def summary(plant: Plant) -> list[str]:
+    """Return what is told of a flight that ended, in lines: how far it went, latencies, and what was not heeded."""
+    flight, rules = plant.flight, plant.rules
+    unit = getattr(flight.loop.body.module, "TIME_UNIT", "s")
+    reason = f"Ended at step {flight.steps} of {rules.steps} ({flight.time:g} {unit}): {plant.ending}."
+    lines = [f"{reason} Commands heeded: {plant.commanded}."]
+    if plant.latencies:
+        quantiles = 1e3 * np.quantile(plant.latencies, [0.0, 0.5, 0.99, 1.0])
+        named = zip(("min", "median", "99 %", "max"), quantiles, strict=True)
+        shown = ", ".join(f"{name} {value:.3g} ms" for name, value in named)
+        lines.append(f"From readings to command, {len(plant.latencies)} times: {shown}.")
+    if rules.rate is not None:
+        lost = max(0, plant.missed - plant.faults[Fault.LATE])
+        lines.append(
+            f"Real time at rate {rules.rate:g}: {plant.missed} missed periods ({rules.missing}), {lost} of their commands "
+            f"never came; the plant was late by {1e3 * plant.behind:.3g} ms at most."
+        )
+    if plant.faults:
+        counted = ", ".join(f"{count} {fault}" for fault, count in sorted(plant.faults.items()))
+        lines.append(f"Messages not heeded: {counted}.")
+    return lines

@@ -1,0 +1,92 @@
+"""A law that lives in a child process flies a loop: the protocol in its binary form, over the pipes of the child."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import shlex
+import subprocess
+from typing import Any
+
+from numpy.typing import NDArray
+
+from starhold.errors import InputError
+from starhold.link.plant import Ending, Plant, Rules
+from starhold.link.protocol import Decoder
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.simulation.lane import Progress
+from starhold.simulation.stepper import Stepper
+
+PATIENCE = 60.0
+"""A process that says nothing for so long (s) is taken to hang."""
+GRACE = 5.0
+"""A process has so long (s) to end by itself after the flight."""
+EVERY = 100
+"""Control steps between two reports of progress."""
+
+
+def fly_by_process(
+    command: str, loop: ClosedLoop, steps: int, record_every: int = 1, progress: Progress | None = None
+) -> tuple[NDArray[Any], Any]:
+    """The samples and the last carry of a loop, as `fly` gives them, whose commands come from a process.
+
+    command: the program and its arguments; no shell reads it. Lockstep; InputError where it cannot be started, ends before
+    the flight does, hangs, or sends what is not valid."""
+    flight = Stepper(loop)
+    plant = Plant(flight, {}, Rules(steps))
+    try:
+        words = shlex.split(command)
+        child = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
+    except (OSError, ValueError, IndexError) as error:
+        raise InputError("run", "--law-process", command, f"a program that runs: {error}") from None
+    with child:
+        try:
+            _converse(plant, child, command, progress)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                child.communicate(timeout=GRACE)
+        finally:
+            child.kill()
+    return flight.samples(record_every)
+
+
+def _converse(plant: Plant, child: subprocess.Popen[bytes], command: str, progress: Progress | None) -> None:
+    """Carry messages to and fro until the flight ends."""
+    assert child.stdin is not None
+    assert child.stdout is not None
+    source, sink = child.stdout.fileno(), child.stdin.fileno()
+    waiting, decoder = bytearray(), Decoder()
+    plant.send = waiting.extend
+    shown = 0
+    while plant.ending is None or waiting:
+        readable, writable, _ = select.select([source], [sink] if waiting else [], [], PATIENCE)
+        at = f"{command}, at step {plant.flight.steps}"
+        if not readable and not writable:
+            raise InputError("run", "--law-process", f"{at}, nothing for {PATIENCE:g} s", "a command for every step")
+        try:
+            if writable:
+                del waiting[: os.write(sink, waiting[: select.PIPE_BUF])]
+            data = os.read(source, 2**16) if readable else None
+        except BrokenPipeError:
+            data = b""
+        if plant.ending is not None:
+            # What is said after the end is not heeded; a process that has left needs no farewell.
+            if data == b"":
+                return
+            continue
+        if data == b"":
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                child.wait(GRACE)
+            found = f"{at}, a process that ended with {child.returncode}"
+            raise InputError("run", "--law-process", found, "a command for every step")
+        plant.received(data or b"", decoder)
+        if plant.faults:
+            fault = next(iter(plant.faults))
+            raise InputError(
+                "run", "--law-process", f"{at}, a message that is {fault}", "the protocol of docs/in-the-loop.md"
+            )
+        if plant.ending is Ending.STOPPED:
+            raise InputError("run", "--law-process", f"{at}, a process that stops the flight", "a command for every step")
+        if progress is not None and (plant.flight.steps - shown >= EVERY or plant.ending is not None):
+            shown = plant.flight.steps
+            progress(shown, plant.rules.steps)
