@@ -26,6 +26,7 @@ from starhold.scenario.checking import free_name, in_file, nearest, show, try_la
 from starhold.scenario.schema import columns
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
+ONE = "one of each, or an estimator that takes them all"
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts that stand in [[part]] tables; a law has its own, and so has the body."""
 SINGLE = {"estimator": "one estimator", "target": "one target"}
@@ -149,12 +150,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         if len(used) > 1:
             raise InputError(where, _key(used[1]), f"a second {role}, beside {used[0].called}", most)
     _check_effectors(loop, where)
-    readings: dict[str, str] = {}
-    for sensor in loop.used("sensor"):
-        for name in sensor.part.module.Reading._fields:
-            if name in readings and name in loop.body.module.State._fields:
-                raise InputError(where, _key(sensor), f"a second sensor of {name}, beside {readings[name]}", "one of each")
-            readings[name] = sensor.called
+    readings = _check_sensors(loop, where)
     there = {f.part.name for f in fitted}
     for one in fitted:
         estimates = one.part.role == "estimator"
@@ -179,6 +175,26 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         raise InputError(
             where, _key(loop.used("effector")[0]), f"an effector on the body {loop.body.name}", "a body that turns"
         )
+
+
+def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
+    """What the sensors read. InputError where one reads what another does, unless an estimator takes both or nobody either."""
+    estimator = next(iter(loop.used("estimator")), None)
+    several: dict[str, str] = {} if estimator is None else getattr(estimator.part.module, "SEVERAL", {})
+    taken = {*loop.law.reads, *(name for fitted in loop.parts for name in fitted.part.reads)}
+    taken |= set(loop.body.module.State._fields if estimator is None else estimator.part.needs) - set(several)
+    found: dict[str, list[str]] = {}
+    for sensor in loop.used("sensor"):
+        for name in sensor.part.module.Reading._fields:
+            if name in found and name in taken:
+                raise InputError(where, _key(sensor), f"a second sensor of {name}, beside {found[name][0]}", ONE)
+            found.setdefault(name, []).append(sensor.called)
+    for name, key in several.items():
+        others = found.get(name, [])[1:]
+        if estimator is not None and key and len(getattr(estimator.params, key)) != len(others):
+            given = f"{len(getattr(estimator.params, key))} rows of {key} for {len(others)} sensors of {name} beside the first"
+            raise InputError(where, _key(estimator), given, "a row for each, in the order of the file")
+    return set(found)
 
 
 def _measuring(reading: str) -> str:
