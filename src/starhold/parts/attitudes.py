@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 from starhold.algebra.quaternion import Quaternion, multiply, normalise, relative, vector_part
@@ -23,13 +24,15 @@ def together(seen: Sequence[tuple[Quaternion, Truth]], weights: Sequence[Matrix]
     (near, new), *others = seen
     for attitude, fresh in others:
         near, new = chosen(new, near, attitude), either(new, fresh)
-    total, pull = (ZERO, ZERO, ZERO), ZERO
-    for (attitude, fresh), weight in zip(seen, weights, strict=True):
-        counted = chosen(fresh, weight, (ZERO, ZERO, ZERO))
-        total, pull = combine(1.0, total, 1.0, counted), add(pull, apply(counted, small_turn(near, attitude)))
+    counted = [chosen(fresh, weight, (ZERO, ZERO, ZERO)) for (_, fresh), weight in zip(seen, weights, strict=True)]
+    total = reduce(lambda a, b: combine(1.0, a, 1.0, b), counted)
     # Where none is new this is not used, but stays finite.
     spread = inverse(chosen(new, total, IDENTITY))
-    return turned_by(near, apply(spread, pull)), spread, new
+    # The second turn leaves nothing of the first one's square.
+    for _ in range(2):
+        pulls = [apply(weight, small_turn(near, attitude)) for (attitude, _), weight in zip(seen, counted, strict=True)]
+        near = turned_by(near, apply(spread, reduce(add, pulls)))
+    return near, spread, new
 
 
 def small_turn(begin: Quaternion, end: Quaternion) -> Vector:

@@ -59,9 +59,9 @@ class Noise(NamedTuple):
 
 class Recursion(NamedTuple):
     """How noise drives small errors of what a law is told, linearly. At a control step an equation takes `errors` and the
-    standard normal `noise` of rate, bias and each attitude, tuples of vectors, to the errors that are kept for the next step and
-    to those of attitude (rad) and rate (rad/s) that the law is told: `corrected` at every `every`-th step, at which an
-    attitude is new, and `carried` at the others."""
+    standard normal `noise` of rate, bias and each attitude, tuples of vectors, to the errors that are kept for the next step
+    and to those of attitude (rad) and rate (rad/s) that the law is told: `corrected` at every `every`-th step, at which
+    attitudes are new, and `carried` at the others."""
 
     corrected: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
     carried: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
