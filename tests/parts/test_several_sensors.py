@@ -1,6 +1,7 @@
 """Loops with several star trackers: what filters make of them, what is recorded, and what flies in all forms."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.conformance.verdicts import agree
+from starhold.scenario import reading
 from starhold.scenario.building import build
 
 ARCSEC = math.radians(1.0 / 3600.0)
@@ -24,7 +26,7 @@ def row(table):
     return [table["cross"], table["roll"], *table["boresight"]]
 
 
-def scenario(*parts, **simulation):
+def scenario(*parts, orbit=None, **simulation):
     """A body that turns, with these parts."""
     return sh.scenario(
         {
@@ -35,6 +37,7 @@ def scenario(*parts, **simulation):
             "part": list(parts),
             "law": [{"type": "lyapunov", "k_rate": 0.2, "k_attitude": 0.03}],
         }
+        | ({} if orbit is None else {"orbit": orbit})
     )
 
 
@@ -109,3 +112,16 @@ def test_complementary_filter_takes_the_mean():
     )
     mean = first * Rotation.from_rotvec(0.5 * (first.inv() * second).as_rotvec())
     assert (mean.inv() * told).magnitude().max() < 1e-9
+
+
+def test_second_magnetometer_is_recorded_where_nothing_reads_one_and_refused_elsewhere(tmp_path):
+    second = '\n[[part]]\ntype = "magnetometer"\nname = "boom"\nnoise = 1e-9\n'
+    builtin = Path(reading.__file__).parent / "builtin" / "cubesat-nadir.toml"
+    (tmp_path / "read.toml").write_text(builtin.read_text() + second)
+    with pytest.raises(sh.InputError, match="part boom: found a second sensor of magnetic_field, beside magnetometer"):
+        sh.simulate(tmp_path / "read.toml", "wheel")
+    orbit = {"position": [6.9e6, 0.0, 0.0], "velocity": [0.0, 5.0e3, 5.7e3]}
+    magnetometers = [{"type": "magnetometer", "noise": 1e-8}, {"type": "magnetometer", "noise": 1e-9, "name": "boom"}]
+    run = sh.simulate(scenario(*magnetometers, orbit=orbit))
+    apart = (run["magnetometer_magnetic_field"] - run["boom_magnetic_field"]).values[1:]
+    assert 0.8e-8 < apart.std() < 1.2e-8

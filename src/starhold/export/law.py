@@ -68,7 +68,9 @@ class FlightLaw:
             setup, wheels = parameters.setup, getattr(inputs, "wheels", None)
             if hasattr(inputs, "target"):
                 setup = setup._replace(target=inputs.target)
-            readings = tuple(_Reading(**{name: getattr(inputs, own) for name, own in one.items()}) for one in self.given)
+            readings = tuple(
+                _Reading(**{name: getattr(inputs, member) for name, member in one.items()}) for one in self.given
+            )
             estimate = () if self.parts.estimator is None else self.loop.carry().memories.estimate
             memories = Memories(
                 kept.get("followed", NoMemory()),
@@ -117,12 +119,12 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
             # Without an estimator attitude and rate are told as they are.
             taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
             repeated = not firsts.keys().isdisjoint(taken)
-            own = {name: f"{sensor.called.replace('-', '_')}_{name}" if repeated else name for name in taken}
-            again += [own] if repeated else []
-            firsts |= {} if repeated else own
-            readings.update({own[name]: first[name] for name in taken})
-            told = quantities(part.module.Reading) if is_recorded(part) else {}
-            shown.update({own.get(name, name): one for name, one in told.items()})
+            inputs = {name: f"{sensor.called.replace('-', '_')}_{name}" if repeated else name for name in taken}
+            again += [inputs] if repeated else []
+            firsts |= {} if repeated else inputs
+            readings.update({inputs[name]: first[name] for name in taken})
+            units = quantities(part.module.Reading) if is_recorded(part) else {}
+            shown.update({inputs.get(name, name): one for name, one in units.items()})
         fields.update(readings)
         notes.update({name: one for name, one in shown.items() if notes.get(name) is None or name not in UNITS})
         given = (firsts, *again) if readings else ()

@@ -87,12 +87,12 @@ def make_equations(parts: Composition) -> Step:
             every.append(reading)
             if is_recorded(sensor):
                 shown.append(reading)
-        estimate, estimator, told = memories.estimate, memories.estimator, vars(readings)
+        estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
         if parts.estimator is not None:
-            given = SimpleNamespace(**told, every=tuple(every))
-            estimate, estimator = parts.estimator.module.estimate(given, estimator, setup.estimator, craft, setup.period)
-            told = estimate._asdict()
-        known = state._replace(**{name: x for name, x in told.items() if name in state._fields})
+            several = SimpleNamespace(**values, every=tuple(every))
+            estimate, estimator = parts.estimator.module.estimate(several, estimator, setup.estimator, craft, setup.period)
+            values = estimate._asdict()
+        known = state._replace(**{name: x for name, x in values.items() if name in state._fields})
         telling = [one for one in named.torques if one.part.flag("MODELLED")]
         torque = total(
             one.part.module.torque(known, setup.environments[one.place], craft, memories.environments[one.place])

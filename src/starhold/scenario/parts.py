@@ -178,29 +178,29 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
 
 
 def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
-    """What the sensors read. InputError where two read what is taken of one only."""
-    taken = {*loop.law.reads, *(name for fitted in loop.parts for name in fitted.part.reads)}
+    """Return the names of what the sensors read. InputError where two read what is taken of one only."""
+    single = {*loop.law.reads, *(name for fitted in loop.parts for name in fitted.part.reads)}
     several: dict[str, str] = {}
     for estimator in loop.used("estimator"):
         several = getattr(estimator.part.module, "SEVERAL", {})
-        taken |= {name for name in estimator.part.needs if name not in several}
-    taken |= set() if loop.used("estimator") else set(loop.body.module.State._fields)
-    found: dict[str, list[str]] = {}
+        single |= {name for name in estimator.part.needs if name not in several}
+    single |= set() if loop.used("estimator") else set(loop.body.module.State._fields)
+    sensors: dict[str, list[str]] = {}
     for sensor in loop.used("sensor"):
         for name in sensor.part.module.Reading._fields:
-            if name in found and name in taken:
-                given = f"a second sensor of {name}, beside {found[name][0]}"
+            if name in sensors and name in single:
+                given = f"a second sensor of {name}, beside {sensors[name][0]}"
                 raise InputError(where, _key(sensor), given, "one of each, or an estimator that takes them all")
-            found.setdefault(name, []).append(sensor.called)
+            sensors.setdefault(name, []).append(sensor.called)
     for estimator in loop.used("estimator"):
         for name, key in several.items():
-            others = found.get(name, [])[1:]
+            others = sensors.get(name, [])[1:]
             rows = len(getattr(estimator.params, key)) if key else len(others)
             if rows != len(others):
                 given = f"{key} of length {rows} for {', '.join(others) or 'no second sensor'}"
                 allowed = f"a row for each sensor of {name} after the first, in the order of the file"
                 raise InputError(where, _key(estimator), given, allowed)
-    return set(found)
+    return set(sensors)
 
 
 def _measuring(reading: str) -> str:

@@ -297,7 +297,7 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
     if noise.more:
         numbers = numbers._replace(tracker=inverse(reduce(summed, numbers.weights)))
         shares = [product(numbers.tracker, weight) for weight in numbers.weights]
-        seen = [product(share, own) for share, own in zip(shares, (noise.attitude, *noise.more), strict=True)]
+        seen = [product(share, root) for share, root in zip(shares, (noise.attitude, *noise.more), strict=True)]
     gain = settled(numbers, noise.every, rate, period)
     if gain is None:
         return None
