@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.analysis.departure import departures
@@ -16,12 +17,14 @@ from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import _numbers as numbers_apart
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.openness import envelope_of, named, pushes
+from starhold.certification.openness import _rate as goal_rate
+from starhold.certification.openness import driven_errors, envelope_of, named, pushes
 from starhold.certification.proofs import checked
 from starhold.certification.subject import described, make_subject
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.parts.catalogue import find
+from starhold.parts.estimators import mekf
 from starhold.parts.part import Fitted
 from starhold.scenario.building import build
 from tests.certification.loops import certified
@@ -66,6 +69,54 @@ def test_a_claim_for_a_share_takes_in_the_parts_that_say_their_noise():
 )
 def test_what_is_not_noise_is_left_out(name, params):
     assert left_out(changed(nadir(), name, **params), 0.9973) == SENSORS
+
+
+def with_two(interval, rows=((2e-5, 9e-5, 1.0, 0.0, 0.0),)):
+    """The loop with another star tracker, at this interval (s), of which the filter knows by these rows."""
+    loop = changed(nadir(), "mekf", more_trackers=rows)
+    first = loop.find("star-tracker")
+    params = first.params._replace(cross=3e-5, roll=1e-4, boresight=(1.0, 0.0, 0.0), interval=interval)
+    return replace(loop, parts=(*loop.parts, replace(first, params=params, name="second")))
+
+
+def test_two_trackers_are_taken_in_or_left_out_by_name():
+    assert left_out(with_two(1.0), 0.9973) == set()
+    assert left_out(with_two(2.0), 0.9973) == SENSORS | {"sensor second"}
+    assert left_out(with_two(1.0, ()), 0.9973) == SENSORS | {"sensor second"}
+    alone = with_two(1.0).without("estimator")
+    assert driven_errors(alone) is None
+    assert differences(noise_claim(with_two(1.0)), nadir())
+
+
+def test_noise_of_two_trackers_drives_errors_as_in_the_filter_that_flies():
+    loop, period, random = with_two(1.0), nadir().period, np.random.default_rng(3)
+    recursion = driven_errors(loop).recursion
+    params, gyro = loop.find("mekf").prepared(period), loop.find("gyro")
+    roots = [
+        f.part.module.noise(f.params, period).attitude
+        for f in loop.used("sensor")
+        if "attitude" in f.part.module.Reading._fields
+    ]
+    reading = gyro.part.module.noise(gyro.params, period).rate
+    rate = np.array(goal_rate(loop))
+    true, onward = Rotation.identity(), Rotation.from_rotvec(rate * period)
+    memory, errors = mekf.remember(params, None), ((0.0,) * 3,) * recursion.size
+    for step in range(2400):
+        noisy, new = step >= 2000, step % recursion.every == 0
+        drawn = random.normal(size=(recursion.noises, 3)) * noisy
+        drawn[1] = 0.0
+        seen = [true * Rotation.from_rotvec(np.array(root) @ own) for root, own in zip(roots, drawn[2:], strict=True)]
+        every = [SimpleNamespace(attitude=tuple(q.as_quat(scalar_first=True)), attitude_is_new=float(new)) for q in seen]
+        told = SimpleNamespace(rate=tuple(rate + reading * drawn[0]), every=every)
+        estimate, memory = mekf.estimate(told, memory, params, loop.known, period)
+        noise = tuple(map(tuple, drawn))
+        errors, attitude, off = (recursion.corrected if new else recursion.carried)(errors, noise)
+        if noisy:
+            found = (true.inv() * Rotation.from_quat(estimate.attitude, scalar_first=True)).as_rotvec()
+            assert np.abs(found - attitude).max() < 1e-8
+            assert np.abs(estimate.rate - rate - off).max() < 1e-8
+        true = true * onward
+    assert np.abs(attitude).max() > 1e-6
 
 
 def test_what_is_read_by_what_has_no_bound_is_left_out():

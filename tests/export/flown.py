@@ -4,6 +4,7 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -98,13 +99,15 @@ def loop_of(name: str) -> Any:
     if name == "estimator on [sensor]":
         noisy = fit("sensor", "gaussian", 1e-4, 1e-5)
         return choices()["target from a table"].with_parts(noisy, fit("estimator", "complementary-filter", 0.1, 0.01))
-    if name == "estimator":
+    if name in ("estimator", "two trackers"):
         loop = choices()["target from a table"].without("sensor")
         tracker, gyro = (
             fit("sensor", "star-tracker", 1e-4, 5e-4, (0.0, 0.6, 0.8), 1.0),
             fit("sensor", "gyro", 1e-5, (1e-4, -1e-4, 2e-4)),
         )
-        return loop.with_parts(tracker, gyro, fit("estimator", "complementary-filter", 0.1, 0.01))
+        loop = loop.with_parts(tracker, gyro, fit("estimator", "complementary-filter", 0.1, 0.01))
+        second = fit("sensor", "star-tracker", 2e-4, 3e-4, called="second")
+        return replace(loop, parts=(*loop.parts, second)) if name == "two trackers" else loop
     if name not in LAWS:
         return choices()[name]
     scenario = load(LAWS[name][0])

@@ -23,6 +23,7 @@ OTHERS = [("gcc", "-O0"), ("clang", "-O3", "-march=native")]
 STATELESS = [name for name in LAWS if name != "mpc"]
 MADE = [
     "estimator",
+    "two trackers",
     "lqr, example 0, noise",
     "target from a table",
     "hysteresis, axis",

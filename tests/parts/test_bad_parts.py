@@ -16,6 +16,7 @@ from tests.running import starhold
 CIRCLE = law_table(catalogue("libration-point")["l2-circle"], catalogue("libration-point")["l2-circle"].examples()[0])
 GYRO, FILTER = part('type = "gyro"\n'), part('type = "complementary-filter"\nattitude_gain = 0.1\nbias_gain = 0.01\n')
 TRACKER = part('type = "star-tracker"\ncross = 1e-5\nroll = 1e-4\n')
+MEKF = part('type = "mekf"\nnoise = 1e-5\nbias_walk = 1e-5\nbias = 1e-4\ncross = 1e-5\nroll = 1e-4\n')
 MARS = "[orbit]\nposition = [3.8e6, 0, 0]\nvelocity = [0, 3.4e3, 0]\ngravitational_parameter = 4.2828375816e13\n"
 MODES = """[[law]]
 type = "modes"
@@ -50,6 +51,21 @@ COMPOSED = {
     "an estimator without one of its sensors": (TRACKER + FILTER, "no rate", "a sensor that measures rate"),
     "two estimators": (GYRO + TRACKER + FILTER * 2, "a second estimator", "one estimator"),
     "two sensors of the rate": (GYRO * 2, "a second sensor of rate, beside gyro", "one of each"),
+    "a sensor of the attitude that a filter is not told of": (
+        GYRO + TRACKER * 2 + MEKF,
+        "part mekf: found more_trackers of length 0 for star-tracker-2",
+        "a row for each sensor of attitude after the first",
+    ),
+    "a sensor that a filter is told of and that is not there": (
+        GYRO + TRACKER + MEKF + "more_trackers = [[1e-5, 1e-4, 0, 1, 0]]\n",
+        "more_trackers of length 1 for no second sensor",
+    ),
+    "two sensors of the attitude and no estimator": (TRACKER * 2, "a second sensor of attitude, beside star-tracker"),
+    "a tracker without noise": (
+        GYRO + TRACKER * 2 + MEKF + "more_trackers = [[0, 1e-4, 0, 1, 0]]\n",
+        "part mekf",
+        "the deviations of more_trackers must be above 0",
+    ),
     "a sensor beside [sensor]": ("[sensor]\nrate_noise = 1e-4\n" + GYRO, "a second sensor of rate"),
     "a part that is about the Earth elsewhere": (
         MARS + part('type = "residual-dipole"\ndipole = [0, 0, 0.01]\n'),

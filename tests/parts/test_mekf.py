@@ -14,29 +14,34 @@ from starhold.parts.estimators import mekf
 ARCSEC = math.radians(1.0 / 3600.0)
 PERIOD = 0.5
 PARAMS = mekf.Params(5e-5, 3e-3, 1e-3, 20.0 * ARCSEC, 120.0 * ARCSEC, (0.0, 0.6, 0.8))
+SECOND = (15.0 * ARCSEC, 200.0 * ARCSEC, (1.0, 0.0, 0.0))
+"""Deviations and boresight of a second tracker."""
 
 
-def filtered(attitudes, rates, new, params=PARAMS, period=PERIOD):
-    """The filter's estimates and memories at all control steps."""
+def filtered(attitudes, rates, new, params=PARAMS, period=PERIOD, second=None):
+    """The filter's estimates and memories at all control steps; second: attitudes of another tracker, and which are new."""
     numbers = mekf.prepare(params, period)
     memory, found = mekf.remember(numbers, None), []
-    for attitude, rate, fresh in zip(attitudes, rates, new, strict=True):
+    for k, (attitude, rate, fresh) in enumerate(zip(attitudes, rates, new, strict=True)):
         readings = SimpleNamespace(attitude=tuple(attitude), rate=tuple(rate), attitude_is_new=float(fresh))
+        if second is not None:
+            other = SimpleNamespace(attitude=tuple(second[0][k]), attitude_is_new=float(second[1][k]))
+            readings.every = (SimpleNamespace(rate=readings.rate), SimpleNamespace(**vars(readings)), other)
         estimate, memory = mekf.estimate(readings, memory, numbers, CRAFT, period)
         found.append((estimate, memory))
     return found
 
 
-def flight(steps, seed):
+def flight(steps, seed, cross=PARAMS.cross, roll=PARAMS.roll, boresight=PARAMS.boresight):
     """Readings of a body that turns ever faster: attitudes (scalar first), rates, and which attitudes are new."""
     random = np.random.default_rng(seed)
-    axis = np.array(PARAMS.boresight)
+    axis = np.array(boresight)
     bias = random.normal(scale=PARAMS.bias, size=3)
     rate, turn = np.array([0.02, -0.05, 0.03]), Rotation.from_rotvec([0.4, -1.0, 2.0])
     attitudes, rates = [], []
     for _ in range(steps):
         angles = random.normal(size=3)
-        error = PARAMS.cross * (angles - axis * (axis @ angles)) + PARAMS.roll * axis * (axis @ angles)
+        error = cross * (angles - axis * (axis @ angles)) + roll * axis * (axis @ angles)
         attitudes.append((turn * Rotation.from_rotvec(error)).as_quat(scalar_first=True))
         rates.append(rate + bias + random.normal(scale=PARAMS.noise / math.sqrt(PERIOD), size=3))
         push = random.normal(scale=2e-3, size=3)
@@ -45,13 +50,19 @@ def flight(steps, seed):
     return np.array(attitudes), np.array(rates), np.arange(steps) % 3 == 0
 
 
-def most_likely(attitudes, rates, new):
+def whitening(cross, roll, boresight):
+    """What takes the error of a tracker's attitude to standard normal numbers."""
+    return np.linalg.inv(cross * np.eye(3) + (roll - cross) * np.outer(boresight, boresight))
+
+
+def most_likely(attitudes, rates, new, second=None):
     """The attitude, bias and noise of the gyro's reading at the last step, of greatest likelihood given all readings, by
     nonlinear least squares over all of them, and the covariance of these nine numbers."""
     steps = len(rates)
     measured = Rotation.from_quat(attitudes, scalar_first=True)
-    axis = np.array(PARAMS.boresight)
-    tracker = np.linalg.inv(PARAMS.cross * np.eye(3) + (PARAMS.roll - PARAMS.cross) * np.outer(axis, axis))
+    trackers = [(measured, new, whitening(PARAMS.cross, PARAMS.roll, PARAMS.boresight))]
+    if second is not None:
+        trackers.append((Rotation.from_quat(second[0], scalar_first=True), second[1], whitening(*SECOND)))
     deviation, walk = PARAMS.noise / math.sqrt(PERIOD), PARAMS.bias_walk * math.sqrt(PERIOD / 3600.0)
     # From a guess that the gyro carries on.
     carried = [measured[0]]
@@ -71,9 +82,9 @@ def most_likely(attitudes, rates, new):
     def residuals(x):
         errors, biases = x[3:].reshape(2, steps, 3)
         turns = guess * Rotation.from_rotvec(errors)
-        seen = (turns.inv() * measured).as_rotvec()[new] @ tracker.T
+        seen = [(turns.inv() * shown).as_rotvec()[fresh] @ tracker.T for shown, fresh, tracker in trackers]
         noise = noises(turns, biases, x[:3]) / deviation
-        parts = [seen, noise, np.diff(biases, axis=0) / walk, biases[:1] / PARAMS.bias]
+        parts = [*seen, noise, np.diff(biases, axis=0) / walk, biases[:1] / PARAMS.bias]
         return np.concatenate([part.ravel() for part in parts])
 
     # The covariance is that in the axes of the attitudes found, so these are the guess in the end.
@@ -101,15 +112,29 @@ def most_likely(attitudes, rates, new):
 def test_estimate_is_the_most_likely_one(steps):
     # The last one filters what all readings up to now say: a smoother's last state. Among the ends some have a new attitude.
     attitudes, rates, new = flight(steps, seed=steps)
-    estimate, memory = filtered(attitudes, rates, new)[-1]
-    turn, bias, noise, covariance = most_likely(attitudes, rates, new)
+    agrees(filtered(attitudes, rates, new)[-1], most_likely(attitudes, rates, new), rates[-1])
+
+
+@pytest.mark.parametrize("steps", [1, 13, 15, 17])
+def test_estimate_of_two_trackers_is_the_most_likely_one(steps):
+    """At the last step both attitudes are new, or the second, or none; the first is the second's alone or both's."""
+    attitudes, rates, new = flight(steps, seed=steps)
+    second = flight(steps, steps, *SECOND)[0], np.arange(steps) % 2 == 0
+    params = PARAMS._replace(more_trackers=((*SECOND[:2], *SECOND[2]),))
+    new = np.arange(steps) % 3 == (0 if steps != 17 else 2)
+    agrees(filtered(attitudes, rates, new, params, second=second)[-1], most_likely(attitudes, rates, new, second), rates[-1])
+
+
+def agrees(found, wanted, reading):
+    """An estimate and what is remembered are of greatest likelihood; reading: the gyro's last one."""
+    (estimate, memory), (turn, bias, noise, covariance) = found, wanted
     apart = (turn.inv() * Rotation.from_quat(estimate.attitude, scalar_first=True)).as_rotvec()
     deviations = np.sqrt(np.diag(covariance))
     assert np.abs(apart / deviations[:3]).max() < 4e-3
     assert np.abs((np.array(estimate.gyro_bias) - bias) / deviations[3:6]).max() < 4e-3
     of_rate = np.hstack([np.zeros((3, 3)), np.eye(3), np.eye(3)])
     slack = np.sqrt(np.diag(of_rate @ covariance @ of_rate.T))
-    assert np.abs((np.array(estimate.rate) - (rates[-1] - bias - noise)) / slack).max() < 4e-3
+    assert np.abs((np.array(estimate.rate) - (reading - bias - noise)) / slack).max() < 4e-3
     assert np.array((estimate.attitude_deviation, estimate.gyro_bias_deviation)).ravel() == pytest.approx(
         deviations[:6], rel=4e-3
     )

@@ -85,7 +85,8 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
     """The errors that noise drives, of an estimate, or of readings that the law is told as they are; None without noise,
-    where parts do not say all about it, and where the target depends on the law's mode."""
+    where parts do not say all about it, where sensors of one quantity are not read together, and where the target depends on
+    the law's mode."""
     estimators = loop.used("estimator")
     wanted = {name for f in estimators for name in f.part.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
@@ -93,10 +94,14 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
     if not sensors or not told or loop.target.part.flag("BY_MODE"):
         return None
     noise = Noise()
-    for f in sensors:
-        own = _noise(f, loop.period)
-        noise = noise._replace(attitude=own.attitude, every=own.every) if "attitude" in _shown(f) else noise
-        noise = noise._replace(rate=own.rate, walk=own.walk) if "rate" in _shown(f) else noise
+    several = getattr(estimators[0].part.module, "SEVERAL", ()) if estimators else ()
+    attitudes, rates = ([_noise(f, loop.period) for f in sensors if name in _shown(f)] for name in ("attitude", "rate"))
+    if len(rates) > 1 or (len(attitudes) > 1 and ("attitude" not in several or len({own.every for own in attitudes}) > 1)):
+        return None
+    for own in attitudes[:1]:
+        noise = noise._replace(attitude=own.attitude, every=own.every, more=tuple(other.attitude for other in attitudes[1:]))
+    for own in rates:
+        noise = noise._replace(rate=own.rate, walk=own.walk)
     if estimators:
         tell: Any = estimators[0].part.hook("recursion")
         recursion = None if tell is None else tell(estimators[0].params, noise, loop.period, _rate(loop))

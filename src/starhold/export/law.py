@@ -46,8 +46,9 @@ class FlightLaw:
     parameters: Parameters
     start: Any
     inputs: Any
-    given: tuple[str, ...]
-    """Readings that an estimator or the law is given."""
+    given: tuple[dict[str, str], ...]
+    """Readings that an estimator or the law is given, each with the name of its input: the first of each name, then those of
+    each sensor that shows one again."""
     command: Any
     """The class of the command."""
 
@@ -67,7 +68,9 @@ class FlightLaw:
             setup, wheels = parameters.setup, getattr(inputs, "wheels", None)
             if hasattr(inputs, "target"):
                 setup = setup._replace(target=inputs.target)
-            readings = tuple(_Reading(**{name: getattr(inputs, name) for name in self.given}) for _ in self.given[:1])
+            readings = tuple(
+                _Reading(**{name: getattr(inputs, member) for name, member in one.items()}) for one in self.given
+            )
             estimate = () if self.parts.estimator is None else self.loop.carry().memories.estimate
             memories = Memories(
                 kept.get("followed", NoMemory()),
@@ -107,18 +110,24 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
     module = parts.body.module
     fields = {name: getattr(loop.start, name) for name in loop.start._fields if name != module.COMMAND}
     notes = {name: UNITS.get(name) or quantities(module.Sample).get(name) for name in fields}
-    given: tuple[str, ...] = ()
+    given: tuple[dict[str, str], ...] = ()
     if parts.estimator is not None or parts.law.reads:
-        readings, shown = {}, {}
-        for part, memory, params in zip(parts.sensors, carry.memories.sensors, setup.sensors, strict=True):
+        firsts, again, readings, shown = {}, [], {}, {}
+        for sensor, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
+            part = sensor.part
             first = part.module.measure(loop.start, memory, params, _Still(), 0)[0]._asdict()
             # Without an estimator attitude and rate are told as they are.
             taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
-            readings.update({name: first[name] for name in taken})
-            shown.update(quantities(part.module.Reading) if is_recorded(part) else {})
+            repeated = not firsts.keys().isdisjoint(taken)
+            inputs = {name: f"{sensor.called.replace('-', '_')}_{name}" if repeated else name for name in taken}
+            again += [inputs] if repeated else []
+            firsts |= {} if repeated else inputs
+            readings.update({inputs[name]: first[name] for name in taken})
+            units = quantities(part.module.Reading) if is_recorded(part) else {}
+            shown.update({inputs.get(name, name): one for name, one in units.items()})
         fields.update(readings)
         notes.update({name: one for name, one in shown.items() if notes.get(name) is None or name not in UNITS})
-        given = tuple(readings)
+        given = (firsts, *again) if readings else ()
     target, numbers = parts.target, setup.target
     if target is not None and buffers((numbers,)):
         if target.flag("BY_MODE"):
@@ -133,14 +142,14 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         target=target,
         environments=tuple(parts.environments[place] for place in modelled),
         effectors=tuple(parts.effectors[place] for place in acting),
-        sensors=(Part("readings", _READINGS),) if given else (),  # pyright: ignore[reportArgumentType]
+        sensors=(Part("readings", _READINGS),) * len(given),  # pyright: ignore[reportArgumentType]
         actuators=(),
     )
     named = setup._replace(
         target=numbers,
         environments=_named("Environments", [(parts.environments[k].name, setup.environments[k]) for k in modelled]),
         effectors=_named("Effectors", [(parts.effectors[k].name, setup.effectors[k]) for k in acting]),
-        sensors=((),) if given else (),
+        sensors=((),) * len(given),
         actuators=(),
     )
     kept = {"sign": carry.h if _keeps_sign(composition, module) else (), "law": carry.memory}

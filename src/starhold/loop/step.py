@@ -78,19 +78,21 @@ def make_equations(parts: Composition) -> Step:
         state, memories = carry.state, carry.memories
         goal = goal_of(carry, state, step, setup)
         readings, kept, every = SimpleNamespace(), [], []
-        known, shown = state, []
+        shown = []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
             reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
-            vars(readings).update(reading._asdict())
-            known = known._replace(**{name: x for name, x in reading._asdict().items() if name in state._fields})
+            # Of several readings of a name all that do not ask for more are given the first.
+            vars(readings).update(reading._asdict() | vars(readings))
             kept.append(memory)
             every.append(reading)
             if is_recorded(sensor):
                 shown.append(reading)
-        estimate, estimator = memories.estimate, memories.estimator
+        estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
         if parts.estimator is not None:
-            estimate, estimator = parts.estimator.module.estimate(readings, estimator, setup.estimator, craft, setup.period)
-            known = state._replace(**{name: x for name, x in estimate._asdict().items() if name in state._fields})
+            several = SimpleNamespace(**values, every=tuple(every))
+            estimate, estimator = parts.estimator.module.estimate(several, estimator, setup.estimator, craft, setup.period)
+            values = estimate._asdict()
+        known = state._replace(**{name: x for name, x in values.items() if name in state._fields})
         telling = [one for one in named.torques if one.part.flag("MODELLED")]
         torque = total(
             one.part.module.torque(known, setup.environments[one.place], craft, memories.environments[one.place])

@@ -46,26 +46,30 @@ DEVIATIONS = 8.0
 class Noise(NamedTuple):
     """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), which
     is new every so many control periods, and at each control step of the rate (rad/s) and of the change of a gyro's bias
-    until the next (rad/s); the deviation about each axis of that of the magnetic field (T)."""
+    until the next (rad/s); the deviation about each axis of that of the magnetic field (T); of the attitudes of further
+    sensors (3, 3; rad), new at the same steps."""
 
     attitude: Matrix = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     every: int = 1
     rate: float = 0.0
     walk: float = 0.0
     field: float = 0.0
+    more: tuple[Matrix, ...] = ()
 
 
 class Recursion(NamedTuple):
     """How noise drives small errors of what a law is told, linearly. At a control step an equation takes `errors` and the
-    standard normal `noise` of rate, bias and attitude, tuples of vectors, to the errors that are kept for the next step and
-    to those of attitude (rad) and rate (rad/s) that the law is told: `corrected` at every `every`-th step, at which an
-    attitude is new, and `carried` at the others."""
+    standard normal `noise` of rate, bias and each attitude, tuples of vectors, to the errors that are kept for the next step
+    and to those of attitude (rad) and rate (rad/s) that the law is told: `corrected` at every `every`-th step, at which
+    attitudes are new, and `carried` at the others."""
 
     corrected: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
     carried: Callable[..., tuple[tuple[Vector, ...], Vector, Vector]]
     every: int
     size: int
     """How many vectors of errors are kept."""
+    noises: int = 3
+    """How many vectors of noise there are."""
 
 
 class Envelope(NamedTuple):

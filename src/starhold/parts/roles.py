@@ -192,14 +192,15 @@ class Sensor(Protocol):
 
 class Estimator(Protocol):
     """The state as it is computed from readings. `NEEDS`: the readings that it takes, by name; `Estimate` is a
-    NamedTuple whose fields are named as those of the body's state that it estimates."""
+    NamedTuple whose fields are named as those of the body's state that it estimates. `SEVERAL`: a dict from the name of a
+    reading that it takes of several sensors to the parameter with a row for each sensor after the first, "" for none."""
 
     NEEDS: tuple[str, ...]
     Estimate: type
 
     def estimate(self, readings: Any, memory: Any, params: Any, craft: Any, period: Scalar, /) -> tuple[Any, Any]:
-        """The estimate and the memory for the next; `readings` has an attribute for each name, craft is the nominal
-        model."""
+        """The estimate and the memory for the next; `readings` has an attribute for each name, that of the first sensor, and
+        `every`, the readings of all sensors in the order of the file; craft is the nominal model."""
         ...
 
     def remember(self, params: Any, state: State, /) -> Any:

@@ -26,6 +26,7 @@ from starhold.scenario.checking import free_name, in_file, nearest, show, try_la
 from starhold.scenario.schema import columns
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
+ONE = "one of each, or an estimator that takes them all"
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts that stand in [[part]] tables; a law has its own, and so has the body."""
 SINGLE = {"estimator": "one estimator", "target": "one target"}
@@ -149,12 +150,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         if len(used) > 1:
             raise InputError(where, _key(used[1]), f"a second {role}, beside {used[0].called}", most)
     _check_effectors(loop, where)
-    readings: dict[str, str] = {}
-    for sensor in loop.used("sensor"):
-        for name in sensor.part.module.Reading._fields:
-            if name in readings and name in loop.body.module.State._fields:
-                raise InputError(where, _key(sensor), f"a second sensor of {name}, beside {readings[name]}", "one of each")
-            readings[name] = sensor.called
+    readings = _check_sensors(loop, where)
     there = {f.part.name for f in fitted}
     for one in fitted:
         estimates = one.part.role == "estimator"
@@ -179,6 +175,32 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         raise InputError(
             where, _key(loop.used("effector")[0]), f"an effector on the body {loop.body.name}", "a body that turns"
         )
+
+
+def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
+    """Return the names of what the sensors read. InputError where two read what is taken of one only."""
+    single = {*loop.law.reads, *(name for fitted in loop.parts for name in fitted.part.reads)}
+    several: dict[str, str] = {}
+    for estimator in loop.used("estimator"):
+        several = getattr(estimator.part.module, "SEVERAL", {})
+        single |= {name for name in estimator.part.needs if name not in several}
+    single |= set() if loop.used("estimator") else set(loop.body.module.State._fields)
+    sensors: dict[str, list[str]] = {}
+    for sensor in loop.used("sensor"):
+        for name in sensor.part.module.Reading._fields:
+            if name in sensors and name in single:
+                given = f"a second sensor of {name}, beside {sensors[name][0]}"
+                raise InputError(where, _key(sensor), given, "one of each, or an estimator that takes them all")
+            sensors.setdefault(name, []).append(sensor.called)
+    for estimator in loop.used("estimator"):
+        for name, key in several.items():
+            others = sensors.get(name, [])[1:]
+            rows = len(getattr(estimator.params, key)) if key else len(others)
+            if rows != len(others):
+                given = f"{key} of length {rows} for {', '.join(others) or 'no second sensor'}"
+                allowed = f"a row for each sensor of {name} after the first, in the order of the file"
+                raise InputError(where, _key(estimator), given, allowed)
+    return set(sensors)
 
 
 def _measuring(reading: str) -> str:

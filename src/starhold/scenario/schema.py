@@ -112,8 +112,8 @@ def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
     keys: dict[str, Any] = {}
     for item in declared:
         written = item.default if item.required else item.written(item.default)
-        # A key may be left out whose default is None or infinite.
-        written = None if isinstance(written, float) and not math.isfinite(written) else written
+        # A key may be left out whose default is None, infinite or a table without rows.
+        written = None if written == () or (isinstance(written, float) and not math.isfinite(written)) else written
         kind = Annotated[Any, *any_quantity(item.gain), Field(validate_default=written is not None)]
         keys[item.name] = (kind, ... if item.required else written)
     return keys

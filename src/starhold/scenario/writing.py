@@ -81,11 +81,12 @@ def scenario_with(law: Law, gains: Any) -> str:
 
 
 def part_table(part: Part, params: Any) -> dict[str, Any]:
-    """A [[part]] table with these parameters, without infinite ones and those that the scenario gives to all parts."""
+    """A [[part]] table with these parameters, without infinite and empty ones, and those that the scenario gives to
+    all parts."""
     table: dict[str, Any] = {"type": part.name} if part.file is None else {"file": str(part.file)}
     body = bodies().get(part.body or "rigid-body")
     for item, value in _own(part.fields(), params, body.tables.SHARED if body else ()):
-        if isinstance(value, float) and not math.isfinite(value):
+        if value == () or (isinstance(value, float) and not math.isfinite(value)):
             continue
         table[item.name] = json.loads(json.dumps(item.written(value)))
     return table

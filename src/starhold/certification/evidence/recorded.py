@@ -73,7 +73,7 @@ class RecordedLoop:
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
         if driven is not None:
-            told, noise = (V3,) * driven.recursion.size, (V3,) * 3
+            told, noise = (V3,) * driven.recursion.size, (V3,) * driven.recursion.noises
             found[CARRIED] = self.add(driven.recursion.carried, errors=told, noise=noise)
             found[CORRECTED] = self.add(driven.recursion.corrected, errors=told, noise=noise)
         return found

@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, vector_part
-from starhold.algebra.scalar import Scalar, both, less, opposite, side, where
-from starhold.algebra.vector import ZERO, Vector, scale, subtract
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
+from starhold.algebra.scalar import Scalar, both, less, opposite, where
+from starhold.algebra.vector import IDENTITY, ZERO, Vector, scale, subtract
+from starhold.parts.attitudes import attitudes_of, small_turn, together
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, unit_quaternion
@@ -18,13 +19,14 @@ CARD = Card(
     summary="q' = q (w_m - b)/2 + attitude_gain e, b' = -bias_gain e, e from each new attitude",
     sources=("Nonlinear Complementary Filters on the Special Orthogonal Group (2008)",),
     assumptions=(
-        "attitudes come without delay",
+        "attitudes come without delay; of several that are new at once the mean is taken",
         "the bias changes slowly",
         "the first attitude measured takes the place of the one stated for the start",
     ),
 )
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
+SEVERAL = {"attitude": ""}
 FIRST = {"gyro_bias": ZERO}
 
 
@@ -66,13 +68,12 @@ def remember(params: Params, state: Any) -> Memory:
 
 def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
     """The estimate at a control step, and the prediction for the next."""
-    measured = readings.attitude
-    # A sensor that does not say whether its attitude is new gives a new one at each control step.
-    new = less(0.5, getattr(readings, "attitude_is_new", 1.0))
+    (measured, new), *others = seen = attitudes_of(readings)
+    if others:
+        measured, _, new = together(seen, [IDENTITY] * len(seen))
     first = both(new, opposite(less(0.5, memory.begun)))
     foretold: Any = tuple(where(first, x, old) for x, old in zip(measured, memory.attitude, strict=True))
-    error = relative(foretold, measured)
-    turn = scale(2.0 * side(error[0]), vector_part(error))
+    turn = small_turn(foretold, measured)
     half = scale(where(new, 0.5 * params.attitude_gain, 0.0), turn)
     attitude = normalise(multiply(foretold, (1.0, *half)))
     bias = subtract(memory.bias, scale(where(new, params.bias_gain * period, 0.0), turn))

@@ -1,19 +1,19 @@
 """Attitude and gyro bias by the multiplicative extended Kalman filter: the gyro carries the attitude on, each new
-attitude of the star tracker corrects both, by gains that follow from their covariances."""
+attitude of the star trackers corrects both, by gains that follow from their covariances."""
 
 from __future__ import annotations
 
 import math
-from functools import cache
-from typing import Annotated, Any, NamedTuple
+from functools import cache, reduce
+from typing import Annotated, Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
 from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, relative, renormalise, vector_part
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, renormalise
 from starhold.algebra.rotation import short_turn
-from starhold.algebra.scalar import Scalar, less, maximum, side, sqrt
+from starhold.algebra.scalar import Scalar, Truth, less, maximum, sqrt
 from starhold.algebra.structure import chosen
 from starhold.algebra.structured import when
 from starhold.algebra.vector import (
@@ -32,6 +32,7 @@ from starhold.algebra.vector import (
     transpose,
 )
 from starhold.algebra.vector import multiply as product
+from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
 from starhold.parts.contract import Card, Noise, Parameter, Recursion
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, unit_quaternion
@@ -44,21 +45,24 @@ CARD = Card(
         "Kalman Filtering for Spacecraft Attitude Estimation (1982)",
     ),
     assumptions=(
-        "errors of gyro and star tracker are white, of the deviations that the filter assumes",
+        "errors of gyro and star trackers are white, of the deviations that the filter assumes",
         "attitudes come without delay",
         "the rate changes in proportion to time between control steps",
         "the error of the attitude is small",
-        "the first attitude of the star tracker takes the place of the one stated for the start",
+        "the first attitude of a star tracker takes the place of the one stated for the start",
     ),
 )
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
+SEVERAL = {"attitude": "more_trackers"}
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO}
 HOUR = 3600.0
 MOST = 100_000
 """Control periods after which a filter has settled, or does not."""
 UNKNOWN = math.sqrt(math.pi**2 / 9.0 + 2.0 / 3.0)
 """Standard deviation about each axis (rad) of the rotation vector of an attitude that may be any."""
+
+Tracker: TypeAlias = tuple[float, float, float, float, float]
 
 
 class Params(NamedTuple):
@@ -78,12 +82,21 @@ class Params(NamedTuple):
     start_deviation: Annotated[
         float, Parameter("rad", above=0.0, text="of that attitude: deviation about each axis; 76 deg if nothing is known")
     ] = UNKNOWN
+    more_trackers: Annotated[
+        tuple[Tracker, ...],
+        Parameter(
+            "rad, 1",
+            columns=("cross", "roll", "x", "y", "z"),
+            text="a row for each star tracker after the first, in their order: its deviations (rad) and boresight",
+        ),
+    ] = ()
 
 
 class Numbers(NamedTuple):
     """The attitude stated for the start. Variances: of it (rad2), of the bias then (rad2/s2), of the tracker's attitude
     (rad2, body axes), and what the noise of one reading of the gyro adds to that of the attitude; what the walk of the bias
-    adds in a control period to those of attitude, attitude with bias, and bias."""
+    adds in a control period to those of attitude, attitude with bias, and bias. The inverse variances of all trackers'
+    attitudes (1/rad2), where there are several."""
 
     start: Quaternion
     start_turn: Scalar
@@ -93,6 +106,7 @@ class Numbers(NamedTuple):
     turned: Scalar
     mixed: Scalar
     walked: Scalar
+    weights: tuple[Matrix, ...] = ()
 
 
 class Estimate(NamedTuple):
@@ -143,19 +157,29 @@ class Instant(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for a boresight without direction, or a start that is no quaternion."""
-    size = math.hypot(*params.boresight)
-    if not size > 0.0:
-        raise ValueError("the boresight needs a direction")
-    axis = scale(1.0 / size, params.boresight)
-    tracker = along_axis(axis, params.roll**2, params.cross**2)
+    """The numbers of a control step. ValueError for a boresight without direction, a start that is no quaternion, or a
+    further tracker without noise."""
+    trackers = [spread_of(params.cross, params.roll, params.boresight)]
+    for cross, roll, *boresight in params.more_trackers:
+        if not min(cross, roll) > 0.0:
+            raise ValueError("the deviations of more_trackers must be above 0")
+        trackers.append(spread_of(cross, roll, cast(Vector, tuple(boresight))))
     # The rate between two readings is their mean: each turns the attitude by its noise for half a period, and so does the
     # step of the bias between them.
     walk = params.bias_walk**2 / HOUR * period
     reading = 0.25 * params.noise**2 * period
     turned, mixed = 0.25 * walk * period**2, -0.5 * walk * period
     start = unit_quaternion(params.start)
-    return Numbers(start, params.start_deviation**2, params.bias**2, tracker, reading, turned, mixed, walk)
+    weights = tuple(map(inverse, trackers)) if params.more_trackers else ()
+    return Numbers(start, params.start_deviation**2, params.bias**2, trackers[0], reading, turned, mixed, walk, weights)
+
+
+def spread_of(cross: float, roll: float, boresight: Vector) -> Matrix:
+    """The covariance of the error of a star tracker's attitude (rad2, body axes)."""
+    size = math.hypot(*boresight)
+    if not size > 0.0:
+        raise ValueError("the boresight needs a direction")
+    return along_axis(scale(1.0 / size, boresight), roll**2, cross**2)
 
 
 def remember(params: Numbers, state: Any) -> Memory:
@@ -168,9 +192,7 @@ def remember(params: Numbers, state: Any) -> Memory:
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
     """The estimate at a control step."""
-    measured = readings.attitude
-    # A sensor that does not say whether its attitude is new gives a new one at each control step.
-    new = less(0.5, getattr(readings, "attitude_is_new", 1.0))
+    measured, new, params = latest(readings, params)
     foretold = propagated(memory, readings.rate, params, period)
     before = chosen(less(0.5, memory.stage), foretold, memory)._replace(rate=readings.rate, stage=maximum(memory.stage, 1.0))
 
@@ -183,6 +205,15 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
     after = now.memory
     rate = subtract(subtract(readings.rate, after.bias), now.noise)
     return Estimate(now.attitude, rate, after.bias, deviations(now.turn), deviations(after.walk)), after
+
+
+def latest(readings: Any, params: Numbers) -> tuple[Quaternion, Truth, Numbers]:
+    """The attitude by all star trackers, whether it is new, and the numbers with its covariance for that of one tracker."""
+    seen = attitudes_of(readings)
+    if not params.weights:
+        return (*seen[0], params)
+    measured, spread, new = together(seen, params.weights)
+    return measured, new, params._replace(tracker=spread)
 
 
 def arrived(before: Memory, params: Numbers) -> Instant:
@@ -201,8 +232,7 @@ def taken(now: Instant, measured: Quaternion, params: Numbers) -> Instant:
 def corrected(now: Instant, measured: Quaternion, params: Numbers, period: Scalar) -> Instant:
     """The estimate of attitude, bias and noise, corrected by a new attitude."""
     before = now.memory
-    error = relative(now.attitude, measured)
-    turn = scale(2.0 * side(error[0]), vector_part(error))
+    turn = small_turn(now.attitude, measured)
     gain = gains(now, params)
     memory = before._replace(
         attitude=turned_by(now.attitude, apply(gain.ahead, turn)),
@@ -257,13 +287,21 @@ def turned(rate: Vector, period: Scalar) -> tuple[Quaternion, Matrix, Matrix]:
 
 
 def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recursion | None:
-    """How noise of gyro and star tracker drives the errors of attitude and bias and that of the gyro's last reading, at a
-    constant rate (rad/s, body axes) of a filter that has settled; None for one that does not."""
+    """How noise of gyro and star trackers drives the errors of attitude and bias and that of the gyro's last reading, at a
+    constant rate (rad/s, body axes) of a filter that has settled; None for one that does not, or that counts other trackers
+    than there are."""
     numbers = prepare(params, period)
+    if len(params.more_trackers) != len(noise.more):
+        return None
+    seen = [noise.attitude]
+    if noise.more:
+        numbers = numbers._replace(tracker=inverse(reduce(summed, numbers.weights)))
+        shares = [product(numbers.tracker, weight) for weight in numbers.weights]
+        seen = [product(share, root) for share, root in zip(shares, (noise.attitude, *noise.more), strict=True)]
     gain = settled(numbers, noise.every, rate, period)
     if gain is None:
         return None
-    (_, axes, drift), (attitude, _, reading, walk, _) = turned(rate, period), noise
+    (_, axes, drift), reading, walk = turned(rate, period), noise.rate, noise.walk
     known = -2.0 * numbers.reading / period
 
     def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
@@ -274,13 +312,13 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
 
     def corrected(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         (ahead, bias, now), *_ = carried(errors, random)
-        deviation = subtract(apply(attitude, random[2]), ahead)
+        deviation = subtract(reduce(add, map(apply, seen, random[2:])), ahead)
         bias = add(bias, apply(gain.bias, deviation))
         rate = subtract(subtract(now, bias), scale(known, apply(gain.sure, deviation)))
         kept = (add(ahead, apply(gain.ahead, deviation)), bias, now)
         return kept, add(ahead, apply(gain.turn, deviation)), rate
 
-    return Recursion(corrected, carried, noise.every, 3)
+    return Recursion(corrected, carried, noise.every, 3, 2 + len(seen))
 
 
 @cache
@@ -297,11 +335,6 @@ def settled(params: Numbers, every: int, rate: Vector, period: float) -> Gains |
             return gain
         before = gain
     return None
-
-
-def turned_by(attitude: Quaternion, turn: Vector) -> Quaternion:
-    """Return an attitude turned on by a small rotation vector (rad, body axes)."""
-    return normalise(multiply(attitude, (1.0, *scale(0.5, turn))))
 
 
 def summed(a: Matrix, b: Matrix) -> Matrix:

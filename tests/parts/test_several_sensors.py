@@ -1,0 +1,127 @@
+"""Loops with several star trackers: what filters make of them, what is recorded, and what flies in all forms."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.spatial.transform import Rotation
+
+import starhold as sh
+from starhold.conformance.verdicts import agree
+from starhold.scenario import reading
+from starhold.scenario.building import build
+
+ARCSEC = math.radians(1.0 / 3600.0)
+GYRO = {"type": "gyro", "noise": 2e-5, "bias_walk": 1e-4}
+MEKF = {"type": "mekf", "noise": 2e-5, "bias_walk": 1e-4, "bias": 3e-4}
+
+
+def tracker(cross, roll, boresight=(0.0, 0.0, 1.0), **more):
+    return {"type": "star-tracker", "cross": cross, "roll": roll, "boresight": list(boresight)} | more
+
+
+def row(table):
+    return [table["cross"], table["roll"], *table["boresight"]]
+
+
+def scenario(*parts, orbit=None, **simulation):
+    """A body that turns, with these parts."""
+    return sh.scenario(
+        {
+            "name": "several",
+            "spacecraft": {"inertia": [2.0, 3.0, 4.0], "torque_limit": 0.02},
+            "initial": {"angles": [0.7, 0.0, 0.2], "rate": [0.01, -0.02, 0.01]},
+            "simulation": {"duration": "40 s", "control_period": 0.5} | simulation,
+            "part": list(parts),
+            "law": [{"type": "lyapunov", "k_rate": 0.2, "k_attitude": 0.03}],
+        }
+        | ({} if orbit is None else {"orbit": orbit})
+    )
+
+
+FIRST, SECOND = tracker(10.0 * ARCSEC, 80.0 * ARCSEC), tracker(6.0 * ARCSEC, 60.0 * ARCSEC, (1.0, 0.0, 0.0), interval=1.5)
+FILTER = MEKF | {"cross": FIRST["cross"], "roll": FIRST["roll"], "boresight": FIRST["boresight"]}
+TWO = FILTER | {"more_trackers": [row(SECOND)]}
+
+
+def errors(run):
+    """The errors of the estimated attitude (rad, body axes) at all samples."""
+    true, told = (Rotation.from_quat(run[name].values, scalar_first=True) for name in ("attitude", "mekf_attitude"))
+    return (true.inv() * told).as_rotvec()
+
+
+def test_errors_of_two_trackers_are_as_large_as_the_filter_says():
+    random, found = np.random.default_rng(5), []
+    for seed in range(60):
+        gyro = GYRO | {"bias": random.normal(scale=3e-4, size=3).tolist()}
+        run = sh.simulate(scenario(gyro, FIRST, SECOND, TWO, seed=seed + 1))
+        found.append(errors(run)[-1] / run["mekf_attitude_deviation"].values[-1])
+    low, high = stats.chi2(180).ppf([0.0005, 0.9995])
+    assert low < np.square(found).sum() < high
+
+
+def test_two_equal_trackers_are_one_of_half_the_variance():
+    own, half = tracker(10.0 * ARCSEC, 10.0 * ARCSEC), 10.0 * ARCSEC / math.sqrt(2.0)
+    even = MEKF | {"cross": own["cross"], "roll": own["roll"]}
+    pair = sh.simulate(scenario(GYRO, own, own, even | {"more_trackers": [row(own)]}))
+    one = sh.simulate(scenario(GYRO, tracker(half, half), MEKF | {"cross": half, "roll": half}))
+    names = ("mekf_attitude_deviation", "mekf_gyro_bias_deviation")
+    for name in names:
+        # The axes turn with another estimate of the rate.
+        assert pair[name].values[1:] == pytest.approx(one[name].values[1:], rel=1e-4)
+    alone = sh.simulate(scenario(GYRO, own, even))
+    assert (alone[names[0]].values[5:] > 1.1 * pair[names[0]].values[5:]).all()
+
+
+def test_what_a_second_tracker_sees_is_used_while_the_first_sees_nothing():
+    blind = FIRST | {"outage": [0.0, 100.0]}
+    run = sh.simulate(scenario(GYRO, blind, SECOND, TWO))
+    assert not run["star_tracker_attitude_is_new"].values.any()
+    assert np.abs(errors(run)[-1]).max() < 100.0 * ARCSEC
+    order = FILTER | {"cross": SECOND["cross"], "roll": SECOND["roll"], "boresight": SECOND["boresight"]}
+    swapped = sh.simulate(scenario(GYRO, SECOND, blind, order | {"more_trackers": [row(FIRST)]}))
+    deviations = (one["mekf_attitude_deviation"].values[1:] for one in (run, swapped))
+    assert np.abs(np.divide(*deviations) - 1.0).max() < 1e-3
+
+
+def test_columns_are_called_after_the_parts():
+    run = sh.simulate(scenario(GYRO, FIRST, SECOND | {"name": "side"}, TWO))
+    first, second = (
+        Rotation.from_quat(run[f"{name}_attitude"].values, scalar_first=True) for name in ("star_tracker", "side")
+    )
+    assert run["side_attitude_is_new"].values[1:].mean() == pytest.approx(1 / 3, abs=0.02)
+    # Each has random numbers of its own.
+    assert (first[1].inv() * second[1]).magnitude() > ARCSEC
+
+
+@pytest.mark.parametrize("estimator", [TWO, {"type": "complementary-filter", "attitude_gain": 0.2, "bias_gain": 0.01}])
+def test_all_forms_of_a_flight_agree(estimator):
+    given = scenario(GYRO, FIRST, SECOND, estimator)
+    loop = build(given, given.laws[0])
+    agree(loop, [loop.start] * 3, (0,))
+
+
+def test_complementary_filter_takes_the_mean():
+    filtered = {"type": "complementary-filter", "attitude_gain": 1.0, "bias_gain": 0.0}
+    run = sh.simulate(scenario(GYRO, FIRST, tracker(50.0 * ARCSEC, 50.0 * ARCSEC), filtered))
+    first, second, told = (
+        Rotation.from_quat(run[f"{name}_attitude"].values[1:], scalar_first=True)
+        for name in ("star_tracker", "star_tracker_2", "complementary_filter")
+    )
+    mean = first * Rotation.from_rotvec(0.5 * (first.inv() * second).as_rotvec())
+    assert (mean.inv() * told).magnitude().max() < 1e-9
+
+
+def test_second_magnetometer_is_recorded_where_nothing_reads_one_and_refused_elsewhere(tmp_path):
+    second = '\n[[part]]\ntype = "magnetometer"\nname = "boom"\nnoise = 1e-9\n'
+    builtin = Path(reading.__file__).parent / "builtin" / "cubesat-nadir.toml"
+    (tmp_path / "read.toml").write_text(builtin.read_text() + second)
+    with pytest.raises(sh.InputError, match="part boom: found a second sensor of magnetic_field, beside magnetometer"):
+        sh.simulate(tmp_path / "read.toml", "wheel")
+    orbit = {"position": [6.9e6, 0.0, 0.0], "velocity": [0.0, 5.0e3, 5.7e3]}
+    magnetometers = [{"type": "magnetometer", "noise": 1e-8}, {"type": "magnetometer", "noise": 1e-9, "name": "boom"}]
+    run = sh.simulate(scenario(*magnetometers, orbit=orbit))
+    apart = (run["magnetometer_magnetic_field"] - run["boom_magnetic_field"]).values[1:]
+    assert 0.8e-8 < apart.std() < 1.2e-8
