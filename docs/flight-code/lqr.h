@@ -16,7 +16,7 @@
 
    Program of the law: sha256 851ab1c92f50234498ca20e7141e8ad0edc5898615f514d663a47b1df0e15661
 
-   Certificate: certificate.json, sha256 131ed2f566024c5787b07713c4bbbec7ad9898b3aa8646f298e6436e1e360cf9:
+   Certificate: certificate.json, sha256 a77cc222d9fa719032436149e4ecc3197bded1e545824d052a38028538952566:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -14,7 +14,7 @@
 
    Program of the law: sha256 d5137098524b4413b6d496ad62634b43647fe728da0c5962b960f411facfefe2
 
-   Certificate: certificate.json, sha256 d1b2e2cde6b92497c9a5881cadc709752637e9dc5f10941c19c40d710bbfa290:
+   Certificate: certificate.json, sha256 c162a597f0643d4eecc5646440141836dcecc9340fbf21329ce7d4261123de72:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

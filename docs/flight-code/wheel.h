@@ -14,7 +14,7 @@
 
    Program of the law: sha256 4f874e55fa16eec8b64cc78923eef683c9775f1cdd52baf71d83b3a67f9942c4
 
-   Certificate: certificate.json, sha256 6860158dceeacb39f0d70478149ac3ff65e928ed4f54a1fb0cd7080fe8576d4f:
+   Certificate: certificate.json, sha256 5bf166e1d098561950e51b6e95fa9b7a9998e25a74421d1e515cfbc9de362729:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
