@@ -105,7 +105,7 @@ def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) ->
     """Numbers (of the key's shape) of a raw value that need not be within the key's bounds, such as a standard deviation; in
     the key's unit, or in the one given. InputError calls it by `name`."""
     gain = place.gain or Gain()
-    read: Callable[..., Any] = reader(Gain(gain.unit if unit is None else unit))
+    read: Callable[..., Any] = reader(Gain(gain.unit, also=gain.also) if unit is None else Gain(unit))
     worth = place.worth if unit is None else 1.0
 
     def number(item: Any) -> float:
