@@ -63,8 +63,8 @@ def allan_deviation(rates, count):
 
 
 def test_the_allan_deviation_of_the_gyro_is_that_of_its_data_sheet():
-    """IEEE 952: angle random walk N and rate random walk K give N^2/t + K^2 t/3 as its square over an averaging time t. At 3 s
-    the one is all of it, at 300 s the other, and between them both."""
+    """IEEE 952: angle random walk N and rate random walk K give N^2/t + K^2 t/3 as its square over an averaging time t. At
+    3 s the one is all of it, at 300 s the other, and between them both."""
     walk, rate_walk, period, count = math.radians(0.15) / 60.0, math.radians(30.0) / 3600.0 / 60.0, 1.0, 30_000
     params = gyro.prepare(gyro.Params(noise=walk, bias_walk=rate_walk * 60.0), period)
     still, memory, rates = SimpleNamespace(rate=ZERO), ZERO, []

@@ -1,6 +1,8 @@
 """Quantities: numbers and units are read strictly, and only what a unit is worth is asked of the library."""
 
+import json
 import math
+import re
 
 import pint
 import pytest
@@ -11,6 +13,7 @@ import starhold as sh
 from starhold.scenario import units
 from starhold.scenario.reading import builtin_text, parse
 from starhold.scenario.units import LONGEST, to_number
+from starhold.scenario.values import locate
 from tests.refusals import rows
 
 REGISTRY = pint.UnitRegistry(cache_folder=":auto:")
@@ -152,6 +155,25 @@ def test_a_plain_field_in_nanotesla_is_asked_for_its_unit():
     noisy = {"type": "magnetometer", "noise": 50.0}
     with pytest.raises(sh.InputError, match=r'noise: found 50.0; .*"50 nT" or "50 T"$'):
         sh.load("cubesat-detumble").with_({"part": [noisy]})
+
+
+LARGE = rows("""
+spacecraft.inertia | [5e9, 5e9, 4e9] | 5e+09 | g cm^2 | kg m^2
+wheels.inertia | 20.0 | 20 | g cm^2 | kg m^2
+wheels.torque_limit | 20.0 | 20 | mN m | N m
+wheels.momentum_limit | 4000.0 | 4000 | mN m s | N m s
+""")
+
+
+@pytest.mark.parametrize(("key", "value", "number", "meant", "unit"), LARGE)
+def test_a_plain_number_far_above_its_kind_is_asked_for_its_unit(key, value, number, meant, unit):
+    scenario, value = sh.load("wheels-orbital").with_({"spacecraft.inertia": [1e4, 1e4, 1e4]}), json.loads(value)
+    allowed = re.escape(f'with a unit it is "{number} {meant}" or "{number} {unit}"')
+    with pytest.raises(sh.InputError, match=rf"{re.escape(key)}: found .*{allowed}$"):
+        scenario.with_({key: value})
+    # What states its unit is taken; so is what a campaign draws, which states it where it has to.
+    place = locate(scenario, key)
+    assert locate(scenario.with_(place.change(value)), key).value == (tuple(value) if isinstance(value, list) else value)
 
 
 @given(st.text("0123456789.eE+-_*^/() sNmkgrade°²⁻", max_size=30), st.sampled_from(["s", "N m", "rad", "1", "1/(N m)^2"]))

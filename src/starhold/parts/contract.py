@@ -128,6 +128,9 @@ class Parameter:
     """The meaning, for listings and pages."""
     spread: bool = True
     """Whether a number stands for a vector of equal numbers."""
+    plain: tuple[float, str] | None = None
+    """The largest number that a file may hold without its unit, well above any of its kind, and the unit that a larger one
+    may be meant in."""
     columns: tuple[str, ...] = ()
     """The names of a table's columns. The table is given as rows, or as the name of a CSV file of them."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""

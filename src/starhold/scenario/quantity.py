@@ -15,12 +15,8 @@ from starhold.scenario.units import shown, to_either, to_number
 
 LEAST, MOST = 1e-30, 1e30
 """Sizes of quantities that files may hold, beside zero; of a vector or matrix the size of its largest entry."""
-PLAIN = {
-    "rad": (math.tau, "within 2 pi", "deg"),
-    "T": (1e-3, "within 0.001", "nT"),
-    "T/sqrt(Hz)": (1e-6, "within 1e-06", "nT/sqrt(Hz)"),
-}
-"""By unit: the largest plain number that is taken, this bound in words, and the unit that a larger one may be meant in."""
+PLAIN = {"rad": (math.tau, "deg"), "T": (1e-3, "nT"), "T/sqrt(Hz)": (1e-6, "nT/sqrt(Hz)")}
+"""By unit: the largest plain number that is taken, and the unit that a larger one may be meant in."""
 MOST_WHOLE = 2**53
 """Up to here floats hold every whole number."""
 
@@ -120,10 +116,16 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
         return (to_either(value, gain.unit, gain.also) if gain.also else to_number(value, gain.unit)) / worth
     if gain.whole and abs(value) > MOST_WHOLE:
         raise ValueError("at most 2^53")
-    most, within, unit = PLAIN.get(gain.unit, (math.inf, "", ""))
-    if abs(value) > most:
-        raise ValueError(ask_for_unit(value, gain.unit, within, unit))
+    most, unit = plain(gain)
+    if most < abs(value) < math.inf:
+        within = "2 pi" if most == math.tau else f"{most:g}"
+        raise ValueError(ask_for_unit(value, gain.unit, f"within {within}", unit))
     return value
+
+
+def plain(gain: Gain) -> tuple[float, str]:
+    """The largest plain number that is taken, and the unit that a larger one may be meant in."""
+    return gain.plain or PLAIN.get(gain.unit, (math.inf, ""))
 
 
 def ask_for_unit(value: float, unit: str, within: str, other: str) -> str:
