@@ -117,7 +117,7 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
     if gain.whole and abs(value) > MOST_WHOLE:
         raise ValueError("at most 2^53")
     most, unit = plain(gain)
-    if most < abs(value) < math.inf:
+    if most < abs(value) <= MOST:
         within = "2 pi" if most == math.tau else f"{most:g}"
         raise ValueError(ask_for_unit(value, gain.unit, f"within {within}", unit))
     return value
