@@ -29,7 +29,7 @@ def keys(fields: list[Field]) -> list[str]:
     for item in fields:
         default = item.gain.choices[item.default] if item.gain.choices and not item.required else item.default
         shown = "required" if item.required else f"`{default}`"
-        lines.append(f"| `{item.name}` | {item.gain.unit} | {item.gain.text} | {shown} |")
+        lines.append(f"| `{item.name}` | {item.gain.units} | {item.gain.text} | {shown} |")
     return lines
 
 

@@ -67,9 +67,14 @@ def random_scenario(random, folder):
         lines.append(f"attitude = {numbers(unit(random))}")
     if maybe(0.4):
         lines += ["[wheels]", f'layout = "{some("orthogonal", "pyramid", "nasa-standard")}"']
-        lines += [f"inertia = {size(1e-5, 1e-2) * scale:.6g}", f"momentum = {some(0.0, size(1e-5, 1e-2) * scale):.6g}"]
-        lines += [f"torque_limit = {size(1e-4, 1e-1) * scale:.6g}" if maybe(0.8) else "torque_limit = 1e9"]
-        lines += [f"momentum_limit = {size(1e-3, 1.0) * scale:.6g}" if maybe(0.7) else "momentum_limit = 1e9"]
+        lines += [
+            f'inertia = "{size(1e-5, 1e-2) * scale:.6g} kg m^2"',
+            f"momentum = {some(0.0, size(1e-5, 1e-2) * scale):.6g}",
+        ]
+        lines += [f'torque_limit = "{size(1e-4, 1e-1) * scale:.6g} N m"' if maybe(0.8) else 'torque_limit = "1e9 N m"']
+        lines += [
+            f'momentum_limit = "{size(1e-3, 1.0) * scale:.6g} N m s"' if maybe(0.7) else 'momentum_limit = "1e9 N m s"'
+        ]
         lines += [f"viscous = {size(1e-8, 1e-4) * scale:.6g}"] if maybe(0.2) else []
         lines += ['allocation = "least-peak"'] if maybe(0.15) else []
     lines += ["[simulation]", f"duration = {steps * period!r}", f"control_period = {period!r}"]

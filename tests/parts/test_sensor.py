@@ -1,4 +1,4 @@
-"""The Gaussian sensor and the random torque: errors of the stated size, and the same for the same seed, run and step."""
+"""Sensors and the random torque: errors of the stated size, and the same for the same seed, run and step."""
 
 import math
 from types import SimpleNamespace
@@ -13,7 +13,7 @@ from starhold.algebra.quaternion import relative, stretch
 from starhold.algebra.vector import ZERO, add
 from starhold.parts.environments import random_torque
 from starhold.parts.random import Dice, normal_vector
-from starhold.parts.sensors import gaussian
+from starhold.parts.sensors import gaussian, gyro, magnetometer
 from tests.algebra.readers import quaternions, small_vectors
 
 KEY = 7, 2
@@ -54,3 +54,35 @@ def test_a_random_torque_has_places_of_its_own(step):
     for deviation in (0.02, 0.0):
         found = random_torque.update(ZERO, None, random_torque.Params(deviation), Dice(KEY, step, 0), step)
         assert found == drawn(0, step, deviation)
+
+
+def allan_deviation(rates, count):
+    """Of averages of so many readings, over all axes; rates: (readings, axes)."""
+    means = rates[: len(rates) // count * count].reshape(-1, count, rates.shape[1]).mean(axis=1)
+    return math.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2))
+
+
+def test_the_allan_deviation_of_the_gyro_is_that_of_its_data_sheet():
+    """IEEE 952: angle random walk N and rate random walk K give N^2/t + K^2 t/3 as its square over an averaging time t. At
+    3 s the one is all of it, at 300 s the other, and between them both."""
+    walk, rate_walk, period, count = math.radians(0.15) / 60.0, math.radians(30.0) / 3600.0 / 60.0, 1.0, 30_000
+    params = gyro.prepare(gyro.Params(noise=walk, bias_walk=rate_walk * 60.0), period)
+    still, memory, rates = SimpleNamespace(rate=ZERO), ZERO, []
+    for step in range(count):
+        reading, memory = gyro.measure(still, memory, params, Dice(KEY, step, 0), step)
+        rates.append(reading.rate)
+    for time in (3.0, 30.0, 300.0):
+        expected = math.sqrt(walk**2 / time + rate_walk**2 * time / 3.0)
+        # Averages beside each other, white ones at worst: two thirds of them, of each axis, are degrees of freedom.
+        deviation = 1.0 / math.sqrt(2.0 * 3.0 * (2.0 / 3.0) * count * period / time)
+        found = allan_deviation(np.array(rates), round(time / period))
+        assert found == pytest.approx(expected, rel=3.0 * deviation)
+
+
+@given(st.floats(1e-12, 1e-6), st.floats(0.01, 10.0))
+def test_a_density_is_the_power_below_half_the_rate_of_readings(density, period):
+    deviation = density * math.sqrt(0.5 / period)
+    alone, both = (magnetometer.Params(noise=noise, noise_density=density) for noise in (0.0, 2.0 * deviation))
+    assert magnetometer.prepare(alone, period).noise == pytest.approx(deviation, rel=1e-14)
+    assert magnetometer.noise(both, period).field == pytest.approx(math.sqrt(5.0) * deviation, rel=1e-14)
+    assert magnetometer.prepare(magnetometer.Params(noise=density), period).noise == density

@@ -145,6 +145,9 @@ semi_major_axis = 7e6↵eccentricity = 2↵inclination = 1 | orbit.semi_major_ax
 semi_major_axis = -7e6↵eccentricity = 2↵inclination = 1↵true_anomaly = 2.2 | orbit.true_anomaly | 120
 altitude = 5e5↵inclination = 97 | orbit.inclination | "97 deg"
 altitude = 620↵inclination = 1 | orbit.altitude: found 620 | "620 km" or "620 m"
+altitude = "620 m"↵inclination = 1 | orbit.altitude: found "620 m" | 620 m is inside; is 620 km meant
+altitude = "0.62 km"↵inclination = 1 | orbit.altitude | is 620 km meant
+altitude = "35.786 km"↵inclination = 1 | orbit.altitude | is 35786 km meant
 altitude = 35786.0↵inclination = 0 | orbit.altitude | "35786 km"
 position = [7000, 0, 0]↵velocity = [0, 7550, 0] | orbit.position | 6378.14 km | in m
 semi_major_axis = 7000↵inclination = 1 | orbit.semi_major_axis | in m

@@ -1,6 +1,8 @@
 """Quantities: numbers and units are read strictly, and only what a unit is worth is asked of the library."""
 
+import json
 import math
+import re
 
 import pint
 import pytest
@@ -11,6 +13,7 @@ import starhold as sh
 from starhold.scenario import units
 from starhold.scenario.reading import builtin_text, parse
 from starhold.scenario.units import LONGEST, to_number
+from starhold.scenario.values import locate
 from tests.refusals import rows
 
 REGISTRY = pint.UnitRegistry(cache_folder=":auto:")
@@ -79,6 +82,16 @@ SAME = rows("""
 1 N m/(rad/s) | 1 N m s | N m s
 2 1/s | 2 rad/s | rad/s
 398600 km^3/s^2 | 3.986e14 m^3/s^2 | m^3/s^2
+60 °/√h | 1 deg/s/√Hz | rad/sqrt(s)
+60 deg/sqrt(h) | 1 deg/s^0.5 | rad/sqrt(s)
+60 deg/h^(1/2) | 1 deg s^-0.5 | rad/sqrt(s)
+60 deg h⁻¹ Hz^(-1/2) | 60 (deg/h)/√(Hz) | rad/sqrt(s)
+60 deg/(sqrt(h)) | 60 deg/h**.5 | rad/sqrt(s)
+60 deg/h/sqrt(h) | 60 deg/h^(3/2) | rad/s/sqrt(h)
+1 deg/h/√s | 60 deg/h^1.5 | rad/s/sqrt(h)
+9 sqrt(m^2 s^4) | 9 m s^2 | m s^2
+5 √kg m | 5 kg^0.5 m | kg^(1/2) m
+12 pT/√Hz | 0.012 nT/sqrt(Hz) | T/sqrt(Hz)
 """)
 
 
@@ -92,6 +105,7 @@ s | 9**9**9 s | 9 s**9**9 | 9 (s^9)^9 | 9 s^99 | 1 ((s)) | 1 s s s s s s s s s s
 s | 1 s^ | 1 (s | 1 s) | 1 s/ | 1 s//s | 1 __import__('os') | 1 degC | s | | 1 | 1 kg
 rad/s | 1 Hz | 1 kHz
 rad | 1 | 5 % | 1 1/s | 6 dB
+rad/sqrt(s) | 1 deg/h | 1 Hz | 1 1/s/sqrt(Hz) | 1 sqrt h | 1 sqrt(h | 1 deg/√ | 1 deg/√(√(h)) | 1 deg/h^(2/2) | 1 deg/h^0.25
 1 | 30 deg | 3 bit | 5 %^2 | 6 dB^2
 """)
 REFUSED += [["s", f"{'1' * LONGEST} s"]]
@@ -103,10 +117,63 @@ def test_what_is_no_quantity_is_refused_with_the_unit_that_is_asked_for(unit, te
         to_number(text, unit)
 
 
+def gyro(noise, walk=0.0):
+    part = {"type": "gyro", "noise": noise, "bias_walk": walk}
+    return sh.load("cubesat-detumble").with_({"part": [part]}).parts[0].params
+
+
+def test_the_random_walks_of_a_gyro_are_read_from_its_data_sheet():
+    """The angle that white noise makes up in a second, and the bias's change within an hour, are the sheet's numbers."""
+    found = gyro("0.15 deg/sqrt(h)", "3 deg/h/sqrt(h)")
+    assert found.noise == pytest.approx(math.radians(0.15) / 60.0, rel=1e-15)
+    assert found.bias_walk == pytest.approx(math.radians(3.0) / 3600.0, rel=1e-15)
+    same = gyro("9 deg/h/√Hz", "3 deg/h")
+    assert (same.noise, same.bias_walk) == pytest.approx((found.noise, found.bias_walk), rel=1e-15)
+    assert gyro("1e-4 rad/s/sqrt(Hz)").noise == gyro("1e-4 rad/s").noise == 1e-4
+
+
+def test_what_is_no_random_walk_is_refused_with_both_units():
+    for wrong in ("0.15 deg/h/sqrt(h)", "0.15 deg", "0.15 deg/sqrt(m)", "0.15 furlong"):
+        with pytest.raises(sh.InputError, match=r"noise: found .*; allowed: a quantity in rad/s or in rad/sqrt\(s\)$"):
+            gyro(wrong)
+    with pytest.raises(sh.InputError, match=r"bias_walk: .*a quantity in rad/s or in rad/s/sqrt\(h\)$"):
+        gyro(0.0, "3 deg/sqrt(h)")
+
+
+def test_the_noise_of_a_magnetometer_is_a_deviation_or_a_density():
+    def read(**numbers):
+        return sh.load("cubesat-detumble").with_({"part": [{"type": "magnetometer"} | numbers]}).parts[0].params
+
+    assert read(noise_density="10 nT/√Hz").noise_density == pytest.approx(1e-8, rel=1e-15)
+    with pytest.raises(sh.InputError, match=r"noise: found .*; allowed: a quantity in T$"):
+        read(noise="10 nT/√Hz")
+    with pytest.raises(sh.InputError, match=r'noise_density: found 10.0; .*"10 nT/sqrt\(Hz\)"'):
+        read(noise_density=10.0)
+
+
 def test_a_plain_field_in_nanotesla_is_asked_for_its_unit():
     noisy = {"type": "magnetometer", "noise": 50.0}
     with pytest.raises(sh.InputError, match=r'noise: found 50.0; .*"50 nT" or "50 T"$'):
         sh.load("cubesat-detumble").with_({"part": [noisy]})
+
+
+LARGE = rows("""
+spacecraft.inertia | [5e9, 5e9, 4e9] | 5e+09 | g cm^2 | kg m^2
+wheels.inertia | 20.0 | 20 | g cm^2 | kg m^2
+wheels.torque_limit | 20.0 | 20 | mN m | N m
+wheels.momentum_limit | 4000.0 | 4000 | mN m s | N m s
+""")
+
+
+@pytest.mark.parametrize(("key", "value", "number", "meant", "unit"), LARGE)
+def test_a_plain_number_far_above_its_kind_is_asked_for_its_unit(key, value, number, meant, unit):
+    scenario, value = sh.load("wheels-orbital").with_({"spacecraft.inertia": [1e4, 1e4, 1e4]}), json.loads(value)
+    allowed = re.escape(f'with a unit it is "{number} {meant}" or "{number} {unit}"')
+    with pytest.raises(sh.InputError, match=rf"{re.escape(key)}: found .*{allowed}$"):
+        scenario.with_({key: value})
+    # What states its unit is taken; so is what a campaign draws, which states it where it has to.
+    place = locate(scenario, key)
+    assert locate(scenario.with_(place.change(value)), key).value == (tuple(value) if isinstance(value, list) else value)
 
 
 @given(st.text("0123456789.eE+-_*^/() sNmkgrade°²⁻", max_size=30), st.sampled_from(["s", "N m", "rad", "1", "1/(N m)^2"]))

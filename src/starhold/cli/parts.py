@@ -178,7 +178,7 @@ def _field_blocks(title: str, fields: Iterable[Field]) -> list[Block]:
         gain = item.gain
         allowed = ", ".join(gain.choices) or _bounds(gain)
         default = "required" if item.required else str(item.written(item.default))
-        rows.append((item.name, gain.unit, allowed, default, gain.text))
+        rows.append((item.name, gain.units, allowed, default, gain.text))
     return ["", Heading(title), _table(("key", "unit", "allowed", "default", "meaning"), rows)]
 
 

@@ -112,6 +112,9 @@ class Parameter:
 
     unit: str = "1"
     """The unit of plain numbers: "N m s", "1/s^2"; "1" for none."""
+    also: str = ""
+    """A further unit that strings may have, as data sheets give it, in which the quantity is the same number: a deviation
+    over a second in "rad/s" is that of white noise in "rad/sqrt(s)"."""
     above: float | None = None
     """Every number is greater."""
     at_least: float | None = None
@@ -129,6 +132,9 @@ class Parameter:
     """The meaning, for listings and pages."""
     spread: bool = True
     """Whether a number stands for a vector of equal numbers."""
+    plain: tuple[float, str] | None = None
+    """The largest number that a file may hold without its unit, well above any of its kind, and the unit that a larger one
+    may be meant in."""
     columns: tuple[str, ...] = ()
     """The names of a table's columns. The table is given as rows, or as the name of a CSV file of them."""
     dimension: Literal["", "length", "velocity", "acceleration", "time", "rate"] = ""
@@ -136,6 +142,11 @@ class Parameter:
     shared: str = ""
     """The key of a scenario, "orbit.epoch", that gives the number to all parts that declare it, in place of keys of
     their own tables, which scenarios without such a key use."""
+
+    @property
+    def units(self) -> str:
+        """The units in words."""
+        return f"{self.unit} or {self.also}" if self.also else self.unit
 
     def check(self, value: Any) -> Any:
         """Validate a value and convert it to the form that equations take; the ValueError says what is allowed."""

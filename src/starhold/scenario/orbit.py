@@ -21,6 +21,9 @@ DENSEST = 1e6
 """Mean density (kg/m3) above which a start lies inside the central body; planets have less than 6000."""
 LOWEST = 1.0 / 64.0
 """Plain altitudes below this share of the body's radius need a unit: about the Earth, below 100 km."""
+AIR = 5e4
+"""Altitude (m) below which nothing circles the Earth; that of any orbit up to the geostationary one, a thousand times too
+small, lies below."""
 FASTEST = 10.0
 """Speed over that of escape from the Sun, a planet or the Moon beyond which a unit is taken to be wrong."""
 STRAIGHT = 1e-9
@@ -116,6 +119,9 @@ class Orbit(Table):
         if isinstance(altitude, int | float) and orbit.surface is not None and altitude < LOWEST * orbit.surface:
             low = f"{LOWEST * orbit.surface:.6g} or more about this body"
             raise at_key("altitude", ask_for_unit(altitude, "m", low, "km"), altitude)
+        if orbit.altitude is not None and orbit.altitude < AIR and body_of(orbit.gravitational_parameter) == "Earth":
+            allowed = f"one above the atmosphere, which {orbit.altitude:.6g} m is inside; is {orbit.altitude:.6g} km meant?"
+            raise at_key("altitude", allowed, altitude)
         return orbit
 
     @model_validator(mode="after")

@@ -11,12 +11,12 @@ from pydantic.fields import FieldInfo
 
 from starhold.laws.interface import Gain
 from starhold.scenario.tables import refuse
-from starhold.scenario.units import shown, to_number
+from starhold.scenario.units import shown, to_either, to_number
 
 LEAST, MOST = 1e-30, 1e30
 """Sizes of quantities that files may hold, beside zero; of a vector or matrix the size of its largest entry."""
-PLAIN = {"rad": (math.tau, "within 2 pi", "deg"), "T": (1e-3, "within 0.001", "nT")}
-"""By unit: the largest plain number that is taken, this bound in words, and the unit that a larger one may be meant in."""
+PLAIN = {"rad": (math.tau, "deg"), "T": (1e-3, "nT"), "T/sqrt(Hz)": (1e-6, "nT/sqrt(Hz)")}
+"""By unit: the largest plain number that is taken, and the unit that a larger one may be meant in."""
 MOST_WHOLE = 2**53
 """Up to here floats hold every whole number."""
 
@@ -113,13 +113,19 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{gain.describe()} in {shown(gain.unit)}")
     if isinstance(value, str):
-        return to_number(value, gain.unit) / worth
+        return (to_either(value, gain.unit, gain.also) if gain.also else to_number(value, gain.unit)) / worth
     if gain.whole and abs(value) > MOST_WHOLE:
         raise ValueError("at most 2^53")
-    most, within, unit = PLAIN.get(gain.unit, (math.inf, "", ""))
-    if abs(value) > most:
-        raise ValueError(ask_for_unit(value, gain.unit, within, unit))
+    most, unit = plain(gain)
+    if most < abs(value) <= MOST:
+        within = "2 pi" if most == math.tau else f"{most:g}"
+        raise ValueError(ask_for_unit(value, gain.unit, f"within {within}", unit))
     return value
+
+
+def plain(gain: Gain) -> tuple[float, str]:
+    """The largest plain number that is taken, and the unit that a larger one may be meant in."""
+    return gain.plain or PLAIN.get(gain.unit, (math.inf, ""))
 
 
 def ask_for_unit(value: float, unit: str, within: str, other: str) -> str:
@@ -135,7 +141,7 @@ def _check_size(value: Any) -> None:
 
 
 def _schema(gain: Gain) -> dict[str, Any]:
-    described = {"description": f"{gain.text or 'quantity'} ({shown(gain.unit)})"}
+    described = {"description": f"{gain.text or 'quantity'} ({shown(gain.units)})"}
     if gain.choices:
         return {"enum": list(gain.choices)} | described
     number: dict[str, Any] = {"type": "integer" if gain.whole else "number"}

@@ -3,7 +3,8 @@ library only gives the worth of these units."""
 
 import hashlib
 import re
-from collections import Counter
+from collections import defaultdict
+from contextlib import suppress
 from functools import cache
 from typing import Any
 
@@ -13,7 +14,12 @@ MOST_POWER = 9
 """A unit's largest exponent, in all."""
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:_\d+)*(?:\.(?:\d+(?:_\d+)*)?)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _OVER = re.compile(r"(?:1\s*)?/\s*")
-_FACTOR = re.compile(r"(?:(?P<name>[^\W\d_]+(?:_[^\W\d_]+)*|[°%])|\((?P<group>[^()]*)\))(?:\^?(?P<power>-?[0-9]))?")
+_FACTOR = re.compile(
+    r"(?P<root>√\s*|sqrt\s*(?=\())?"
+    r"(?:(?P<name>[^\W\d_]+(?:_[^\W\d_]+)*|[°%])|\((?P<group>(?:[^()]|(?<=sqrt)\([^()]*\))*)\))"
+    r"(?:\^(?P<halves>-?[0-9]?\.5)|\^?(?P<power>-?[0-9]))?"
+)
+_HALVES = re.compile(r"\^\((-?[13579])/2\)")
 _JOINT = re.compile(r"\s*[*·⋅/]\s*|\s+|[.-]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOGETHER = re.compile(r"(?P<force>[nuµμmkM]?N)m(?P<time>s?)|(?P<mass>k?g)m")
@@ -59,6 +65,14 @@ def to_number(text: str, unit: str) -> float:
     return _convert(value, _powers(given, unit), unit)
 
 
+def to_either(text: str, unit: str, also: str) -> float:
+    """The worth of a text in a unit, or in another one of which the number is the same; ValueError names both."""
+    for wanted in (unit, also):
+        with suppress(ValueError):
+            return to_number(text, wanted)
+    raise ValueError(f"a quantity in {shown(unit)} or in {also}")
+
+
 def apart(text: str) -> tuple[float, str]:
     """The number and the unit of a text that `to_number` takes, as they are written."""
     number = _NUMBER.match(text.strip())
@@ -76,29 +90,33 @@ def _allowed(unit: str) -> str:
 
 
 @cache
-def _powers(given: str, unit: str) -> dict[str, int]:
+def _powers(given: str, unit: str) -> dict[str, float]:
     """The units of a text with their exponents; `unit` is the one that errors name."""
     given = re.sub(f"[{'⁰¹²³⁴⁵⁶⁷⁸⁹⁻'}]+", lambda raised: "^" + raised[0].translate(_RAISED), given)
-    powers = _read(re.sub(r"\s*(?:\*\*|\^)\s*", "^", given), unit) if given else {}
+    given = re.sub(r"\s*(?:\*\*|\^)\s*", "^", given)
+    given = _HALVES.sub(lambda halves: f"^{int(halves[1]) / 2}", given)
+    powers = _read(given, unit) if given else {}
     if any(abs(power) > MOST_POWER for power in powers.values()):
         raise ValueError(_allowed(unit))
     return {name: power for name, power in powers.items() if power}
 
 
-def _read(given: str, unit: str) -> Counter[str]:
-    """Factors from left to right; of a group in parentheses, which has none within, all."""
-    powers: Counter[str] = Counter()
+def _read(given: str, unit: str) -> dict[str, float]:
+    """Factors from left to right; of a group in parentheses, which has none within but a root's, all."""
+    powers: defaultdict[str, float] = defaultdict(int)
     over = _OVER.match(given)
     sign, place = (-1, over.end()) if over else (1, 0)
     while factor := _FACTOR.match(given, place):
-        power = int(factor["power"] or 1)
+        power = float(factor["halves"]) if factor["halves"] else int(factor["power"] or 1)
+        whole = sign * 0.5 if factor["root"] else sign
         if factor["name"] is None:
             for name, inner in _read(factor["group"].strip(), unit).items():
-                powers[name] += sign * power * inner
+                powers[name] += whole * power * inner
         else:
             *others, last = _split(factor["name"])
-            powers.update(dict.fromkeys(others, sign))
-            powers[last] += sign * power
+            for name in others:
+                powers[name] += whole
+            powers[last] += whole * power
         if factor.end() == len(given):
             return powers
         joint = _JOINT.match(given, factor.end())
@@ -116,7 +134,7 @@ def _split(name: str) -> list[str]:
     return [together["force"] or together["mass"], "m", *(["s"] if together["time"] else [])]
 
 
-def _convert(value: float, powers: dict[str, int], unit: str) -> float:
+def _convert(value: float, powers: dict[str, float], unit: str) -> float:
     if unit == "1":
         # An angle is not a pure number here, though it is one in the library.
         if not powers:
@@ -152,10 +170,10 @@ def _wanted(unit: str) -> Any:
     return _container({} if unit == "1" else _powers(unit, unit))
 
 
-def _container(powers: dict[str, int]) -> Any:
+def _container(powers: dict[str, float]) -> Any:
     from pint.util import UnitsContainer
 
-    registry, named = unit_registry(), Counter[str]()
+    registry, named = unit_registry(), defaultdict[str, float](int)
     for name, power in powers.items():
         named[registry.get_name(name)] += power
     return UnitsContainer({name: power for name, power in named.items() if power})

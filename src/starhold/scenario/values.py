@@ -3,7 +3,6 @@
 Keys are told as `Scenario.with_` takes them. Values are validated ones: SI or scaled, as plain numbers in the file would be.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +20,7 @@ from starhold.scenario.checking import cut, nearest, read_toml, show
 from starhold.scenario.making import path_of
 from starhold.scenario.modes import CONDITIONS, Condition, ModeTable
 from starhold.scenario.parts import part_model
-from starhold.scenario.quantity import declared, reader
+from starhold.scenario.quantity import declared, plain, reader
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.schema import law_model
 from starhold.scenario.tables import Table, refuse_own
@@ -78,11 +77,11 @@ class Place:
         return {self.key: self._written(value)} | ({} if self.displaced is None else {self.displaced: None})
 
     def _written(self, value: Any) -> Any:
-        """The value as a file may hold it: plain angles only within a turn."""
+        """The value as a file may hold it: with its unit where a plain number would be asked for it."""
         if isinstance(value, list):
             return [self._written(item) for item in cast(list[Any], value)]
-        turns = self.gain is not None and self.gain.unit == "rad" and isinstance(value, float) and abs(value) > math.tau
-        return f"{value!r} rad" if turns else value
+        large = self.gain is not None and isinstance(value, float) and abs(value) > plain(self.gain)[0]
+        return f"{value!r} {self.gain.unit}" if self.gain is not None and large else value
 
     def refuse(self, name: str, given: str, allowed: str) -> InputError:
         """An error about the dispersion of the key, or about a parameter of it."""
@@ -105,7 +104,7 @@ def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) ->
     """Numbers (of the key's shape) of a raw value that need not be within the key's bounds, such as a standard deviation; in
     the key's unit, or in the one given. InputError calls it by `name`."""
     gain = place.gain or Gain()
-    read: Callable[..., Any] = reader(Gain(gain.unit if unit is None else unit))
+    read: Callable[..., Any] = reader(Gain(gain.unit, also=gain.also) if unit is None else Gain(unit))
     worth = place.worth if unit is None else 1.0
 
     def number(item: Any) -> float:

@@ -68,8 +68,13 @@ Tracker: TypeAlias = tuple[float, float, float, float, float]
 class Params(NamedTuple):
     """The noise of gyro and star tracker that the filter assumes, in the terms of those sensors."""
 
-    noise: Annotated[float, Parameter("rad/s", at_least=0.0, text="of the gyro: deviation of the mean over a second")]
-    bias_walk: Annotated[float, Parameter("rad/s", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h")]
+    noise: Annotated[
+        float, Parameter("rad/s", also="rad/sqrt(s)", at_least=0.0, text="of the gyro: deviation of the mean over a second")
+    ]
+    bias_walk: Annotated[
+        float,
+        Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h"),
+    ]
     bias: Annotated[float, Parameter("rad/s", above=0.0, text="of the gyro: deviation of the bias at the start")]
     cross: Annotated[float, Parameter("rad", above=0.0, text="of the star tracker: deviation across the boresight")]
     roll: Annotated[float, Parameter("rad", above=0.0, text="of the star tracker: deviation about the boresight")]

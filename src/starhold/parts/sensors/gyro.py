@@ -26,11 +26,22 @@ class Params(NamedTuple):
 
     noise: Annotated[
         float,
-        Parameter("rad/s", at_least=0.0, text="standard deviation of the mean over a second: the angle random walk"),
+        Parameter(
+            "rad/s",
+            also="rad/sqrt(s)",
+            at_least=0.0,
+            text="standard deviation of the mean over a second: the angle random walk",
+        ),
     ] = 0.0
     bias: Annotated[Vector, Parameter("rad/s", shape=(3,), spread=False, text="at the start")] = ZERO
     bias_walk: Annotated[
-        float, Parameter("rad/s", at_least=0.0, text="standard deviation of the bias's change within an hour")
+        float,
+        Parameter(
+            "rad/s",
+            also="rad/s/sqrt(h)",
+            at_least=0.0,
+            text="standard deviation of the bias's change within an hour: the rate random walk",
+        ),
     ] = 0.0
     scale_error: Annotated[float, Parameter("1", at_least=-0.5, at_most=0.5, text="of the scale factor")] = 0.0
     limit: Annotated[float, Parameter("rad/s", above=0.0, text="largest rate that it shows; none if absent")] = math.inf

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.scalar import Scalar, where
+from starhold.algebra.scalar import Scalar, sqrt, where
 from starhold.algebra.vector import ZERO, Vector, add, scale
 from starhold.parts import magnetic_field
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
@@ -22,7 +22,8 @@ CARD = Card(
     assumptions=(
         *magnetic_field.ASSUMPTIONS,
         "axes along the body's",
-        "white noise from control step to control step",
+        "white noise from control step to control step; a density is one-sided, and a reading has what lies below half the "
+        "rate of control",
         "magnetic parts on board show as a constant bias: torque rods are off while it measures",
     ),
 )
@@ -40,6 +41,10 @@ class Params(NamedTuple):
     scale_error: Annotated[float, Parameter("1", at_least=-0.5, at_most=0.5, text="of the scale factor")] = 0.0
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER
+    noise_density: Annotated[
+        float,
+        Parameter("T/sqrt(Hz)", at_least=0.0, text="one-sided; with n readings a second sqrt(n/2) of it adds to `noise`"),
+    ] = 0.0
 
 
 class Numbers(NamedTuple):
@@ -62,7 +67,7 @@ class Reading(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known, and for a bad outage."""
     field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period)
-    return Numbers(params.noise, params.bias, 1.0 + params.scale_error, field, outage)
+    return Numbers(_deviation(params, period), params.bias, 1.0 + params.scale_error, field, outage)
 
 
 def remember(params: Numbers, state: Any) -> Vector:
@@ -89,7 +94,12 @@ def error(params: Params) -> Errors:
 
 def noise(params: Params, period: float) -> Noise:
     """Tell the noise of a reading."""
-    return Noise(field=params.noise)
+    return Noise(field=_deviation(params, period))
+
+
+def _deviation(params: Params, period: float) -> Scalar:
+    """The standard deviation of each component of a reading (T)."""
+    return sqrt(params.noise * params.noise + params.noise_density * params.noise_density * (0.5 / period))
 
 
 def examples() -> list[Params]:

@@ -66,7 +66,7 @@ QUATERNION = Gain("1", shape=(4,), spread=False, text="quaternion, scalar first,
 ANGLES = Gain("rad", shape=(3,), spread=False, text="Tait-Bryan (3-2-1) angles yaw, pitch, roll")
 
 
-MOMENTS = Gain("kg m^2", shape=(3, 3))
+MOMENTS = Gain("kg m^2", shape=(3, 3), plain=(1e9, "g cm^2"))
 
 
 def _read_inertia(given: Any) -> Any:
@@ -184,9 +184,15 @@ class Rotor(Table):
     """A reaction wheel as a unit of the catalogue, or as its numbers; numbers given override the unit's."""
 
     unit: Annotated[str | None, Field(description="a unit of the catalogue, see `starhold wheels`")] = None
-    inertia: Annotated[float | None, *quantity(Gain("kg m^2", above=0.0, text="of the rotor about its axis"))] = None
-    torque_limit: Annotated[float | None, *quantity(Gain("N m", above=0.0, text="largest motor torque"))] = None
-    momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="largest angular momentum"))] = None
+    inertia: Annotated[
+        float | None, *quantity(Gain("kg m^2", above=0.0, plain=(10.0, "g cm^2"), text="of the rotor about its axis"))
+    ] = None
+    torque_limit: Annotated[
+        float | None, *quantity(Gain("N m", above=0.0, plain=(10.0, "mN m"), text="largest motor torque"))
+    ] = None
+    momentum_limit: Annotated[
+        float | None, *quantity(Gain("N m s", above=0.0, plain=(1000.0, "mN m s"), text="largest angular momentum"))
+    ] = None
     viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
     coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
     momentum: Annotated[float, *quantity(Gain("N m s", text="at the start"))] = 0.0
