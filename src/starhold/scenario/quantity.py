@@ -109,7 +109,13 @@ def _plain(error: Exception) -> str:
 def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
     # Tuples are defaults.
     if isinstance(value, (list, tuple)):
-        return [_to_numbers(item, gain, worth) for item in cast(list[Any], value)]
+        items, units = cast(list[Any], value), gain.unit.split(", ")
+        if 1 < len(units) == len(gain.columns) and not any(isinstance(item, (list, tuple)) for item in items):
+            # A row of a table whose columns have units of their own.
+            if len(items) not in (0, len(units)):
+                raise ValueError(gain.describe())
+            return [_to_numbers(item, replace(gain, unit=unit), worth) for item, unit in zip(items, units, strict=False)]
+        return [_to_numbers(item, gain, worth) for item in items]
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{gain.describe()} in {shown(gain.unit)}")
     if isinstance(value, str):

@@ -45,7 +45,7 @@ class Params(NamedTuple):
 
     plates: Annotated[
         tuple[Row, ...],
-        Parameter("m^2, 1, m", columns=COLUMNS, text=TEXT),
+        Parameter("m^2, 1, 1, 1, m, m, m", columns=COLUMNS, text=TEXT),
     ]
     coefficient: Annotated[float, Parameter("1", at_least=0.0, text="of drag, of each plate")] = 2.2
     density: Annotated[float, Parameter("kg/m^3", at_least=0.0, text="at the height of reference")] = 6.967e-13

@@ -42,7 +42,7 @@ class Params(NamedTuple):
     plates: Annotated[
         tuple[Row, ...],
         Parameter(
-            "m^2, 1, m, 1",
+            "m^2, 1, 1, 1, m, m, m, 1, 1",
             columns=(*COLUMNS, "specular", "diffuse"),
             text=f"{TEXT}; shares of the light that are reflected specularly and diffusely",
         ),

@@ -30,7 +30,8 @@ class Params(NamedTuple):
     """The rows, and their axes."""
 
     table: Annotated[
-        tuple[Row, ...], Parameter("s, N m", columns=("time", "x", "y", "z"), text="times, increasing, and torques at them")
+        tuple[Row, ...],
+        Parameter("s, N m, N m, N m", columns=("time", "x", "y", "z"), text="times, increasing, and torques"),
     ]
     axes: Annotated[int, Parameter(choices=("body", "inertial"), text="in which x, y and z are given")] = 0
 

@@ -90,9 +90,9 @@ class Params(NamedTuple):
     more_trackers: Annotated[
         tuple[Tracker, ...],
         Parameter(
-            "rad, 1",
+            "rad, rad, 1, 1, 1",
             columns=("cross", "roll", "x", "y", "z"),
-            text="a row for each star tracker after the first, in their order: its deviations (rad) and boresight",
+            text="a row for each star tracker after the first, in their order: its deviations and boresight",
         ),
     ] = ()
 
