@@ -45,7 +45,7 @@ COMMANDS = {
     "laws": Timed(("laws",)),
     "--version": Timed(("--version",)),
 }
-HEAD = "╇"
+HEAD = "─" * 40
 """What stands in the line below the head of a table, and nowhere before."""
 START = "import sys; sys.argv[0] = 'starhold'; from starhold.cli.main import main; main()"
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
