@@ -38,7 +38,7 @@ def test_its_laws_show_every_keyword_of_a_gain(folder):
     for keyword in dataclass_fields(Gain):
         # Rows of a file, and what a whole flight shares, are for other parts, such as `torque-table`.
         shown = any(getattr(gain, keyword.name) != keyword.default for gain in gains)
-        assert shown or keyword.name in ("columns", "shared"), keyword.name
+        assert shown or keyword.name in ("also", "columns", "plain", "shared"), keyword.name
 
 
 @pytest.mark.parametrize("name", FILES)
