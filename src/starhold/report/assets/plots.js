@@ -387,7 +387,7 @@ const lead = document.querySelector(".two, .one");
 const measureAbove = () => document.documentElement.style.setProperty("--above", `${lead.getBoundingClientRect().top + scrollY}px`);
 if (lead) {
   measureAbove();
-  addEventListener("resize", measureAbove);
+  new ResizeObserver(measureAbove).observe(document.body);
 }
 drawAll();
 dark.addEventListener("change", () => {
