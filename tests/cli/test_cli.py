@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from unittest.mock import MagicMock
 
 import pytest
 import xarray as xr
@@ -35,14 +34,6 @@ def test_what_compare_prints_of_a_mission_fits_on_a_screen(tmp_path):
     assert len(lines) <= 60
     assert max(map(len, lines)) <= 120
     assert {"settling", "overshoot"} <= set(lines[3].split()), "the table of metrics has laws as rows"
-
-
-@pytest.fixture
-def unpainted(monkeypatch):
-    """Commands draw no figures, which take longer than the flights."""
-    blank = MagicMock()
-    blank.return_value.__enter__.return_value.finish.return_value = None
-    monkeypatch.setattr("starhold.report.painter.Painter", blank)
 
 
 def test_compare_writes_everything_and_prints_the_table(short):
@@ -76,25 +67,25 @@ def test_compare_writes_everything_and_prints_the_table(short):
     complains(starhold("compare", "short.toml", "-o", "out", cwd=short), "--force")
 
 
-def test_what_is_forced_keeps_the_files_of_others(short, unpainted):
-    words = ("run", "short.toml", "--no-certify", "-o", "out")
+def test_what_is_forced_keeps_the_files_of_others(short):
+    words = ("run", "short.toml", "--no-certify", "--pictures", "page", "-o", "out")
     starhold(*words, cwd=short, code=0)
     (short / "out" / "mine.txt").write_text("keep")
     starhold(*words, "--force", cwd=short, code=0)
     assert (short / "out" / "mine.txt").read_text() == "keep"
 
 
-def test_run_flies_the_law_that_is_asked_for(short, unpainted):
-    starhold("run", "short.toml", "--law", "sliding", "--no-certify", cwd=short, code=0)
+def test_run_flies_the_law_that_is_asked_for(short):
+    starhold("run", "short.toml", "--law", "sliding", "--no-certify", "--pictures", "page", cwd=short, code=0)
     folder = short / "results" / "three-laws-sliding"
     assert (folder / "run.nc").exists()
     assert set(json.loads((folder / "summary.json").read_text())["laws"]) == {"sliding"}
 
 
-def test_a_motion_that_is_lost_is_said_so(short, unpainted):
+def test_a_motion_that_is_lost_is_said_so(short):
     text = SHORT.replace("k_rate = 0.09", "k_rate = 900").replace('torque_limit = "0.01 N m"', "")
     (short / "wild.toml").write_text(text)
-    done = starhold("run", "wild.toml", "-o", "wild", "--no-certify", cwd=short, code=1)
+    done = starhold("run", "wild.toml", "-o", "wild", "--no-certify", "--pictures", "page", cwd=short, code=1)
     assert "lyapunov diverged at" in done.stdout
     row = json.loads((short / "wild" / "summary.json").read_text())["laws"]["lyapunov"]
     assert 0 < row["diverged_at"] < 20
@@ -172,11 +163,11 @@ def test_user_errors_are_one_line_and_exit_code_2(command, short):
         assert len(done.stderr) < 1000
 
 
-def test_new_writes_a_file_that_runs(tmp_path, unpainted):
+def test_new_writes_a_file_that_runs(tmp_path):
     assert starhold("new", "my.toml", "--schema", cwd=tmp_path).returncode == 0
     assert (tmp_path / "my.toml").read_text().startswith("#:schema ./starhold.schema.json")
     assert json.loads((tmp_path / "starhold.schema.json").read_text())["title"] == "starhold scenario"
-    starhold("run", "my.toml", "--no-certify", "-o", "out", cwd=tmp_path, code=0)
+    starhold("run", "my.toml", "--no-certify", "--pictures", "page", "-o", "out", cwd=tmp_path, code=0)
 
 
 def test_lists(tmp_path):
@@ -219,10 +210,10 @@ def test_a_folder_that_another_process_writes_is_refused_until_that_ends(tmp_pat
     assert not list((tmp_path / "shared").iterdir())
 
 
-def test_warnings_and_failures_of_the_system_are_single_lines(short, unpainted):
+def test_warnings_and_failures_of_the_system_are_single_lines(short):
     falling = SHORT.replace("velocity = [0, 7550, 0]", "velocity = [0, 6000, 0]")
     (short / "falling.toml").write_text(falling)
-    warned = starhold("run", "falling.toml", "-o", "falling", "--no-certify", cwd=short, code=0)
+    warned = starhold("run", "falling.toml", "-o", "falling", "--no-certify", "--pictures", "page", cwd=short, code=0)
     assert warned.stderr.startswith("starhold: warning: orbit.velocity: the orbit meets the Earth's surface")
     assert warned.stderr.count("\n") == 1
 

@@ -47,7 +47,7 @@ class Dispersion:
 
     @property
     def known(self) -> bool:
-        """Whether what laws suppose has the drawn values too."""
+        """Laws know the drawn values where this is true; else they suppose the nominal ones."""
         return self.distribution.known_to_law or not self.nominal_tables
 
     @property

@@ -8,7 +8,7 @@ from functools import reduce
 from importlib import resources
 from itertools import chain
 from math import lcm, prod
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -44,6 +44,12 @@ class Lemma(NamedTuple):
     parts: Sequence[Part] = ()
 
 
+Polynomial: TypeAlias = (
+    rules.Vanishes | rules.Squares | rules.Sum | rules.Solves | rules.Contracts | rules.Persists | rules.Definite
+)
+"""Obligations about polynomials; the other compares two numbers."""
+
+
 def printed(proved: Sequence[Proved]) -> str:
     """Return the text of a file that coqc accepts, with a lemma, or some, for each obligation that was checked."""
     Account.left = 10**12
@@ -66,7 +72,7 @@ def _texts(o: rules.Obligation, evidence: Any) -> Iterator[str]:
         yield from map(_text, lemmas(o, evidence))
 
 
-def lemmas(o: rules.Obligation, evidence: Any) -> Iterator[Lemma]:
+def lemmas(o: Polynomial, evidence: Any) -> Iterator[Lemma]:
     """Yield what an obligation says, with its evidence."""
     if isinstance(o, rules.Vanishes):
         yield Lemma(o.p, None, _polys(evidence or []), o.modulo)
@@ -89,10 +95,8 @@ def lemmas(o: rules.Obligation, evidence: Any) -> Iterator[Lemma]:
         yield _form(o.a)
     elif isinstance(o, rules.Contracts):
         yield from _contracting(o, matrix(evidence, len(o.A), len(o.A)))
-    elif isinstance(o, rules.Persists):
-        yield from _persisting(o.A, matrix(evidence, len(o.A), len(o.A)))
     else:
-        raise NotImplementedError(f"{type(o).__name__} has no lemma")
+        yield from _persisting(o.A, matrix(evidence, len(o.A), len(o.A)))
 
 
 def _form(a: Rows, p: Poly | None = None, cofactors: Sequence[Poly] = (), zeros: Sequence[Poly] = ()) -> Lemma:

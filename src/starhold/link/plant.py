@@ -215,7 +215,7 @@ class Plant:
 
 
 def summary(plant: Plant) -> list[str]:
-    """Return what is told of a flight that ended, in lines: how far it went, latencies, and what was not heeded."""
+    """Summarise a flight that ended, in lines: its last step, the latencies, and the messages that were rejected."""
     flight, rules = plant.flight, plant.rules
     unit = getattr(flight.loop.body.module, "TIME_UNIT", "s")
     reason = f"Ended at step {flight.steps} of {rules.steps} ({flight.time:g} {unit}): {plant.ending}."

@@ -97,7 +97,7 @@ class Budget:
     required: Mapping[str, float]
     """The largest level (rad) of an index that is allowed, by the index."""
     proof: ProvedPointing | None = None
-    """What is proved of the pointing, and each source's share of that, where it was asked for."""
+    """The proved bound of the pointing error holds here, with each source's share of it, where a proof was asked for."""
 
     @property
     def axis(self) -> str:
