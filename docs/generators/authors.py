@@ -132,7 +132,7 @@ def claims_table() -> str:
             continue
         found: dict[str, list[str]] = {"every claim": [], "pointing": [], "none": []}
         for name, part in parts(role).items():
-            tells = any(part.hook(hook) is not None for hook in ("bound", "error", "noise", "recursion"))
+            tells = any(part.hook(hook) is not None for hook in ("bound", "error", "noise", "perturbation", "recursion"))
             by = "every claim" if name in READ.get(role, ()) else "pointing" if tells else "none"
             found[by].append(f"`{name}`")
         rows.append([role, *(", ".join(names) for names in found.values())])

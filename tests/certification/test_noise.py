@@ -154,7 +154,8 @@ def noise_claim(loop):
 )
 def test_a_claim_is_about_the_noise_of_its_loop(name, params, told):
     claim = noise_claim(nadir())
-    claim["numbers"] |= {"momentum": "1", "target.rate": "1", "target.acceleration": "1", "outside": "1"}
+    names = ("momentum", "target.rate", "target.acceleration", "error.target.rate", "error.target.acceleration", "outside")
+    claim["numbers"] |= dict.fromkeys(names, "1")
     claim["numbers"] |= {f"outside.{k}": "1" for k in range(3)}
     assert differences(claim, nadir()) == []
     assert told in differences(claim, changed(nadir(), name, **params))

@@ -81,11 +81,19 @@ def from_elements(elements: Elements, gravity: float) -> tuple[Vector, Vector]:
 
 def lowest(position: Vector, velocity: Vector, gravity: float) -> float:
     """The least distance (m) of the whole orbit from the centre."""
-    distance, _, radial, h2 = _invariants(position, velocity, gravity)
-    parameter = h2 / gravity
-    # e cos(anomaly) and e sin(anomaly): of near circles the energy would lose the eccentricity.
-    eccentricity = math.hypot(parameter / distance - 1.0, math.sqrt(parameter / gravity) * radial / distance)
+    distance, parameter, eccentricity = _conic(position, velocity, gravity)
     return min(distance, parameter / (1.0 + eccentricity))
+
+
+def highest(position: Vector, velocity: Vector, gravity: float) -> float:
+    """The largest distance (m) of the whole orbit from the centre; infinity for one that does not come back."""
+    distance, parameter, eccentricity = _conic(position, velocity, gravity)
+    return max(distance, parameter / (1.0 - eccentricity)) if eccentricity < 1.0 else math.inf
+
+
+def angular_momentum(position: Vector, velocity: Vector) -> float:
+    """The norm of the angular momentum per mass (m2/s)."""
+    return math.sqrt(_invariants(position, velocity, 0.0)[3])
 
 
 def period_of(position: Vector, velocity: Vector, gravity: float) -> float:
@@ -124,6 +132,14 @@ def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) 
     if begun > end:
         return math.inf
     return ((eccentricity * math.sinh(end) - end) - (sine - begun)) / rate
+
+
+def _conic(position: Vector, velocity: Vector, gravity: float) -> tuple[float, float, float]:
+    """Distance (m), parameter (m) and eccentricity."""
+    distance, _, radial, h2 = _invariants(position, velocity, gravity)
+    parameter = h2 / gravity
+    # e cos(anomaly) and e sin(anomaly): of near circles the energy would lose the eccentricity.
+    return distance, parameter, math.hypot(parameter / distance - 1.0, math.sqrt(parameter / gravity) * radial / distance)
 
 
 def _invariants(position: Vector, velocity: Vector, gravity: float) -> tuple[float, float, float, float]:
