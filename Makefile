@@ -29,7 +29,7 @@ check: $(VENV)/.test
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.bench
-	for script in benchmarks/[a-z]*.py; do case $$script in */common.py|*/basilisk_*.py) ;; *) echo "== $$script"; $(BIN)/python $$script || exit 1 ;; esac; done
+	$(BIN)/python benchmarks/run_all.py
 
 docs: $(VENV)/.docs
 	$(BIN)/python docs/generate.py
