@@ -28,6 +28,11 @@ from tests.running import starhold
         (["--law", "none"], "none"),
         (["--host", "192.0.2.1"], "serve: --host, --port: found 192.0.2.1:5750"),
         (["--host", "no such host"], "serve: --host, --port: found no such host:5750"),
+        (["--udp", "--zmq"], "serve: --zmq: found --udp too; allowed: one of the two"),
+        (["--zmq", "--host", "no such host"], "serve: --host, --port: found no such host:5750"),
+        (["--serial", "/nowhere"], "serve: --serial, --baud: found /nowhere at 115200 baud, No such file"),
+        (["--serial", "/dev/null"], "serve: --serial, --baud: found /dev/null at 115200 baud, "),
+        (["--serial", "/dev/null", "--baud", "-1"], "serve: --serial, --baud: found /dev/null at -1 baud, "),
     ],
 )
 def test_a_wrong_argument_is_one_line(words, message, tmp_path):
@@ -44,6 +49,13 @@ def test_a_port_in_use_and_a_time_without_seconds(tmp_path):
     assert f"found 127.0.0.1:{port}" in done.stderr
     done = starhold("serve", "l2-circle", "--rate", "1", cwd=tmp_path, code=2)
     assert "a scenario whose time is in 1/Omega" in done.stderr
+
+
+@pytest.mark.parametrize(("option", "package"), [({"zmq": True}, "zmq"), ({"serial": "/dev/null"}, "serial")])
+def test_an_extra_that_is_missing_is_named(option, package, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(sh.InputError, match=rf"^serve --{package}: need {package}: pip install 'starhold\[{package}\]'$"):
+        sh.serve("three-laws", **option)
 
 
 def test_results_that_are_there_are_kept(tmp_path):

@@ -73,8 +73,8 @@ class Plant:
         self.missed = 0
         """Periods of real time for which no command came in time."""
         self.commanded = 0
-        self.behind = 0.0
-        """How late the plant itself has begun a period at most (s)."""
+        self.lateness: list[float] = []
+        """How late the plant itself has begun each period of real time (s)."""
         self._sent: dict[int, float] = {}
         self._begin()
 
@@ -84,6 +84,11 @@ class Plant:
         if self.rules.rate is None or self._begun is None or self.ending is not None:
             return None
         return self._begun + (self.flight.steps + 1) * self.flight.loop.period / self.rules.rate
+
+    @property
+    def behind(self) -> float:
+        """How late the plant itself has begun a period at most (s)."""
+        return max(self.lateness, default=0.0)
 
     def received(self, data: bytes, decoder: Decoder) -> None:
         """Heed the messages in these bytes of a stream, which has a decoder of its own, as far as they are valid."""
@@ -97,16 +102,12 @@ class Plant:
         for fault in decoder.end():
             self._heed(fault, decoder)
 
-    def hang_up(self, decoder: Decoder) -> None:
-        """Note that the peer, whose stream had this decoder, is gone, in the middle of a message perhaps."""
-        self.faults.update(decoder.end())
-        self.end(Ending.GONE)
-
     def tick(self) -> None:
         """Fly the period that is over, with the command that came for it or by the rule for none."""
         if self.due is None:
             return
-        self.behind = max(self.behind, self.clock() - self.due)
+        # A timer may be early by less than its resolution.
+        self.lateness.append(max(0.0, self.clock() - self.due))
         command, self._next = self._next, None
         if command is None:
             self.missed += 1
@@ -212,6 +213,15 @@ class Plant:
 
     def _tell(self, message: Message) -> None:
         self.send(line(message) if self._is_text else binary(message))
+
+
+def status(plant: Plant) -> str:
+    """Say in a line how a flight in real time goes: its step, the latest latencies, and what was missed."""
+    latest = 1e3 * np.array(plant.latencies[-KEPT:] or [np.nan])
+    return (
+        f"Step {plant.flight.steps} of {plant.rules.steps}: latency {np.median(latest):.3g} ms, at most {latest.max():.3g} ms; "
+        f"{plant.missed} periods missed; the plant late by {1e3 * plant.behind:.3g} ms at most"
+    )
 
 
 def summary(plant: Plant) -> list[str]:
