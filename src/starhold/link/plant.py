@@ -62,6 +62,8 @@ class Plant:
         self.layout = Layout(flight.loop)
         fields = [[one.name, one.size] for one in self.layout.fields]
         self._about = json.dumps(about | {"steps": rules.steps, "fields": fields})
+        # No period waits for a compiler.
+        flight.prepare()
         self._readings = flight.reset()
         self.send: Callable[[bytes], None] = lambda data: None
         self._is_text = False
@@ -217,11 +219,10 @@ class Plant:
 
 def status(plant: Plant) -> str:
     """Say in a line how a flight in real time goes: its step, the latest latencies, and what was missed."""
-    latest = 1e3 * np.array(plant.latencies[-KEPT:] or [np.nan])
-    return (
-        f"Step {plant.flight.steps} of {plant.rules.steps}: latency {np.median(latest):.3g} ms, at most {latest.max():.3g} ms; "
-        f"{plant.missed} periods missed; the plant late by {1e3 * plant.behind:.3g} ms at most"
-    )
+    latest = plant.latencies[-KEPT:]
+    latency = f"{1e3 * np.median(latest):.3g} ms, at most {1e3 * max(latest):.3g} ms" if latest else "none yet"
+    late = f"plant late by {1e3 * plant.behind:.3g} ms"
+    return f"Step {plant.flight.steps}/{plant.rules.steps}: latency {latency}; missed {plant.missed}; {late}"
 
 
 def summary(plant: Plant) -> list[str]:

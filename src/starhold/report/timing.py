@@ -35,6 +35,7 @@ def draw_timing(timing: dict[str, Any]) -> Any:
         axis.hist(np.maximum(seconds, LEAST), edges, color=COLOURS[number])
         axis.axvline(timing["period"], color="0.3", linewidth=1.0, dashes=(5, 3))
         axis.set_xscale("log")
+        axis.set_axisbelow(True)
         axis.set_xlim(edges[0], edges[-1])
         axis.set_ylabel("times")
         axis.text(0.01, 0.9, f"{label}, {len(seconds)}", transform=axis.transAxes, fontsize=8.5)
