@@ -112,7 +112,7 @@ def test_a_law_leaves_and_flies_in_a_process(tmp_path):
     assert done.stderr.startswith("starhold: run: --law-process: found ./none; allowed: a program that runs")
     starhold("run", "three-laws", "--law-process", "./flight", "--check-step", cwd=tmp_path, code=2)
     # Killed in the middle of a frame: ten thousand bytes are a hello, some commands, and a part of one.
-    (tmp_path / "cut.sh").write_text("./flight | dd bs=1 count=10000 status=none; kill -9 $$\n")
+    (tmp_path / "cut.sh").write_text("./flight | { dd bs=1 count=10000 status=none; kill -9 $$; }\n")
     done = starhold("run", "three-laws", "--law-process", "sh cut.sh", "-o", "cut", cwd=tmp_path, code=2)
     step = int(re.search(r"sh cut\.sh, at step (\d+), a process that ended with -9", done.stderr)[1])
     assert step == (10000 - 20) // 44

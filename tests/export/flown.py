@@ -149,6 +149,14 @@ def build_in(folder: Any, *command: Any) -> None:
     assert done.returncode == 0, (command, done.stderr[:2000])
 
 
+def built(folder: Any, code: Code, *flags: str, compiler: str = "gcc") -> str:
+    """A law as a program that commands, compiled."""
+    need(compiler)
+    put(folder, code, "process")
+    build_in(folder, compiler, *STRICT, *flags, "-o", "flight", f"{code.name}.c", f"{code.name}_process.c", "-lm")
+    return str(Path(folder, "flight"))
+
+
 def read(code: Code, inputs: Any) -> Any:
     """The numbers that C has of rows of all numbers of the inputs."""
     return np.asarray(inputs)[..., kept_inputs(code)]

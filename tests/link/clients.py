@@ -8,6 +8,7 @@ import tty
 from contextlib import contextmanager
 from queue import Queue
 
+import numpy as np
 import pytest
 
 from starhold.api import serve
@@ -145,3 +146,31 @@ def served(*about, over="tcp", **options):
     yield address, results
     thread.join(PATIENCE)
     assert not thread.is_alive()
+
+
+def mutated(rng, step):
+    """Bytes that hold no valid command for a step: random ones, and messages that were cut, changed, or are for another."""
+    good = Message(Kind.COMMAND, step, tuple(rng.normal(size=3)))
+    write = (binary, line)[rng.integers(2)]
+    kind = rng.integers(6)
+    if kind == 0:
+        return rng.bytes(int(rng.integers(1, 200)))
+    if kind == 1:
+        numbers = list(good.numbers)
+        numbers[rng.integers(3)] = rng.choice([np.nan, np.inf, -np.inf])
+        return write(good._replace(numbers=numbers))
+    if kind == 2:
+        return write(good._replace(step=int(rng.choice([step + 1, step + 2, 2**32 - 1]))))
+    if kind == 3:
+        return write(good._replace(numbers=good.numbers[: rng.integers(3)]))
+    text = bytearray(write(good))
+    if kind == 4:
+        return bytes(text[: rng.integers(1, len(text) - 1)])
+    if write is line:
+        words = [b"[" * 3000, b"9" * 5000, b'"step": 1e99', b'"step": true', b"null", b'{"kind": 3}', b'"\\ud800"', b"\xff{"]
+        at = int(rng.integers(1, len(text) - 2))
+        text[at:at] = words[rng.integers(len(words))] + b"{"
+        return bytes(text)
+    at = int(rng.integers(len(text)))
+    text[at] ^= int(rng.integers(1, 256))
+    return bytes(text)

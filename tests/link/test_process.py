@@ -1,7 +1,6 @@
 """A law in a child process flies the bits of the simulation, and one that misbehaves ends the flight in a line."""
 
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -10,19 +9,11 @@ from starhold.link import process
 from starhold.link.process import fly_by_process
 from starhold.loop.kernels import numbers_of
 from starhold.simulation.lane import fly
-from tests.export.flown import STRICT, build_in, code_of, loop_of, need, put, same
+from tests.export.flown import built, code_of, loop_of, same
 from tests.tiers import fewer, leading
 
 STEPS = 400
 LOOPS = ["lyapunov", "estimator", "wheel", "target from a table", "estimator on [sensor]", "l2", "mission", "b_dot", "mpc"]
-
-
-def built(folder, code, *flags):
-    """A law as a program, compiled."""
-    need("gcc")
-    put(folder, code, "process")
-    build_in(folder, "gcc", *STRICT, *flags, "-o", "flight", f"{code.name}.c", f"{code.name}_process.c", "-lm")
-    return str(Path(folder, "flight"))
 
 
 @pytest.mark.parametrize("name", leading(LOOPS, 6))

@@ -3,6 +3,7 @@ not valid moves it."""
 
 import json
 import socket
+import subprocess
 import time
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 import starhold as sh
 from starhold.link.plant import Ending, summary
 from starhold.link.protocol import Fault, Kind, Message, binary
-from tests.link.clients import OVER, Client, Dealer, served
+from tests.export.flown import built, code_of
+from tests.link.clients import OVER, Client, Dealer, connected, mutated, served
 from tests.tiers import fewer
 
 STEPS = 60
@@ -55,6 +57,24 @@ def test_lockstep_has_the_bits_of_a_simulation(over, text):
     assert not result.plant.faults
     assert len(result.plant.latencies) == STEPS + 1
     assert result.lines[0].startswith(f"Ended at step {STEPS} of {STEPS} (")
+
+
+@pytest.mark.parametrize("over", ["tcp", "serial"])
+def test_exported_c_flies_an_orbit_with_the_bits_of_a_simulation(over, tmp_path):
+    """With an estimator and modes: the law as a program whose standard input and output are the line."""
+    scenario = short("cubesat-mission", fewer(11_400, 60))
+    flight = built(tmp_path, code_of("mission"), "-O2")
+    with served(scenario, over=over) as (address, results):
+        link = connected(address)
+        end = link.end if over == "serial" else link.fileno()
+        if over == "tcp":
+            link.settimeout(None)
+        assert subprocess.run([flight], stdin=end, stdout=end, check=False).returncode == 0
+        link.close()
+    result = results.get()
+    assert result.ending is Ending.FLOWN
+    assert not result.plant.faults
+    assert_same(sh.simulate(scenario), result.recording.dataset())
 
 
 def test_real_time_keeps_to_the_clock_and_counts_what_is_missing():
@@ -156,15 +176,20 @@ def test_only_the_first_address_commands_by_datagrams(over):
 
 @pytest.mark.parametrize("over", OVER)
 def test_noise_on_the_line_neither_moves_nor_stops_the_plant(over):
-    rng, count = np.random.default_rng(7), fewer(10_000, 50)
+    rng, count = np.random.default_rng(7), fewer(10_000, 100)
     with served(short("three-laws"), over=over) as (address, results):
         client = Client(address)
         client.greet()
         for k in range(count):
-            client.socket.sendall(rng.bytes(int(rng.integers(1, 100))))
+            client.socket.sendall(mutated(rng, 0))
             if k % 20 == 19:
+                for _ in range(2 if over in ("tcp", "serial") else 0):
+                    # A stream may take them for the rest of what was cut.
+                    client.send(Kind.HELLO)
                 # The plant goes on: it answers, at the step where it was.
                 assert client.greet()[1].step == 0
+        for _ in range(2):
+            client.send(Kind.HELLO)
         client.send(Kind.COMMAND, 0, (0.0, 0.0, 0.0))
         while client.until(Kind.READINGS).step != 1:
             pass
