@@ -13,10 +13,11 @@ from tests.export.flown import built, code_of, loop_of, same
 from tests.tiers import fewer, leading
 
 STEPS = 400
-LOOPS = ["lyapunov", "estimator", "wheel", "target from a table", "estimator on [sensor]", "l2", "mission", "b_dot", "mpc"]
+LOOPS = ["lyapunov", "estimator", "sun", "yaw-steering", "wheel", "target from a table", "estimator on [sensor]", "l2",
+         "mission", "b_dot", "mpc"]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", leading(LOOPS, 6))
+@pytest.mark.parametrize("name", leading(LOOPS, 8))
 def test_exported_laws_fly_the_bits_of_the_simulation(name, tmp_path):
     steps = fewer(STEPS, 2) if name != "mpc" else 12
     samples, carry = fly_by_process(built(tmp_path, code_of(name), "-O2"), loop_of(name), steps)
