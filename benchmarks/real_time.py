@@ -47,6 +47,9 @@ def main() -> None:
                         came.append(now)
                         link.sendall(binary(Message(Kind.COMMAND, message.step, (0.0, 0.0, 0.0))))
             link.close()
+            while not (out / "timing.png").exists():
+                # Written last; who leaves earlier ends the plant.
+                time.sleep(0.1)
         timing = json.loads((out / "timing.json").read_text())
     seen = np.array(came) - came[0] - timing["period"] * np.arange(len(came))
     parts = {
