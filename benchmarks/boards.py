@@ -1,9 +1,9 @@
 """Exported laws on other processors: instructions a call, and the bits of the simulation.
 
-Each law is exported as a process, compiled for the machine and run by qemu as the law of its scenario. One flight is compared with
-the simulation bit by bit; in a shorter one qemu runs an instruction at a time and lists them, and those between the entry
-into the law's step and the return from it are counted, with all that it calls. Instructions are not cycles: what a call costs in time
-depends on the processor's pipeline, caches and memory.
+Each law is exported as a process, compiled for the machine and run by qemu as the law of its scenario. One flight is
+compared with the simulation bit by bit; in a shorter one qemu runs an instruction at a time and lists them, and those
+between the entry into the law's step and the return from it are counted, with all that it calls. Instructions are not cycles: what a
+call costs in time depends on the processor's pipeline, caches and memory.
 
 Run: python benchmarks/boards.py    (machines whose compiler or emulator is not installed are left out)
 """
@@ -32,7 +32,12 @@ from starhold.link.process import fly_by_process
 from starhold.scenario.building import build
 from starhold.simulation.lane import fly
 
-LAWS = {"lyapunov": ("three-laws", "lyapunov"), "pd": ("cubesat-nadir", None), "mission": ("cubesat-mission", "mission")}
+LAWS = {
+    "lyapunov": ("three-laws", "lyapunov"),
+    "nadir": ("cubesat-nadir", "lyapunov"),
+    "mission": ("cubesat-mission", "mission"),
+}
+"""Names in C: scenario and law."""
 MACHINES = {
     "ARMv7-A, VFPv4": ("arm", "arm-linux-gnueabihf-gcc", "-march=armv7-a", "-mfpu=vfpv4", "-mfloat-abi=hard"),
     "RISC-V, RV64GC": ("riscv64", "riscv64-linux-gnu-gcc"),
@@ -104,7 +109,7 @@ def measured(name: str, machine: str) -> list[str]:
     assert version is not None
     assert len(found) == COUNTED + 1
     spread = [f"{number:.0f}" for number in (np.median(found), max(found))]
-    return [f"{scenario.name}, {name}", machine, f"gcc {version[1]}", *spread, "equal" if same else "DIFFER"]
+    return [", ".join(LAWS[name]), machine, f"gcc {version[1]}", *spread, "equal" if same else "DIFFER"]
 
 
 def main() -> None:

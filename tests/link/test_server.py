@@ -1,5 +1,5 @@
-"""A plant on the loopback address or a serial line: lockstep has the bits of a simulation, real time keeps to the clock, and nothing that is
-not valid moves it."""
+"""A plant on the loopback address or a serial line: lockstep has the bits of a simulation, real time keeps to the clock, and
+nothing that is not valid moves it."""
 
 import json
 import socket

@@ -29,7 +29,10 @@ def serve(
     missing: Annotated[
         str, typer.Option(metavar="hold|zero|stop", help="what flies a period of real time without a command")
     ] = "hold",
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for run.nc, in real time timing.json and timing.png too, created")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="folder for run.nc, and how well real time was kept; created"),
+    ] = None,
     force: Force = False,
     allow_unstable: Unstable = False,
 ) -> None:

@@ -138,7 +138,8 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         fields["target"] = _Target(*target.module.goal(numbers, loop.start, 0, None))
         notes["target"] = Quantity("", "the attitude to be reached, from inertial axes, at this instant")
         target, numbers = Part(target.name, _GOAL), ()  # pyright: ignore[reportArgumentType]
-    if timed := target is not None and "target" not in fields and _tells_time(loop):
+    timed = target is not None and "target" not in fields and _tells_time(loop)
+    if target is not None and timed:
         target = Part(target.name, Counted(target.module))  # pyright: ignore[reportArgumentType]
     if acting:
         fields["wheels"] = carry.effectors[acting[0]]

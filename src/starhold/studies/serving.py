@@ -78,9 +78,9 @@ def serve(
     ends: see docs/in-the-loop.md for the messages. `recording` of the result is the flight, `lines` tell how it went.
 
     law: whose measurement readings have, the first if None; port: 0 for any that is free; zmq: extra `zmq`; serial: a device
-    such as "/dev/ttyUSB0", extra `serial`, with its baud rate; rate: how many times faster than the clock, None for lockstep;
-    missing: "hold", "zero" or "stop", for a period of real time without a command; announce: called with the address;
-    watch: called with the plant at most once a second of real time. InputError for what cannot be."""
+    such as "/dev/ttyUSB0", extra `serial`, with its baud rate; rate: how many times faster than the clock, None for
+    lockstep; missing: "hold", "zero" or "stop", for a period of real time without a command; announce: called with the
+    address; watch: called with the plant at most once a second of real time. InputError for what cannot be."""
     from starhold.link import server
     from starhold.link.plant import Missing, Plant, Rules
     from starhold.link.serial_line import serial_line
