@@ -39,7 +39,8 @@ STUDIED = tuple(
     if command.suffix
     for kind in command.kinds
 )
-MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *STUDIED)
+TIMING = ("timing.json", "timing.png")
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *TIMING, *STUDIED)
 """A folder with one of these holds results."""
 
 

@@ -75,10 +75,18 @@ def _flown(
     if process is None:
         samples, carry = fly(loop, timing.steps, timing.record_every, progress=progress)
         return name_samples(scenario, loop, samples, carry), carry
-    from starhold.link.process import fly_by_process
+    from starhold.link.process import LostLawError, fly_by_process
 
-    samples, carry = fly_by_process(process, loop, timing.steps, timing.record_every, progress)
-    return commanded_by(process, name_samples(scenario, loop, samples, carry)), carry
+    def named(samples: Any, carry: Any) -> Recording:
+        return commanded_by(process, name_samples(scenario, loop, samples, carry))
+
+    try:
+        samples, carry = fly_by_process(process, loop, timing.steps, timing.record_every, progress)
+    except LostLawError as error:
+        if error.flight.steps:
+            error.recording = named(*error.flight.samples(timing.record_every))
+        raise
+    return named(samples, carry), carry
 
 
 def commanded_by(process: str, run: Recording) -> Recording:

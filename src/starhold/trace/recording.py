@@ -152,6 +152,9 @@ class Recorder:
         """Record an operation."""
         if len(values) != len(operation.takes):
             raise TypeError(f"{operation.name} takes {len(operation.takes)} values, not {len(values)}")
+        if operation.name == "number_of" and kind_of(values[0]) == NUMBER:
+            # A count that is kept from step to step is a number already.
+            return values[0]
         for value, kind in zip(values, operation.takes, strict=True):
             fits = value.kind == kind if isinstance(value, Handle) else isinstance(value, _CONSTANTS.get(kind, ()))
             if not fits or (isinstance(value, bool) and kind != TRUTH):
