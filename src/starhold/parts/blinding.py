@@ -1,4 +1,4 @@
-"""What blinds an optical head: Sun, Moon and the Earth's limb within cones about its boresight."""
+"""Sun, Moon and the Earth's limb blind an optical head within cones about its boresight."""
 
 from __future__ import annotations
 

@@ -50,9 +50,9 @@ def prepared(epoch: Date) -> Numbers:
     def begun(first: float, rate: float) -> float:
         return ((first + rate * centuries) / 360.0) % 1.0
 
-    series = (tuple(begun(*term[1:]) for term in terms) for terms in (_LONGITUDE, _LATITUDE))
+    along, across = (tuple(begun(*term[1:]) for term in terms) for terms in (_LONGITUDE, _LATITUDE))
     slope = radians(23.439 - 4e-7 * days)
-    return Numbers(begun(*_MEAN), *series, cos(slope), sin(slope))
+    return Numbers(begun(*_MEAN), along, across, cos(slope), sin(slope))
 
 
 def position(time: Scalar, params: Numbers) -> Vector:
