@@ -45,6 +45,11 @@ CASES = {
     "a loss": (WHEEL, FOUR | LOST, {"wheels.viscous": SHARE, "spacecraft.inertia": SHARE}),
     "least peak": (WHEEL, PYRAMID, {"wheels.inertia": SHARE, "spacecraft.inertia": SHARE}),
     "sensors": (LYAPUNOV, PARTS, {"part.gyro.scale_error": normal(0.01), "part.gyro.bias": normal(1e-3)}),
+    "mounting": (
+        LYAPUNOV,
+        PARTS,
+        {"part.gyro.mounting_error": normal(0.01), "part.star-tracker.mounting_error": normal(0.01)},
+    ),
     "starts beside a filter": (LYAPUNOV, PARTS, {"initial.rate": normal(0.01), "initial.attitude": ROTATIONS}),
     "dipole": (LYAPUNOV, MAGNET, {"part.residual-dipole.dipole": SHARE, "spacecraft.inertia": TOLD}),
     "riccati, told": (LQR, {}, {"spacecraft.inertia": TOLD}),

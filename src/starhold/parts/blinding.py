@@ -20,8 +20,8 @@ SOURCES = (*sun.SOURCES, *moon.SOURCES)
 ASSUMPTIONS = (
     *sun.ASSUMPTIONS,
     *moon.ASSUMPTIONS,
-    "a cone is a half angle about the boresight, in which the centre of Sun or Moon blinds, or the limb's nearest point, or the "
-    "Earth itself; the Sun does not where the Earth hides it, the Moon blinds at any phase",
+    "a cone is a half angle about the boresight; within it the centre of Sun or Moon blinds, and the Earth to its limb",
+    "the Sun does not blind where the Earth hides it; the Moon does at any phase",
     "the limb is that of a sphere, lit where its point nearest the boresight is in sunlight",
 )
 SUN, MOON = (
@@ -41,9 +41,10 @@ RADIUS = BODIES["Earth"].radius
 
 
 class Cones(NamedTuple):
-    """Cosines of the cones of Sun and Moon, cosines and sines of those of the lit and of the dark limb, () for none; Sun and
-    Moon at the start; the control period (s)."""
+    """The unit vector of the boresight (body axes); cosines of the cones of Sun and Moon, cosines and sines of those of
+    the lit and of the dark limb, () for none; Sun and Moon at the start; the control period (s)."""
 
+    boresight: Vector
     sun: tuple[Scalar, ...]
     moon: tuple[Scalar, ...]
     lit: tuple[Scalar, ...]
@@ -54,7 +55,7 @@ class Cones(NamedTuple):
 
 
 def prepared(
-    sun_cone: float, moon_cone: float, limb_cones: tuple[float, float], epoch: Date, period: float
+    boresight: Vector, sun_cone: float, moon_cone: float, limb_cones: tuple[float, float], epoch: Date, period: float
 ) -> Cones | tuple[()]:
     """The cones of a head, () without any. ValueError for one that blinds always, and for a bad epoch."""
     for name, cone in (("Sun", sun_cone), ("Moon", moon_cone), ("lit limb", limb_cones[0]), ("dark limb", limb_cones[1])):
@@ -66,6 +67,7 @@ def prepared(
     lit, dark = ((math.cos(cone), math.sin(cone)) for cone in limb_cones)
     earth = tuple(limb_cones) != NONE
     return Cones(
+        boresight,
         (math.cos(sun_cone),) if sun_cone else (),
         (math.cos(moon_cone),) if moon_cone else (),
         lit if earth else (),
@@ -89,9 +91,9 @@ def check(cones: Cones | tuple[()], start: Any, craft: Craft) -> None:
         raise ValueError(f"the Earth's limb, {limb}, blinds always: limb_cones must be less than what is left of 180 deg")
 
 
-def is_blind(state: Any, boresight: Vector, cones: Cones, step: int) -> Truth:
-    """Tell whether a head with this boresight (unit vector, body axes) is blinded at a control step."""
-    time, along = number_of(step) * cones.period, to_reference(state.attitude, boresight)
+def is_blind(state: Any, cones: Cones, step: int) -> Truth:
+    """Tell whether a head with these cones is blinded at a control step."""
+    time, along = number_of(step) * cones.period, to_reference(state.attitude, cones.boresight)
     seen = sun.sun(time, cones.solar)
     blind: list[Truth] = []
     if cones.sun:

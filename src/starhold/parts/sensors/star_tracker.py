@@ -6,11 +6,11 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, to_reference
 from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, where
 from starhold.algebra.structured import when
-from starhold.algebra.vector import Vector, add, along_axis, dot, scale, subtract
-from starhold.parts import blinding
+from starhold.algebra.vector import ZERO, Vector, add, along_axis, dot, scale, subtract
+from starhold.parts import as_built, blinding
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
@@ -22,8 +22,7 @@ CARD = Card(
     summary="q_m = q(t - delay) turned by Gaussian angles, more about the boresight; held between updates",
     sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)", *blinding.SOURCES),
     assumptions=(
-        "stars are in view except during the outage, above the rate limit and within cones that blind, as it is when a reading "
-        "is due",
+        "stars are in view except during the outage, above the rate limit and, as a reading is due, within cones that blind",
         *blinding.ASSUMPTIONS,
         "errors independent from update to update",
         "before its first update it shows the inertial axes",
@@ -55,11 +54,13 @@ class Params(NamedTuple):
         float, Parameter("rad/s", above=0.0, text="above which stars smear and there is no reading; none if absent")
     ] = math.inf
     epoch: Annotated[Date, EPOCH] = START
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
 
 
 class Numbers(NamedTuple):
     """Deviations (rad), the unit vector of the boresight, control steps from update to update, those of the delay, and those
-    of the outage; the cones that blind, and the squared rate limit (rad2/s2), () for none."""
+    of the outage; the cones that blind, the squared rate limit (rad2/s2), and the turn of its mounting, () for
+    none."""
 
     cross: Scalar
     roll: Scalar
@@ -69,6 +70,7 @@ class Numbers(NamedTuple):
     outage: Window
     cones: blinding.Cones | tuple[()] = ()
     square: tuple[Scalar, ...] = ()
+    mounted: as_built.Turn = ()
 
 
 class Memory(NamedTuple):
@@ -97,15 +99,18 @@ def prepare(params: Params, period: float) -> Numbers:
     late = round(params.delay / period)
     if late > MOST:
         raise ValueError(f"the delay must be at most {MOST} control periods, {MOST * period:g} s")
+    boresight, mounted = scale(1.0 / size, params.boresight), as_built.turn_of(params.mounting_error)
+    looks = to_reference(mounted, boresight) if mounted else boresight
     return Numbers(
         params.cross,
         params.roll,
-        scale(1.0 / size, params.boresight),
+        boresight,
         float(max(1, round(params.interval / period))),
         late,
         in_steps(params.outage, period),
-        blinding.prepared(params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, period),
+        blinding.prepared(looks, params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, period),
         (params.rate_limit * params.rate_limit,) if params.rate_limit < math.inf else (),
+        mounted,
     )
 
 
@@ -124,7 +129,7 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
     seen = memory.waiting[-1] if params.late else state.attitude
     due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
     if params.cones:
-        due = both(due, opposite(blinding.is_blind(state, params.boresight, params.cones, step)))
+        due = both(due, opposite(blinding.is_blind(state, params.cones, step)))
     if params.square:
         due = both(due, less_equal(dot(state.rate, state.rate), params.square[0]))
 
@@ -132,7 +137,8 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
         angles = dice.vector(0, 1.0)
         along = scale(dot(angles, params.boresight), params.boresight)
         error = add(scale(0.5 * params.cross, subtract(angles, along)), scale(0.5 * params.roll, along))
-        return (normalise(multiply(seen, (1.0, *error))),)
+        mounted = multiply(seen, params.mounted) if params.mounted else seen
+        return (normalise(multiply(mounted, (1.0, *error))),)
 
     (shown,) = when(due, fresh, memory.shown)
     waiting = (state.attitude, *memory.waiting[:-1]) if params.late else ()
@@ -141,9 +147,11 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
 
 
 def error(params: Params) -> Errors:
-    """None where an attitude is there as it is; what the craft turns until it comes has no bound."""
+    """That of the mounting where an attitude is there as it is; what the craft turns until it comes has no bound."""
     silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
-    return UNBOUNDED if params.delay or silent or params.rate_limit < math.inf else NO_ERRORS
+    if params.delay or silent or params.rate_limit < math.inf:
+        return UNBOUNDED
+    return NO_ERRORS._replace(attitude=math.hypot(*params.mounting_error))
 
 
 def noise(params: Params, period: float) -> Noise:
@@ -153,8 +161,12 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """A small one at four readings a second, one that is exact, and one with cones."""
+    """A small one at four readings a second, one that is exact but askew, and one with cones."""
     arcsec = math.radians(1.0 / 3600.0)
     sun, moon, lit, dark = (math.radians(angle) for angle in (40.0, 10.0, 30.0, 5.0))
     blinded = Params(1e-5, 1e-4, (0.0, 0.0, -1.0), 0.2, 0.0, NEVER, sun, moon, (lit, dark), math.radians(3.0))
-    return [Params(6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8), 0.25, 0.2), Params(0.0, 0.0), blinded]
+    return [
+        Params(6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8), 0.25, 0.2),
+        Params(0.0, 0.0, mounting_error=(1e-3, -2e-3, 5e-4)),
+        blinded,
+    ]
