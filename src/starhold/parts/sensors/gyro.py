@@ -95,7 +95,7 @@ class Reading(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a control step."""
     walk = params.bias_walk * math.sqrt(period / HOUR)
-    stays = math.exp(-period / params.correlation_time)
+    stays, size = math.exp(-period / params.correlation_time), params.bias_instability
     return Numbers(
         params.noise / math.sqrt(period),
         walk,
@@ -104,9 +104,7 @@ def prepare(params: Params, period: float) -> Numbers:
         params.limit,
         as_built.axes_of(params.mounting_error, params.axis_errors),
         as_built.step_of(params.resolution),
-        (stays, params.bias_instability * math.sqrt(1.0 - stays * stays))
-        if as_built.is_given(params.bias_instability)
-        else (),
+        (stays, size * math.sqrt(1.0 - stays * stays)) if as_built.is_given(size) else (),
     )
 
 
