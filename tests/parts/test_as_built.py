@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.algebra.vector import ZERO
+from starhold.parts.effectors import magnetorquers, thrusters
 from starhold.parts.random import Silent
 from starhold.parts.sensors import gyro, magnetometer, star_tracker, sun_sensor
 from tests.parts.fields import states
@@ -88,3 +89,19 @@ def test_neither_law_nor_filter_knows_the_mounting():
     off = errors(run)[-1] - np.radians([0.2, 0.0, -0.1])
     assert (np.abs(off) < 5.0 * run["mekf_attitude_deviation"].values[-1]).all()
     assert np.abs(off).max() < 80.0 * ARCSEC < math.radians(0.1)
+
+
+def test_rods_and_thrusters_act_along_the_axes_they_are_mounted_with():
+    state = next(states())
+    wanted, measured = (1e-5, -2e-5, 3e-6), SimpleNamespace(magnetic_field=(1e-5, -2e-5, 3e-5))
+    for effector, params in ((magnetorquers, magnetorquers.Params((9.0,) * 3)), (thrusters, thrusters.Params((1e-3,) * 3))):
+        given = []
+        for mounting in (ZERO, MOUNTING):
+            numbers = effector.prepare(params._replace(mounting_error=mounting), 0.5)
+            moved = effector.switch(effector.remember(numbers), wanted, measured, state, numbers, 0)
+            rods = effector is magnetorquers
+            given.append(
+                moved.dipole if rods else effector.reaction(moved, effector.pulse(moved, 0.5, numbers), state, numbers)
+            )
+        assert np.abs(ASKEW.apply(given[0]) - given[1]).max() < 3.0 * SMALL * np.linalg.norm(given[0])
+        assert np.abs(np.subtract(*given)).max() > 5e-3 * np.linalg.norm(given[0])
