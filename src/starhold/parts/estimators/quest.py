@@ -37,7 +37,7 @@ ROLE = "estimator"
 ABOUT = "Earth"
 NEEDS = ("sun", "sun_is_seen", "magnetic_field", "position", "rate")
 SEVERAL = dict.fromkeys(("sun", "sun_is_seen", "magnetic_field"), "")
-FIRST = {"attitude_age": 0.0}
+FIRST = {"attitude_age": 0.0, "is_valid": 0.0}
 STEPS = 8
 """Newton's steps from the sum of the weights down to the largest eigenvalue."""
 TINY = 1e-30

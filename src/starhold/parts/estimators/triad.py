@@ -35,7 +35,7 @@ CARD = Card(
 ROLE = "estimator"
 ABOUT = "Earth"
 NEEDS = ("sun", "sun_is_seen", "magnetic_field", "position", "rate")
-FIRST = {"attitude_age": 0.0}
+FIRST = {"attitude_age": 0.0, "is_valid": 0.0}
 TINY = 1e-30
 remember = attitude_at_start
 
