@@ -19,6 +19,7 @@ from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import ROWS, angular_acceleration
 from starhold.parts.craft import tensor
+from starhold.parts.effectors.wheel_motion import without_friction
 from starhold.parts.effectors.wheels import Wheels
 from starhold.simulation.lanes import Batch, simulate_many
 from starhold.trace.straight_line import evaluated
@@ -307,11 +308,10 @@ def _paced(
 
 
 def _frictionless(wheels: Wheels, bounded: bool) -> Wheels:
-    """The wheels come back without friction and, unless bounded, without limits; lost ones stay lost."""
-    none = (0.0,) * len(wheels.axes)
-    free = wheels._replace(viscous=none, coulomb=none)
+    """The wheels come back balanced and without friction and, unless bounded, without limits; lost ones stay lost."""
+    free = without_friction(wheels)
     limits = tuple(math.inf if limit > 0.0 else 0.0 for limit in wheels.torque_limit)
-    return free if bounded else free._replace(torque_limit=limits, momentum_limit=(math.inf,) * len(limits))
+    return free if bounded else free._replace(torque_limit=limits, momentum_limit=(math.inf,) * len(limits), power_limit=())
 
 
 def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator) -> Array:

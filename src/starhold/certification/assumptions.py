@@ -14,6 +14,7 @@ from starhold.certification.orbit_band import strays
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
+from starhold.parts.effectors.wheel_motion import has_friction
 from starhold.parts.effectors.wheels import BAND
 
 Unmet: TypeAlias = list[tuple[Any, str]]
@@ -81,12 +82,16 @@ def _wheels_limited(span: Any) -> Unmet:
     torque, momentum = np.abs(span["wheel_torque"]), np.abs(span["wheel_momentum"])
     strong = span.reaches(torque, np.array(wheels.torque_limit))[:, working].any(axis=1)
     full = (momentum > np.array(wheels.momentum_limit) * (1.0 - BAND))[:, working].any(axis=1)
-    return [*_friction(span), *_limited(span), (strong, "a motor reaches its limit"), (full, "a wheel is full")]
+    power = [(bool(wheels.power_limit), "the motors have a power limit")]
+    return [*_friction(span), *_limited(span), (strong, "a motor reaches its limit"), (full, "a wheel is full"), *power]
 
 
 def _friction(span: Any) -> Unmet:
     wheels = span.loop.wheels
-    return [(any((*wheels.viscous, *wheels.coulomb)), "the wheels have friction")]
+    return [
+        (has_friction(wheels), "the wheels have friction"),
+        (bool(wheels.unbalanced), "the rotors are out of balance"),
+    ]
 
 
 def _strayed(span: Any) -> Unmet:

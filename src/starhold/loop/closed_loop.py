@@ -289,13 +289,14 @@ class ClosedLoop:
         goal = self._goal(start, setup) if self.aims else None
         h = () if goal is None else self.body.module.side_of(start, goal)
         sensors, estimator = self.used("sensor"), next(iter(self.used("estimator")), None)
+        kept = NoMemory() if estimator is None else estimator.remembered(setup.estimator, start)
         memories = Memories(
             goal.attitude if goal is not None and self.target.part.flag("FOLLOWS") else NoMemory(),
             tuple(f.remembered(numbers) for f, numbers in zip(self.used("environment"), setup.environments, strict=True)),
             tuple(f.remembered(numbers, start) for f, numbers in zip(sensors, setup.sensors, strict=True)),
             tuple(before_first(f.part, start) for f in sensors if is_recorded(f.part)),
-            NoMemory() if estimator is None else estimator.remembered(setup.estimator, start),
-            () if estimator is None else before_first(estimator.part, start),
+            kept,
+            () if estimator is None else before_first(estimator.part, start, kept),
         )
         effectors = tuple(f.remembered(numbers) for f, numbers in zip(self.used("effector"), setup.effectors, strict=True))
         followed = sum(f.part.hook("rates") is not None for f in self.used("actuator"))
@@ -321,13 +322,15 @@ def can_be_inactive(effector: Part) -> bool:
     return effector.flag("ACTS") or effector.flag("OUTSIDE")
 
 
-def before_first(part: Part, state: Any) -> Any:
-    """The value of a sensor's reading or an estimator's estimate before the first one: the fields of the body's state of the
-    same names, else the part's `FIRST`. ValueError if there is neither."""
+def before_first(part: Part, state: Any, memory: Any = None) -> Any:
+    """The value of a sensor's reading or an estimator's estimate before the first one: the part's `FIRST`, else what the
+    estimator begins with, the fields of its memory of the same names, else those of the body's state. ValueError if there
+    is none of them."""
     kind: Any = part.module.Estimate if part.role == "estimator" else part.module.Reading
     first = getattr(part.module, "FIRST", {})
     for name in kind._fields:
         if not hasattr(state, name) and (not isinstance(first, dict) or name not in first):
             example = f'FIRST = {{"{name}": 0.0}}'
             raise ValueError(f"{name} is no field of the body's state: give it before the first control step, {example}")
-    return kind(*(first[name] if name in first else getattr(state, name) for name in kind._fields))
+    values = (first[name] if name in first else getattr(memory, name, getattr(state, name, None)) for name in kind._fields)
+    return kind(*values)

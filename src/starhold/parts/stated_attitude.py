@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import Quaternion, stretch
 from starhold.algebra.vector import most
 from starhold.parts.contract import Parameter
@@ -16,6 +17,8 @@ START = Parameter(
     "1", shape=(4,), spread=False, text="assumed attitude at the start: quaternion, inertial to body, scalar first"
 )
 """The declaration of the initial estimate, common to all estimators."""
+VALID = Quantity("1", "1 where the estimated attitude rests on one that was measured, else 0")
+"""What says whether an estimate can be relied on, common to all estimators."""
 
 
 def unit_quaternion(stated: Quaternion) -> Quaternion:

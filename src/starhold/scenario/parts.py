@@ -264,6 +264,9 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
             if check is not None:
                 for craft in crafts:
                     check(params, craft)
+            begin = one.part.hook("check_start")
+            if begin is not None:
+                begin(params, loop.start, loop.craft)
     if all(fitted.part.file is None for fitted in loop.parts):
         return
     tried = replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))

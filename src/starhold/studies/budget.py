@@ -38,6 +38,7 @@ from starhold.laws.modes import Modes, make_law
 from starhold.loop.closed_loop import Composition
 from starhold.loop.kernels import Observer, numbers_of
 from starhold.parts.contract import Parameter
+from starhold.parts.effectors.wheel_motion import has_friction
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
@@ -247,7 +248,7 @@ def sources(scenario: Scenario) -> tuple[Source, ...]:
         if value
     ]
     wheels = wheels_of(scenario)
-    if wheels is not None and np.any((wheels.viscous, wheels.coulomb)):
+    if wheels is not None and has_friction(wheels):
         disturbing.append(Source("wheel friction", _smooth(scenario)))
     for fitted in scenario.parts:
         key, part = f"part.{fitted.called}", fitted.part
@@ -264,7 +265,7 @@ def sources(scenario: Scenario) -> tuple[Source, ...]:
 
 def _smooth(scenario: Scenario) -> dict[str, Any]:
     tables = [f"wheel[{place}]" for place in range(1, len(scenario.table.wheel) + 1)] or ["wheels"]
-    return {f"{table}.{key}": 0.0 for table in tables for key in ("viscous", "coulomb")}
+    return {f"{table}.{key}": 0.0 for table in tables for key in ("viscous", "coulomb", "static_friction")}
 
 
 def _errors_of(fitted: Fitted) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Vector, norm, scale, subtract
-from starhold.parts import magnetic_field
+from starhold.parts import as_built, magnetic_field
 from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.effectors import magnetorquers
 from starhold.parts.effectors.magnetorquers import LIMIT, LIMITED, State, dipole_for, within
@@ -40,17 +40,19 @@ class Params(NamedTuple):
         Vector, Parameter("N m s", shape=(3,), spread=False, text="that the wheels are to keep, body axes")
     ] = ZERO
     epoch: Annotated[Date, EPOCH] = START
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
 
 
 class Numbers(NamedTuple):
-    """The gain (1/s), the largest dipoles (A m2), how they are limited, the momentum that stays (N m s), and the
-    field."""
+    """The gain (1/s), the largest dipoles (A m2), how they are limited, the momentum that stays (N m s), the
+    field, and the turn of their mounting, () for none."""
 
     gain: Scalar
     dipole_limit: Vector
     limited: int
     momentum: Vector
     field: magnetic_field.Numbers
+    mounted: as_built.Turn = ()
 
 
 class Sample(NamedTuple):
@@ -62,14 +64,15 @@ class Sample(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known."""
-    return Numbers(*params[:4], magnetic_field.prepared(params.epoch, period))
+    mounted = as_built.turn_of(params.mounting_error)
+    return Numbers(*params[:4], magnetic_field.prepared(params.epoch, period), mounted)
 
 
 def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
     """The dipole for the wheels' momentum in the measured field, and the field at the craft."""
     torque = scale(-params.gain, subtract(measurement.wheel_momentum, params.momentum))
     dipole = within(dipole_for(torque, measurement.magnetic_field), params.dipole_limit, params.limited)
-    return State(dipole, magnetic_field.field_at(body.position, step, params.field))
+    return State(as_built.in_body(params.mounted, dipole), magnetic_field.field_at(body.position, step, params.field))
 
 
 remember, reaction, rates, momentum = (
@@ -95,9 +98,12 @@ def bound(params: Params, envelope: Envelope) -> Push:
     limit = norm(params.dipole_limit)
     full = limit * magnetic_field.strongest(params.epoch, envelope.distance)
     for_momentum = params.gain * (envelope.momentum + norm(params.momentum)) + limit * envelope.field_error
+    if as_built.is_given(params.mounting_error):
+        return Push(full)
     return Push(full) if full <= for_momentum else Push(for_momentum, params.gain * envelope.moment)
 
 
 def examples() -> list[Params]:
-    """Slow unloading by a CubeSat's magnetorquers, and a quick one that leaves a bias."""
-    return [Params(1e-3, (0.2, 0.2, 0.2)), Params(0.02, (30.0, 30.0, 20.0), 1, (0.0, 0.01, 0.0))]
+    """Slow unloading by a CubeSat's magnetorquers, and a quick one, askew, that leaves a bias."""
+    askew = Params(0.02, (30.0, 30.0, 20.0), 1, (0.0, 0.01, 0.0), mounting_error=(0.0, 0.01, 0.02))
+    return [Params(1e-3, (0.2, 0.2, 0.2)), askew]

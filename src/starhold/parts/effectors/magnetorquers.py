@@ -9,7 +9,7 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, absolute, clip, divide, less, maximum, where
 from starhold.algebra.several import each
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
-from starhold.parts import magnetic_field
+from starhold.parts import as_built, magnetic_field
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
 
@@ -19,7 +19,7 @@ CARD = Card(
     sources=(magnetic_field.SOURCE, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
     assumptions=(
         *magnetic_field.ASSUMPTIONS,
-        "along the body axes, without lag or hysteresis, held for a control period",
+        "along the body axes but for the mounting error, without lag or hysteresis, held for a control period",
         "the field in inertial axes is held for a control period",
         "no torque along the field",
     ),
@@ -43,14 +43,16 @@ class Params(NamedTuple):
     dipole_limit: Annotated[Vector, LIMIT]
     limited: Annotated[int, LIMITED] = 0
     epoch: Annotated[Date, EPOCH] = START
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
 
 
 class Numbers(NamedTuple):
-    """The largest dipoles (A m2), how they are limited, and the field."""
+    """The largest dipoles (A m2), how they are limited, the field, and the turn of their mounting, () for none."""
 
     dipole_limit: Vector
     limited: int
     field: magnetic_field.Numbers
+    mounted: as_built.Turn = ()
 
 
 class State(NamedTuple):
@@ -68,7 +70,8 @@ class Sample(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known."""
-    return Numbers(params.dipole_limit, params.limited, magnetic_field.prepared(params.epoch, period))
+    field, mounted = magnetic_field.prepared(params.epoch, period), as_built.turn_of(params.mounting_error)
+    return Numbers(params.dipole_limit, params.limited, field, mounted)
 
 
 def remember(params: Any) -> State:
@@ -79,7 +82,7 @@ def remember(params: Any) -> State:
 def switch(state: State, wanted: Vector, measurement: Any, body: Any, params: Numbers, step: int) -> State:
     """The dipole for a wanted torque (N m) in the measured field, and the field at the craft."""
     dipole = within(dipole_for(wanted, measurement.magnetic_field), params.dipole_limit, params.limited)
-    return State(dipole, magnetic_field.field_at(body.position, step, params.field))
+    return State(as_built.in_body(params.mounted, dipole), magnetic_field.field_at(body.position, step, params.field))
 
 
 def dipole_for(torque: Vector, field: Vector) -> Vector:
@@ -128,5 +131,6 @@ def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
 
 
 def examples() -> list[Params]:
-    """Those of a CubeSat, and larger ones at another time."""
-    return [Params((0.2, 0.2, 0.2)), Params((30.0, 30.0, 20.0), 1, (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]
+    """Those of a CubeSat, and larger ones, askew, at another time."""
+    large = Params((30.0, 30.0, 20.0), 1, (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), (0.01, -0.02, 0.0))
+    return [Params((0.2, 0.2, 0.2)), large]

@@ -9,6 +9,7 @@ from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar, absolute, less, maximum, minimum, sign, where
 from starhold.algebra.several import each
 from starhold.algebra.vector import ZERO, Vector, scale, times
+from starhold.parts import as_built
 from starhold.parts.contract import Card, Parameter
 
 CARD = Card(
@@ -16,7 +17,7 @@ CARD = Card(
     summary="full torque for t = |command| / torque of the control period, once |command| > on and until |command| < off",
     sources=("Spacecraft Dynamics and Control (1997): reaction pulses, Schmitt trigger, pulse-width modulation",),
     assumptions=(
-        "torques in pairs about the body axes, without force, at once on and at once off",
+        "torques in pairs about the body axes but for the mounting error, without force, at once on and at once off",
         "a pulse begins with the control period; of a substep in which it ends the torque is the mean",
         "the propellant that is spent leaves mass and inertia as they are",
     ),
@@ -46,10 +47,12 @@ class Params(NamedTuple):
     ] = 0
     lever: Annotated[float, Parameter("m", above=0.0, text="arm of a thruster about its axis")] = 1.0
     specific_impulse: Annotated[float, Parameter("s", above=0.0, text="of the propellant")] = 220.0
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
 
 
 class Numbers(NamedTuple):
-    """The parameters, the control period (s), and the propellant for an impulse of torque (kg/(N m s))."""
+    """The parameters, the control period (s), the propellant for an impulse of torque (kg/(N m s)), and the turn of their
+    mounting, () for none."""
 
     torque: Vector
     minimum: Scalar
@@ -58,6 +61,7 @@ class Numbers(NamedTuple):
     pulses: int
     period: Scalar
     propellant: Scalar
+    mounted: as_built.Turn = ()
 
 
 class State(NamedTuple):
@@ -84,7 +88,7 @@ def prepare(params: Params, period: float) -> Numbers:
     if params.minimum > period:
         raise ValueError(f"the shortest pulse must be at most the control period of {period:g} s, not {params.minimum:g} s")
     spent = 1.0 / (params.lever * params.specific_impulse * GRAVITY)
-    return Numbers(*params[:5], period, spent)
+    return Numbers(*params[:5], period, spent, as_built.turn_of(params.mounting_error))
 
 
 def remember(params: Numbers) -> State:
@@ -122,7 +126,7 @@ def _share(firing: Scalar, left: Scalar, substep: Scalar) -> Scalar:
 
 def reaction(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
     """The torque on the body (N m)."""
-    return times(params.torque, command)
+    return as_built.in_body(params.mounted, times(params.torque, command))
 
 
 def rates(state: State, command: Vector, body: Any, acceleration: Vector, params: Numbers) -> Any:
@@ -138,7 +142,8 @@ def momentum(state: State, params: Numbers) -> Vector:
 
 def applied(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
     """The mean torque of the control period that begins (N m)."""
-    return scale(1.0 / params.period, times(params.torque, times(state.firing, state.left)))
+    given = scale(1.0 / params.period, times(params.torque, times(state.firing, state.left)))
+    return as_built.in_body(params.mounted, given)
 
 
 def record(state: State, command: Vector, body: Any, params: Numbers) -> Sample:
@@ -148,8 +153,8 @@ def record(state: State, command: Vector, body: Any, params: Numbers) -> Sample:
 
 
 def examples() -> list[Params]:
-    """A pair of 20 mN m with a trigger, and one that fires for whole control periods."""
+    """A pair of 20 mN m with a trigger, and one, askew, that fires for whole control periods."""
     return [
         Params((0.02, 0.02, 0.02), 0.02, (5e-3, 5e-3, 5e-3), (2e-3, 2e-3, 2e-3), lever=0.5),
-        Params((0.05, 0.04, 0.03), 0.0, (0.01, 0.01, 0.01), (4e-3, 4e-3, 4e-3), 1),
+        Params((0.05, 0.04, 0.03), 0.0, (0.01, 0.01, 0.01), (4e-3, 4e-3, 4e-3), 1, mounting_error=(0.0, 0.01, 0.02)),
     ]

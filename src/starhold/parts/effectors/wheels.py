@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.scalar import Scalar, absolute, both, clip, either, less, less_equal, where
+from starhold.algebra.scalar import Scalar, absolute, both, clip, either, less, less_equal, plus, where
 from starhold.algebra.several import each, weighted
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, add, cross, dot, scale
@@ -26,12 +26,13 @@ from starhold.parts.craft import vector
 from starhold.parts.effectors.envelope import authority, check_authority, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 from starhold.parts.effectors.wheel_arrays import axial, least_squares, unit_axes
+from starhold.parts.effectors.wheel_motion import at_top_speed, limited, shaken, slopes, speeds, sticking, top_speeds
 
 CARD = Card(
     title="Reaction wheels",
     summary="h' = motor torque - friction about each spin axis; the body feels -sum a h' - w x sum a h",
     sources=("published study of control by reaction wheels with the largest degree of stability",),
-    assumptions=("balanced rotors", "rigid bearings"),
+    assumptions=("rotors balanced but for what is stated", "rigid bearings"),
 )
 ROLE = "effector"
 TABLE = "wheels"
@@ -71,15 +72,22 @@ class Wheels(NamedTuple):
     """The pieces of `allocate_peak`, of 6 + 3 N numbers each: a normal, an edge, and a row for each wheel. Torques in the
     cone above a facet of the envelope cost the peak |normal . torque|, and pieces of one facet are told apart by the
     largest |edge . torque|."""
+    sticking: Numbers = ()
+    """Static friction beyond Coulomb's (N m), its speeds (rad/s), power limits of the motors (W), and two torques (N m at
+    1 rad/s) that turn with each rotor; each () for none. See `wheel_motion`."""
+    stribeck_speed: Numbers = ()
+    power_limit: Numbers = ()
+    unbalanced: tuple[Rows, ...] = ()
 
 
 Params = Wheels
 
 
 class State(NamedTuple):
-    """The absolute angular momentum of each rotor about its spin axis (N m s)."""
+    """The absolute momentum of each rotor about its axis (N m s), and the angles (turns) of rotors out of balance."""
 
     momentum: Numbers
+    angle: Numbers = ()
 
 
 class Sample(NamedTuple):
@@ -106,7 +114,7 @@ def with_facets(wheels: Wheels) -> Wheels:
 
 def remember(params: Wheels) -> State:
     """Rotors at rest."""
-    return State((0.0,) * len(params.axes))
+    return State((0.0,) * len(params.axes), (0.0,) * len(params.unbalanced))
 
 
 def command(applied: Vector, params: Wheels) -> Numbers:
@@ -116,12 +124,15 @@ def command(applied: Vector, params: Wheels) -> Numbers:
 
 def reaction(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
     """The torque of the wheels on the body (N m)."""
-    return on_body(motor(command, state.momentum, body.rate, params), state.momentum, body.rate, params)
+    h, rate = state.momentum, body.rate
+    torque = on_body(motor(command, h, rate, params), h, rate, params)
+    return add(torque, shaken(state.angle, h, rate, params)) if params.unbalanced else torque
 
 
 def rates(state: State, command: Numbers, body: Any, acceleration: Vector, params: Wheels) -> State:
-    """d(momentum)/dt of each rotor (N m)."""
-    return State(motor(command, state.momentum, body.rate, params))
+    """d(momentum)/dt of each rotor (N m), and its speed (turns/s) where it is out of balance."""
+    turning = speeds(state.momentum, body.rate, params) if params.unbalanced else ()
+    return State(motor(command, state.momentum, body.rate, params), tuple(x * (0.5 / math.pi) for x in turning))
 
 
 def momentum(state: State, params: Wheels) -> Vector:
@@ -132,7 +143,9 @@ def momentum(state: State, params: Wheels) -> Vector:
 def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
     """The recorded quantities."""
     h = state.momentum
-    return Sample(h, motor(command, h, body.rate, params), command, available(command, h, params))
+    return Sample(
+        h, motor(command, h, body.rate, params), command, available(command, h, limited(command, h, body.rate, params))
+    )
 
 
 def applied(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
@@ -141,19 +154,24 @@ def applied(state: State, command: Numbers, body: Any, params: Wheels) -> Vector
 
 
 def error(params: Wheels, envelope: Envelope) -> Push:
-    """The largest torque of friction, by which the motors' falls short of the command: of rotors within their momentum
-    limits, together or against one another."""
+    """The largest torque of friction on rotors within their momentum limits, together or against one another, by which the
+    motors' falls short of the command; that of imbalance has no bound on a body that turns."""
+    if params.unbalanced:
+        return Push(math.inf)
     A, viscous = np.array(params.axes), np.array(params.viscous)
     speeds = np.array(params.momentum_limit) / np.array(params.inertia)
     most = np.where(viscous > 0.0, viscous, 0.0) * np.where(viscous > 0.0, speeds, 0.0) + np.array(params.coulomb)
+    most = most + np.array(params.sticking) if params.sticking else most
     stretch = float(np.linalg.norm(A, 2))
     return Push(stretch * float(np.linalg.norm(most)), stretch**2 * float(viscous.max()))
 
 
 def fastest(params: Wheels) -> float:
-    """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included."""
-    columns = zip(params.viscous, params.coulomb, params.inertia, strict=True)
-    return max((viscous + coulomb / CREEP) / inertia for viscous, coulomb, inertia in columns)
+    """The fastest rate (1/s) at which friction brings a rotor to rest, that of Coulomb friction within CREEP included, or
+    the top speed of rotors out of balance."""
+    columns = zip(params.viscous, params.coulomb, params.inertia, slopes(params), strict=True)
+    friction = max((viscous + coulomb / CREEP + slope) / inertia for viscous, coulomb, inertia, slope in columns)
+    return max(friction, *top_speeds(params)) if params.unbalanced else friction
 
 
 def examples() -> list[Wheels]:
@@ -204,12 +222,13 @@ def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> 
         momentum,
         wheels.axes,
         wheels.inertia,
-        wheels.torque_limit,
+        limited(command, momentum, rate, wheels).torque_limit,
         wheels.momentum_limit,
         wheels.viscous,
         wheels.coulomb,
     )
-    return each(_motor, columns, rate)
+    given = each(_motor, columns, rate)
+    return tuple(map(plus, given, sticking(momentum, rate, wheels))) if wheels.sticking else given
 
 
 def _motor(
@@ -249,7 +268,6 @@ def _available(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum
 
 
 def _fraction(x: Scalar) -> Scalar:
-    """x kept within [0, 1]."""
     return where(less(x, 0.0), 0.0, where(less(x, 1.0), x, 1.0))
 
 
@@ -323,7 +341,7 @@ def capacity(state: State, params: Wheels) -> float:
 
 def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
     """The torque (N m) that the wheels surely give as they share it out, in norm or about each body axis at once."""
-    return authority(params, kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
+    return authority(at_top_speed(params), kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
 
 
 def shared_as(params: Wheels, known: Wheels) -> Wheels:
@@ -360,7 +378,7 @@ def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:
 
 
 def _column(name: str, value: Any, count: int, least: float | None, infinite: bool = False) -> Numbers:
-    """A number for each wheel; `least` None asks for positive ones."""
+    """`least` None asks for positive ones."""
     given = np.asarray(value, dtype=float)
     if given.shape not in ((), (count,)):
         raise ValueError(f"{name}: one number or {count} are needed, not an array of shape {given.shape}")

@@ -12,7 +12,7 @@ from starhold.algebra.vector import IDENTITY, ZERO, Vector, scale, subtract
 from starhold.parts.attitudes import attitudes_of, small_turn, together
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
-from starhold.parts.stated_attitude import START, unit_quaternion
+from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
 CARD = Card(
     title="Complementary filter",
@@ -27,7 +27,7 @@ CARD = Card(
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 SEVERAL = {"attitude": ""}
-FIRST = {"gyro_bias": ZERO}
+FIRST = {"gyro_bias": ZERO, "is_valid": 0.0}
 
 
 class Params(NamedTuple):
@@ -41,11 +41,12 @@ class Params(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Attitude, rate without the bias, and the bias."""
+    """Attitude, rate without the bias, the bias, and whether an attitude has come yet."""
 
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
     gyro_bias: Annotated[Vector, Quantity("rad/s", "estimated bias of the gyro", "axis")]
+    is_valid: Annotated[float, VALID]
 
 
 class Memory(NamedTuple):
@@ -80,7 +81,8 @@ def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period
     rate = subtract(readings.rate, bias)
     step = scale(0.5 * period, rate)
     ahead = normalise(multiply(attitude, (1.0, *step)))
-    return Estimate(attitude, rate, bias), Memory(ahead, bias, where(new, 1.0, memory.begun))
+    begun = where(new, 1.0, memory.begun)
+    return Estimate(attitude, rate, bias, begun), Memory(ahead, bias, begun)
 
 
 def examples() -> list[Params]:

@@ -13,7 +13,7 @@ from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, renormalise
 from starhold.algebra.rotation import short_turn
-from starhold.algebra.scalar import Scalar, Truth, less, maximum, sqrt
+from starhold.algebra.scalar import Scalar, Truth, both, less, less_equal, maximum, sqrt, where
 from starhold.algebra.structure import chosen
 from starhold.algebra.structured import when
 from starhold.algebra.vector import (
@@ -27,6 +27,7 @@ from starhold.algebra.vector import (
     combine,
     diagonal,
     inverse,
+    most,
     scale,
     subtract,
     transpose,
@@ -35,7 +36,7 @@ from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
 from starhold.parts.contract import Card, Noise, Parameter, Recursion
 from starhold.parts.craft import Craft
-from starhold.parts.stated_attitude import START, unit_quaternion
+from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
 CARD = Card(
     title="Multiplicative extended Kalman filter",
@@ -55,7 +56,7 @@ CARD = Card(
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 SEVERAL = {"attitude": "more_trackers"}
-FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO}
+FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO, "is_valid": 0.0}
 HOUR = 3600.0
 MOST = 100_000
 """Control periods after which a filter has settled, or does not."""
@@ -87,6 +88,9 @@ class Params(NamedTuple):
     start_deviation: Annotated[
         float, Parameter("rad", above=0.0, text="of that attitude: deviation about each axis; 76 deg if nothing is known")
     ] = UNKNOWN
+    valid_within: Annotated[
+        float, Parameter("rad", above=0.0, text="largest deviation of an attitude that counts as valid; any if absent")
+    ] = math.inf
     more_trackers: Annotated[
         tuple[Tracker, ...],
         Parameter(
@@ -101,7 +105,7 @@ class Numbers(NamedTuple):
     """The attitude stated for the start. Variances: of it (rad2), of the bias then (rad2/s2), of the tracker's attitude
     (rad2, body axes), and what the noise of one reading of the gyro adds to that of the attitude; what the walk of the bias
     adds in a control period to those of attitude, attitude with bias, and bias. The inverse variances of all trackers'
-    attitudes (1/rad2), where there are several."""
+    attitudes (1/rad2), where there are several. The largest deviation of an attitude that counts as valid (rad)."""
 
     start: Quaternion
     start_turn: Scalar
@@ -112,16 +116,19 @@ class Numbers(NamedTuple):
     mixed: Scalar
     walked: Scalar
     weights: tuple[Matrix, ...] = ()
+    valid_within: Scalar = math.inf
 
 
 class Estimate(NamedTuple):
-    """Attitude, rate without the bias, the bias, and the standard deviations of attitude and bias."""
+    """Attitude, rate without the bias, the bias, the standard deviations of attitude and bias, and whether a first attitude
+    has come and that of the attitude is small enough."""
 
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "estimated angular velocity, body axes", "axis")]
     gyro_bias: Annotated[Vector, Quantity("rad/s", "estimated bias of the gyro", "axis")]
     attitude_deviation: Annotated[Vector, Quantity("rad", "standard deviation of its error, body axes", "axis")]
     gyro_bias_deviation: Annotated[Vector, Quantity("rad/s", "standard deviation of its error, body axes", "axis")]
+    is_valid: Annotated[float, VALID]
 
 
 class Memory(NamedTuple):
@@ -176,7 +183,18 @@ def prepare(params: Params, period: float) -> Numbers:
     turned, mixed = 0.25 * walk * period**2, -0.5 * walk * period
     start = unit_quaternion(params.start)
     weights = tuple(map(inverse, trackers)) if params.more_trackers else ()
-    return Numbers(start, params.start_deviation**2, params.bias**2, trackers[0], reading, turned, mixed, walk, weights)
+    return Numbers(
+        start,
+        params.start_deviation**2,
+        params.bias**2,
+        trackers[0],
+        reading,
+        turned,
+        mixed,
+        walk,
+        weights,
+        params.valid_within,
+    )
 
 
 def spread_of(cross: float, roll: float, boresight: Vector) -> Matrix:
@@ -209,7 +227,9 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
     (now,) = when(new, correct, arrived(before, params))
     after = now.memory
     rate = subtract(subtract(readings.rate, after.bias), now.noise)
-    return Estimate(now.attitude, rate, after.bias, deviations(now.turn), deviations(after.walk)), after
+    spread, walked = deviations(now.turn), deviations(after.walk)
+    valid = both(less(1.5, after.stage), less_equal(most(spread), params.valid_within))
+    return Estimate(now.attitude, rate, after.bias, spread, walked, where(valid, 1.0, 0.0)), after
 
 
 def latest(readings: Any, params: Numbers) -> tuple[Quaternion, Truth, Numbers]:

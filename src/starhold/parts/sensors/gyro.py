@@ -7,15 +7,22 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import ZERO, Vector, add, clip_axes, scale
+from starhold.algebra.vector import ZERO, Matrix, Vector, add, scale
+from starhold.parts import as_built
 from starhold.parts.contract import UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.random import Dice
 
 CARD = Card(
     title="Rate gyro",
-    summary="w_m = (1 + scale_error) w + b + noise, b a random walk",
-    sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014): Farrenkopf's gyro model",),
-    assumptions=("axes along the body's", "white noise over a control period"),
+    summary="w_m = (1 + scale_error) w + b + noise, b a random walk and what wanders",
+    sources=(
+        "Fundamentals of Spacecraft Attitude Determination and Control (2014): Farrenkopf's gyro model",
+        "IEEE Std 952-1997: Allan variance of correlated noise",
+    ),
+    assumptions=(
+        "white noise over a control period",
+        "the instability of the bias is a Gauss-Markov process, without any at the start; flicker noise has a flatter floor",
+    ),
 )
 ROLE = "sensor"
 HOUR = 3600.0
@@ -44,17 +51,39 @@ class Params(NamedTuple):
         ),
     ] = 0.0
     scale_error: Annotated[float, Parameter("1", at_least=-0.5, at_most=0.5, text="of the scale factor")] = 0.0
-    limit: Annotated[float, Parameter("rad/s", above=0.0, text="largest rate that it shows; none if absent")] = math.inf
+    limit: Annotated[float, as_built.limit("rad/s")] = math.inf
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    axis_errors: Annotated[Matrix | Vector, as_built.AXES] = ZERO
+    resolution: Annotated[float, as_built.resolution("rad/s")] = 0.0
+    bias_instability: Annotated[
+        float, Parameter("rad/s", at_least=0.0, text="deviation of the part of the bias that wanders about zero")
+    ] = 0.0
+    correlation_time: Annotated[
+        float,
+        Parameter("s", above=0.0, text="of that part: its Allan deviation is largest, 0.62 of it, at 1.9 of this time"),
+    ] = 100.0
 
 
 class Numbers(NamedTuple):
-    """Deviations of a reading and of the bias's step (rad/s), the bias at the start, the scale factor and the limit."""
+    """Deviations of a reading and of the bias's step (rad/s), the bias at the start, the scale factor and the limit; () or
+    its axes, its step (rad/s), and of the part of the bias that wanders the share that stays and the deviation of what is
+    added (rad/s)."""
 
     deviation: Scalar
     walk: Scalar
     bias: Vector
     factor: Scalar
     limit: Scalar
+    axes: as_built.Axes = ()
+    step: as_built.Step = ()
+    wander: tuple[Scalar, ...] = ()
+
+
+class Wandering(NamedTuple):
+    """The bias of a control step without the part that wanders, and that part (rad/s)."""
+
+    bias: Vector
+    wander: Vector
 
 
 class Reading(NamedTuple):
@@ -66,23 +95,43 @@ class Reading(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a control step."""
     walk = params.bias_walk * math.sqrt(period / HOUR)
-    return Numbers(params.noise / math.sqrt(period), walk, params.bias, 1.0 + params.scale_error, params.limit)
+    stays, size = math.exp(-period / params.correlation_time), params.bias_instability
+    return Numbers(
+        params.noise / math.sqrt(period),
+        walk,
+        params.bias,
+        1.0 + params.scale_error,
+        params.limit,
+        as_built.axes_of(params.mounting_error, params.axis_errors),
+        as_built.step_of(params.resolution),
+        (stays, size * math.sqrt(1.0 - stays * stays)) if as_built.is_given(size) else (),
+    )
 
 
-def remember(params: Numbers, state: Any) -> Vector:
+def remember(params: Numbers, state: Any) -> Vector | Wandering:
     """The bias at the start (rad/s)."""
-    return params.bias
+    return Wandering(params.bias, ZERO) if params.wander else params.bias
 
 
-def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Vector]:
+def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The rate with the bias and noise of this control step, and the bias of the next."""
-    shown = add(add(scale(params.factor, state.rate), memory), dice.vector(0, params.deviation))
-    return Reading(clip_axes(shown, params.limit)), add(memory, dice.vector(3, params.walk))
+    bias = add(memory.bias, memory.wander) if params.wander else memory
+    seen = as_built.along(params.axes, state.rate)
+    shown = add(add(scale(params.factor, seen), bias), dice.vector(0, params.deviation))
+    reading = Reading(as_built.shown(shown, params.step, params.limit))
+    if not params.wander:
+        return reading, add(memory, dice.vector(3, params.walk))
+    stays, added = params.wander
+    wander = add(scale(stays, memory.wander), dice.vector(6, added))
+    return reading, Wandering(add(memory.bias, dice.vector(3, params.walk)), wander)
 
 
 def error(params: Params) -> Errors:
-    """The bias at the start; what grows with the rate has no bound."""
-    return UNBOUNDED if params.scale_error or params.limit < math.inf else Errors(rate=math.hypot(*params.bias))
+    """The bias at the start and half a step; what grows with the rate, or wanders, has no bound."""
+    built = as_built.is_given(params.scale_error, params.mounting_error, params.axis_errors, params.bias_instability)
+    if built or params.limit < math.inf:
+        return UNBOUNDED
+    return Errors(rate=math.hypot(*params.bias) + as_built.off_step(params.resolution))
 
 
 def noise(params: Params, period: float) -> Noise:
@@ -92,6 +141,10 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """A MEMS gyro, one that has a bias alone, and one that is exact."""
+    """A MEMS gyro, one that has a bias alone, one that is exact, and one as it is built."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
-    return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params()]
+    skewed = ((1e-3, 0.0, 5e-4), (0.0, -2e-3, 0.0), (0.0, 3e-4, 0.0))
+    built = mems._replace(
+        mounting_error=(2e-3, 0.0, -1e-3), axis_errors=skewed, resolution=1e-4, bias_instability=1e-5, correlation_time=300.0
+    )
+    return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params(), built]

@@ -8,8 +8,8 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, sqrt, where
-from starhold.algebra.vector import ZERO, Vector, add, scale
-from starhold.parts import magnetic_field
+from starhold.algebra.vector import ZERO, Matrix, Vector, add, scale
+from starhold.parts import as_built, magnetic_field
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -21,7 +21,6 @@ CARD = Card(
     sources=(magnetic_field.SOURCE, "Fundamentals of Spacecraft Attitude Determination and Control (2014)"),
     assumptions=(
         *magnetic_field.ASSUMPTIONS,
-        "axes along the body's",
         "white noise from control step to control step; a density is one-sided, and a reading has what lies below half the "
         "rate of control",
         "magnetic parts on board show as a constant bias: torque rods are off while it measures",
@@ -45,16 +44,24 @@ class Params(NamedTuple):
         float,
         Parameter("T/sqrt(Hz)", at_least=0.0, text="one-sided; with n readings a second sqrt(n/2) of it adds to `noise`"),
     ] = 0.0
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    axis_errors: Annotated[Matrix | Vector, as_built.AXES] = ZERO
+    resolution: Annotated[float, as_built.resolution("T")] = 0.0
+    limit: Annotated[float, as_built.limit("T")] = math.inf
 
 
 class Numbers(NamedTuple):
-    """Deviation and bias (T), the scale factor, the field, and the outage (control steps)."""
+    """Deviation and bias (T), the scale factor, the field, and the outage (control steps); () or its axes, its step (T),
+    and its limit (T)."""
 
     noise: Scalar
     bias: Vector
     factor: Scalar
     field: magnetic_field.Numbers
     outage: Window
+    axes: as_built.Axes = ()
+    step: as_built.Step = ()
+    limit: tuple[Scalar, ...] = ()
 
 
 class Reading(NamedTuple):
@@ -67,7 +74,16 @@ class Reading(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known, and for a bad outage."""
     field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period)
-    return Numbers(_deviation(params, period), params.bias, 1.0 + params.scale_error, field, outage)
+    return Numbers(
+        _deviation(params, period),
+        params.bias,
+        1.0 + params.scale_error,
+        field,
+        outage,
+        as_built.axes_of(params.mounting_error, params.axis_errors),
+        as_built.step_of(params.resolution),
+        (params.limit,) if params.limit < math.inf else (),
+    )
 
 
 def remember(params: Numbers, state: Any) -> Vector:
@@ -78,7 +94,10 @@ def remember(params: Numbers, state: Any) -> Vector:
 def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Vector]:
     """The field at this control step, or in an outage the last one before it."""
     true = magnetic_field.field_at(state.position, step, params.field)
-    shown = add(add(scale(params.factor, to_body(state.attitude, true)), params.bias), dice.vector(0, params.noise))
+    seen = as_built.along(params.axes, to_body(state.attitude, true))
+    shown = add(add(scale(params.factor, seen), params.bias), dice.vector(0, params.noise))
+    if params.step or params.limit:
+        shown = as_built.shown(shown, params.step, params.limit[0] if params.limit else math.inf)
     out = is_out(step, params.outage)
     latest: Any = tuple(where(out, old, new) for old, new in zip(memory, shown, strict=True))
     return Reading(latest, where(out, 0.0, 1.0)), latest
@@ -86,10 +105,12 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
 
 def error(params: Params) -> Errors:
     """The largest error beside noise and without outages, wherever there is no ground."""
-    if params.outage != NEVER:
+    if params.outage != NEVER or params.limit < math.inf:
         return UNBOUNDED
-    scaled = abs(params.scale_error) * magnetic_field.strongest(params.epoch, magnetic_field.GROUND)
-    return NO_ERRORS._replace(field=scaled + math.hypot(*params.bias))
+    skewed = as_built.stretch(as_built.axes_of(params.mounting_error, params.axis_errors))
+    share = abs(params.scale_error) * (1.0 + skewed) + skewed
+    scaled = share * magnetic_field.strongest(params.epoch, magnetic_field.GROUND)
+    return NO_ERRORS._replace(field=scaled + math.hypot(*params.bias) + as_built.off_step(params.resolution))
 
 
 def noise(params: Params, period: float) -> Noise:
@@ -103,6 +124,7 @@ def _deviation(params: Params, period: float) -> Scalar:
 
 
 def examples() -> list[Params]:
-    """Return the magnetometer of a CubeSat, and an exact one with an outage and another epoch."""
+    """Return the magnetometer of a CubeSat, an exact one with an outage and another epoch, and one as it is built."""
     small = Params(noise=5e-8, bias=(2e-7, -1e-7, 3e-7), scale_error=0.002)
-    return [small, Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), outage=(0.5, 1.5))]
+    built = small._replace(mounting_error=(0.0, 0.01, -0.02), axis_errors=(1e-3, -2e-3, 5e-4), resolution=1.5e-8, limit=1e-4)
+    return [small, Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), outage=(0.5, 1.5)), built]

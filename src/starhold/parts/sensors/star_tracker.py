@@ -6,20 +6,24 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
-from starhold.algebra.scalar import Scalar, both, less, opposite, where
+from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise, to_reference
+from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, where
 from starhold.algebra.structured import when
-from starhold.algebra.vector import Vector, add, along_axis, dot, scale, subtract
+from starhold.algebra.vector import ZERO, Vector, add, along_axis, dot, scale, subtract
+from starhold.parts import as_built, blinding
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
+from starhold.parts.craft import Craft
+from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
 
 CARD = Card(
     title="Star tracker",
     summary="q_m = q(t - delay) turned by Gaussian angles, more about the boresight; held between updates",
-    sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)",),
+    sources=("Fundamentals of Spacecraft Attitude Determination and Control (2014)", *blinding.SOURCES),
     assumptions=(
-        "stars are in view except during the outage",
+        "stars are in view except during the outage, above the rate limit and, as a reading is due, within cones that blind",
+        *blinding.ASSUMPTIONS,
         "errors independent from update to update",
         "before its first update it shows the inertial axes",
     ),
@@ -43,11 +47,20 @@ class Params(NamedTuple):
     interval: Annotated[float, Parameter("s", at_least=0.0, text="between updates; each control step if 0")] = 0.0
     delay: Annotated[float, Parameter("s", at_least=0.0, text="from exposure to reading")] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER
+    sun_cone: Annotated[float, blinding.SUN] = 0.0
+    moon_cone: Annotated[float, blinding.MOON] = 0.0
+    limb_cones: Annotated[tuple[float, float], blinding.LIMB] = blinding.NONE
+    rate_limit: Annotated[
+        float, Parameter("rad/s", above=0.0, text="above which stars smear and there is no reading; none if absent")
+    ] = math.inf
+    epoch: Annotated[Date, EPOCH] = START
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
 
 
 class Numbers(NamedTuple):
     """Deviations (rad), the unit vector of the boresight, control steps from update to update, those of the delay, and those
-    of the outage."""
+    of the outage; the cones that blind, the squared rate limit (rad2/s2), and the turn of its mounting, () for
+    none."""
 
     cross: Scalar
     roll: Scalar
@@ -55,6 +68,9 @@ class Numbers(NamedTuple):
     every: Scalar
     late: int
     outage: Window
+    cones: blinding.Cones | tuple[()] = ()
+    square: tuple[Scalar, ...] = ()
+    mounted: as_built.Turn = ()
 
 
 class Memory(NamedTuple):
@@ -75,21 +91,32 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for a boresight without direction, too long a delay, and a bad outage."""
+    """The numbers of a control step. ValueError for a boresight without direction, too long a delay, a bad outage,
+    and cones that blind always."""
     size = math.hypot(*params.boresight)
     if not size > 0.0:
         raise ValueError("the boresight needs a direction")
     late = round(params.delay / period)
     if late > MOST:
         raise ValueError(f"the delay must be at most {MOST} control periods, {MOST * period:g} s")
+    boresight, mounted = scale(1.0 / size, params.boresight), as_built.turn_of(params.mounting_error)
+    looks = to_reference(mounted, boresight) if mounted else boresight
     return Numbers(
         params.cross,
         params.roll,
-        scale(1.0 / size, params.boresight),
+        boresight,
         float(max(1, round(params.interval / period))),
         late,
         in_steps(params.outage, period),
+        blinding.prepared(looks, params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, period),
+        (params.rate_limit * params.rate_limit,) if params.rate_limit < math.inf else (),
+        mounted,
     )
+
+
+def check_start(params: Numbers, start: Any, craft: Craft) -> None:
+    """Raise ValueError where cones have no orbit, or blind always."""
+    blinding.check(params.cones, start, craft)
 
 
 def remember(params: Numbers, state: Any) -> Memory:
@@ -101,12 +128,17 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
     """The last update, a new one where it is due."""
     seen = memory.waiting[-1] if params.late else state.attitude
     due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
+    if params.cones:
+        due = both(due, opposite(blinding.is_blind(state, params.cones, step)))
+    if params.square:
+        due = both(due, less_equal(dot(state.rate, state.rate), params.square[0]))
 
     def fresh(_: Quaternion) -> tuple[Quaternion]:
         angles = dice.vector(0, 1.0)
         along = scale(dot(angles, params.boresight), params.boresight)
         error = add(scale(0.5 * params.cross, subtract(angles, along)), scale(0.5 * params.roll, along))
-        return (normalise(multiply(seen, (1.0, *error))),)
+        mounted = multiply(seen, params.mounted) if params.mounted else seen
+        return (normalise(multiply(mounted, (1.0, *error))),)
 
     (shown,) = when(due, fresh, memory.shown)
     waiting = (state.attitude, *memory.waiting[:-1]) if params.late else ()
@@ -115,8 +147,11 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
 
 
 def error(params: Params) -> Errors:
-    """None where an attitude is there as it is; what the craft turns until it comes has no bound."""
-    return UNBOUNDED if params.delay or params.outage != NEVER else NO_ERRORS
+    """That of the mounting where an attitude is there as it is; what the craft turns until it comes has no bound."""
+    silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
+    if params.delay or silent or params.rate_limit < math.inf:
+        return UNBOUNDED
+    return NO_ERRORS._replace(attitude=math.hypot(*params.mounting_error))
 
 
 def noise(params: Params, period: float) -> Noise:
@@ -126,6 +161,12 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """A small one at four readings a second, and one that is exact."""
+    """A small one at four readings a second, one that is exact but askew, and one with cones."""
     arcsec = math.radians(1.0 / 3600.0)
-    return [Params(6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8), 0.25, 0.2), Params(0.0, 0.0)]
+    sun, moon, lit, dark = (math.radians(angle) for angle in (40.0, 10.0, 30.0, 5.0))
+    blinded = Params(1e-5, 1e-4, (0.0, 0.0, -1.0), 0.2, 0.0, NEVER, sun, moon, (lit, dark), math.radians(3.0))
+    return [
+        Params(6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8), 0.25, 0.2),
+        Params(0.0, 0.0, mounting_error=(1e-3, -2e-3, 5e-4)),
+        blinded,
+    ]

@@ -10,7 +10,7 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, where
 from starhold.algebra.vector import ZERO, Vector, add, dot, scale, unit
 from starhold.algebra.words import number_of
-from starhold.parts import sun
+from starhold.parts import as_built, sun
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -48,11 +48,12 @@ class Params(NamedTuple):
     ] = math.pi
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
 
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the Sun, the control
-    period (s), and the outage (control steps)."""
+    period (s), and the outage (control steps); () or its axes."""
 
     noise: Scalar
     boresight: Vector
@@ -60,6 +61,7 @@ class Numbers(NamedTuple):
     sun: sun.Numbers
     period: Scalar
     outage: Window
+    axes: as_built.Axes = ()
 
 
 class Reading(NamedTuple):
@@ -77,13 +79,15 @@ def prepare(params: Params, period: float) -> Numbers:
     # The margin for rounding lets a sensor with half a turn see all.
     cosine = math.cos(params.half_angle) - 1e-12
     outage = in_steps(params.outage, period)
-    return Numbers(params.noise, scale(1.0 / size, params.boresight), cosine, sun.prepared(params.epoch), period, outage)
+    axes = as_built.axes_of(params.mounting_error, ZERO)
+    boresight = scale(1.0 / size, params.boresight)
+    return Numbers(params.noise, boresight, cosine, sun.prepared(params.epoch), period, outage, axes)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The Sun at this control step."""
     seen = sun.sun(number_of(step) * params.period, params.sun)
-    toward = to_body(state.attitude, seen.direction)
+    toward = as_built.along(params.axes, to_body(state.attitude, seen.direction))
     inside = less_equal(params.cosine, dot(toward, params.boresight))
     lit = less(0.5, sun.in_view(state.position, seen))
     visible = both(both(inside, lit), opposite(is_out(step, params.outage)))
@@ -94,8 +98,8 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def examples() -> list[Params]:
-    """A fine one, and an exact one that sees all."""
+    """A fine one, and one without noise that sees all and is mounted askew."""
     return [
         Params(math.radians(0.1), (1.0, 0.0, 1.0), math.radians(60.0)),
-        Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0)),
+        Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), mounting_error=(0.01, 0.0, -0.02)),
     ]

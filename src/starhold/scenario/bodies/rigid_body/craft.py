@@ -14,8 +14,9 @@ from starhold.errors import input_at
 from starhold.parts.catalogue import find, fit
 from starhold.parts.craft import Craft, bare_inertia, compact, inverse, make_craft
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
+from starhold.parts.effectors.wheel_motion import with_more
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
-from starhold.parts.effectors.wheels import ALLOCATIONS, State, Wheels, make_wheels
+from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels, make_wheels, remember
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies.rigid_body.tables import RigidBodyTable, Rotor, WheelsTable
 
@@ -25,6 +26,15 @@ if TYPE_CHECKING:
 
 LAYOUTS = {"orthogonal": three_orthogonal, "pyramid": pyramid, "nasa-standard": nasa_standard}
 NUMBERS = ("inertia", "torque_limit", "momentum_limit", "viscous", "coulomb")
+NONE: dict[str, Any] = {
+    "static_friction": 0.0,
+    "stribeck_speed": 0.0,
+    "power_limit": math.inf,
+    "static_imbalance": 0.0,
+    "dynamic_imbalance": 0.0,
+    "position": (0.0, 0.0, 0.0),
+}
+"""What wheels may have besides, and what stands for none."""
 
 
 def written_out(scenario: Scenario, target: Fitted, effectors: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
@@ -55,8 +65,14 @@ def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
     if table.wheels is None and not table.wheel:
         return ()
     axes, columns, momenta = rotors_in(table)
+    shared = table.wheels or WheelsTable()
+    rotors: list[Rotor] = [*table.wheel] or [shared] * len(axes)
     wheels = make_wheels(axes, **columns)._replace(allocation=ALLOCATIONS.index((table.wheels or WheelsTable()).allocation))
-    return (Fitted(find("effector", "wheels"), wheels, start=State(tuple(momenta))),)
+    more = {name: [_given(name, rotor, shared) for rotor in rotors] for name in NONE}
+    if any(value is not None for column in more.values() for value in column):
+        filled = ([NONE[name] if x is None else x for x in column] for name, column in more.items())
+        wheels = with_more(wheels, *filled)
+    return (Fitted(find("effector", "wheels"), wheels, start=remember(wheels)._replace(momentum=tuple(momenta))),)
 
 
 def rotors_in(table: RigidBodyTable) -> tuple[list[Any], dict[str, list[Any]], list[Any]]:
@@ -66,7 +82,15 @@ def rotors_in(table: RigidBodyTable) -> tuple[list[Any], dict[str, list[Any]], l
     axes = [wheel.axis for wheel in single] or list(LAYOUTS[shared.layout or ""]())
     rotors: list[Rotor] = [*single] or [shared] * len(axes)
     columns = {name: [_number(name, rotor, shared, place) for place, rotor in enumerate(rotors, 1)] for name in NUMBERS}
-    return axes, columns, [(rotor if "momentum" in rotor.model_fields_set else shared).momentum for rotor in rotors]
+    started = [rotor if {"momentum", "speed"} & rotor.model_fields_set else shared for rotor in rotors]
+    pairs = zip(started, columns["inertia"], strict=True)
+    return axes, columns, [one.momentum if one.speed is None else inertia * one.speed for one, inertia in pairs]
+
+
+def _given(name: str, table: Rotor, shared: Rotor) -> Any:
+    """A number of a wheel: its own or what all share, None without either."""
+    own = getattr(table, name)
+    return getattr(shared, name) if own is None else own
 
 
 def _number(name: str, table: Rotor, shared: Rotor, place: int) -> Any:
@@ -75,6 +99,8 @@ def _number(name: str, table: Rotor, shared: Rotor, place: int) -> Any:
         value: Any = getattr(given, name)
         if value is not None:
             return value
+        if name == "momentum_limit" and given.top_speed is not None:
+            return _number("inertia", table, shared, place) * given.top_speed
         if given.unit is not None:
             if given.unit not in WHEEL_UNITS:
                 raise ValueError(f"no wheel unit {given.unit!r}; one of {', '.join(WHEEL_UNITS)}")

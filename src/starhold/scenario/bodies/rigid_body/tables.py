@@ -196,6 +196,33 @@ class Rotor(Table):
     viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
     coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
     momentum: Annotated[float, *quantity(Gain("N m s", text="at the start"))] = 0.0
+    top_speed: Annotated[
+        float | None, *quantity(Gain("rad/s", above=0.0, text='in place of momentum_limit, such as "6000 rpm"'))
+    ] = None
+    speed: Annotated[float | None, *quantity(Gain("rad/s", text="at the start in place of momentum, body at rest"))] = None
+    static_friction: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="largest, of a slow rotor"))] = None
+    stribeck_speed: Annotated[
+        float | None, *quantity(Gain("rad/s", above=0.0, text="at which friction is largest, the static one"))
+    ] = None
+    power_limit: Annotated[
+        float | None, *quantity(Gain("W", above=0.0, text="of the motor as it drives the rotor: torque times speed"))
+    ] = None
+    static_imbalance: Annotated[
+        float | None, *quantity(Gain("kg m", at_least=0.0, text="mass of the rotor times its distance from the axis"))
+    ] = None
+    dynamic_imbalance: Annotated[
+        float | None, *quantity(Gain("kg m^2", at_least=0.0, text="product of inertia of the rotor about its axis"))
+    ] = None
+    position: Annotated[
+        Any, *quantity(Gain("m", shape=(3,), spread=False, text="from the centre of mass, for a static imbalance"))
+    ] = None
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> Rotor:
+        for speed, momentum in (("top_speed", "momentum_limit"), ("speed", "momentum")):
+            if getattr(self, speed) is not None and momentum in self.model_fields_set:
+                raise at_key(speed, f"either {speed} or {momentum}, not both", getattr(self, speed))
+        return self
 
 
 class WheelTable(Rotor):

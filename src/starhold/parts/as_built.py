@@ -1,0 +1,103 @@
+"""Sensors as they are built: mounted a little otherwise than law and filter take them, with axes of another scale that are
+not at right angles, in steps and within limits. What is not asked for leaves a sensor's equations as they are."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from starhold.algebra.circular import nearest
+from starhold.algebra.cosines import from_quaternion
+from starhold.algebra.quaternion import Quaternion, normalise, to_reference
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.several import each
+from starhold.algebra.structure import leaves
+from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, clip_axes, diagonal, multiply, scale
+from starhold.parts.contract import Parameter
+
+Turn: TypeAlias = Quaternion | tuple[()]
+Axes: TypeAlias = Matrix | tuple[()]
+Step: TypeAlias = tuple[Scalar, ...]
+MOUNTING = Parameter(
+    "rad",
+    shape=(3,),
+    spread=False,
+    at_least=-0.5,
+    at_most=0.5,
+    text="small turn about the body axes by which it is mounted otherwise than law and filter take it",
+)
+"""The declaration of a mounting error, common to all parts."""
+AXES = Parameter(
+    shape=(3, 3), text="errors of its axes: of their scales on the diagonal, beside it those of non-orthogonal ones"
+)
+"""The declaration of errors of a sensor's axes, common to all sensors."""
+
+
+def resolution(unit: str) -> Parameter:
+    """The declaration of the step of what a sensor shows."""
+    return Parameter(unit, at_least=0.0, text="step between what it can show on an axis; none if 0")
+
+
+def limit(unit: str) -> Parameter:
+    """The declaration of the most that a sensor shows on an axis."""
+    return Parameter(unit, above=0.0, text="most that it shows on an axis; none if absent")
+
+
+def is_given(*numbers: Any) -> bool:
+    """Whether one of these is not zero; a recorded number stands for those that runs draw, which are not."""
+    return any(not isinstance(number, float | int) or number for number in leaves(numbers))
+
+
+def turn_of(mounting: Vector) -> Turn:
+    """The turn from the body axes to those of the mounting, () for none."""
+    return normalise((1.0, *scale(0.5, mounting))) if is_given(mounting) else ()
+
+
+def axes_of(mounting: Vector, errors: Matrix | Vector) -> Axes:
+    """What a vector in body axes is multiplied by as a sensor shows it, () for nothing."""
+    turn = turn_of(mounting)
+    if not turn and not is_given(errors):
+        return ()
+    rows = errors if isinstance(errors[0], tuple) else diagonal(errors)  # pyright: ignore[reportArgumentType]
+    skewed: Matrix = tuple(map(add, IDENTITY, rows))  # pyright: ignore[reportAssignmentType, reportArgumentType]
+    return multiply(skewed, from_quaternion(turn)) if turn else skewed
+
+
+def along(axes: Axes, vector: Vector) -> Vector:
+    """A vector as it is along the axes of a sensor."""
+    return apply(axes, vector) if axes else vector
+
+
+def in_body(turn: Turn, vector: Vector) -> Vector:
+    """A vector along the axes of a mounting in body axes."""
+    return to_reference(turn, vector) if turn else vector
+
+
+def step_of(size: float) -> Step:
+    """The step as equations take it, () for none."""
+    return (size,) if is_given(size) else ()
+
+
+def shown(vector: Vector, step: Step, most: Scalar) -> Vector:
+    """A vector in steps, and within a limit of each axis."""
+    if step:
+        x, y, z = each(partial(_in_steps, step[0]), (vector,))
+        vector = (x, y, z)
+    return clip_axes(vector, most)
+
+
+def _in_steps(step: Scalar, x: Scalar) -> Scalar:
+    return step * nearest(x / step)
+
+
+def stretch(axes: Axes) -> float:
+    """The most by which the axes change a vector, as a share of it."""
+    return float(np.linalg.norm(np.array(axes) - np.eye(3), 2)) if axes else 0.0
+
+
+def off_step(size: float) -> float:
+    """The largest error, in norm, of three components in steps."""
+    return 0.5 * math.sqrt(3.0) * size

@@ -1,0 +1,77 @@
+"""The Moon: its place over time."""
+
+from __future__ import annotations
+
+from math import cos, radians, sin
+from typing import NamedTuple
+
+from starhold.algebra.circular import cosine_sine
+from starhold.algebra.scalar import Scalar
+from starhold.algebra.vector import Vector
+from starhold.parts.epoch import DAY, Date, days_of
+from starhold.parts.orbit import BODIES
+
+SOURCES = ("The Astronomical Almanac: low-precision formulas for the Moon",)
+ASSUMPTIONS = ("the Moon's direction, as the Earth sees it, to 0.4 deg from 1950 to 2050",)
+EARTH = BODIES["Earth"].radius
+CENTURY, LATE = 36525.0, 69.2
+"""Days in a Julian century, and by how many seconds Terrestrial Time is ahead of UTC."""
+_MEAN = (218.32, 481267.881)
+# Degrees; and the degrees at J2000 and in a century of each term's angle.
+_LONGITUDE = (
+    (6.29, 135.0, 477198.87),
+    (-1.27, 259.3, -413335.36),
+    (0.66, 235.7, 890534.22),
+    (0.21, 269.9, 954397.74),
+    (-0.19, 357.5, 35999.05),
+    (-0.11, 186.5, 966404.03),
+)
+_LATITUDE = ((5.13, 93.3, 483202.02), (0.28, 228.2, 960400.89), (-0.28, 318.3, 6003.15), (-0.17, 217.6, -407332.21))
+_PARALLAX = (0.0518, 0.0095, 0.0078, 0.0028)
+"""Of the cosines of the longitude's first angles; beside 0.9508 deg."""
+
+
+class Numbers(NamedTuple):
+    """At the start the mean longitude and the angles of the terms of longitude and latitude (turns), and cosine and sine of
+    the equator's slope."""
+
+    mean: Scalar
+    longitude: tuple[Scalar, ...]
+    latitude: tuple[Scalar, ...]
+    cosine: Scalar
+    sine: Scalar
+
+
+def prepared(epoch: Date) -> Numbers:
+    """The numbers of the Moon for a flight that begins at an epoch (UTC); ValueError for one that is no date."""
+    days = days_of(epoch)
+    centuries = (days + LATE / DAY) / CENTURY
+
+    def begun(first: float, rate: float) -> float:
+        return ((first + rate * centuries) / 360.0) % 1.0
+
+    along, across = (tuple(begun(*term[1:]) for term in terms) for terms in (_LONGITUDE, _LATITUDE))
+    slope = radians(23.439 - 4e-7 * days)
+    return Numbers(begun(*_MEAN), along, across, cos(slope), sin(slope))
+
+
+def position(time: Scalar, params: Numbers) -> Vector:
+    """The Moon's place (m, inertial axes, from the Earth's centre) so many seconds after the start."""
+
+    def angle(begin: Scalar, rate: float) -> Scalar:
+        return begin + rate / (360.0 * CENTURY * DAY) * time
+
+    along = [cosine_sine(angle(begin, rate)) for begin, (_, _, rate) in zip(params.longitude, _LONGITUDE, strict=True)]
+    across = [cosine_sine(angle(begin, rate)) for begin, (_, _, rate) in zip(params.latitude, _LATITUDE, strict=True)]
+    ahead = sum(term[0] / 360.0 * s for term, (_, s) in zip(_LONGITUDE, along, strict=True))
+    x, y = cosine_sine(angle(params.mean, _MEAN[1]) + ahead)
+    level, north = cosine_sine(sum(term[0] / 360.0 * s for term, (_, s) in zip(_LATITUDE, across, strict=True)))
+    parallax = 0.9508 + sum(size * c for size, (c, _) in zip(_PARALLAX, along, strict=False))
+    # Angles of a degree are their sines to 5e-5.
+    distance = EARTH / (radians(1.0) * parallax)
+    x, y = distance * (level * x), level * y
+    return (
+        x,
+        distance * (params.cosine * y - params.sine * north),
+        distance * (params.sine * y + params.cosine * north),
+    )

@@ -1,0 +1,147 @@
+"""Coarse Sun sensors: photodiodes on faces of the craft, whose currents by the cosine law give the Sun's direction."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.quaternion import to_body
+from starhold.algebra.scalar import Scalar, both, divide, less, maximum, opposite, where
+from starhold.algebra.several import each, weighted
+from starhold.algebra.vector import (
+    ZERO,
+    Matrix,
+    Vector,
+    along_axis,
+    apply,
+    combine,
+    diagonal,
+    dot,
+    inverse,
+    norm,
+    scale,
+    unit,
+)
+from starhold.algebra.words import number_of
+from starhold.parts import as_built, sun
+from starhold.parts.contract import Card, Parameter
+from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.random import RANGE, Dice
+
+CARD = Card(
+    title="Coarse Sun sensors",
+    summary="I_i = max(n_i.s, 0) + albedo max(-n_i.r, 0) max(r.s, 0) + noise; s_m by least squares with weights I_i",
+    sources=(*sun.SOURCES, "Fundamentals of Spacecraft Attitude Determination and Control (2014): cosine detectors"),
+    assumptions=(
+        *sun.ASSUMPTIONS,
+        sun.SHADOW,
+        "the Earth's light comes from its centre, at most `albedo` of the Sun's: a bound of what is scattered",
+        "currents are shares of that of a diode that faces the Sun; noise is white from control step to control step",
+        "faces do not shade one another",
+    ),
+)
+ROLE = "sensor"
+NEEDS = ("two-body",)
+ABOUT = "Earth"
+FIRST = {"sun": ZERO, "sun_is_seen": 0.0}
+Row: TypeAlias = tuple[float, float, float]
+CUBE: tuple[Row, ...] = (
+    (1.0, 0.0, 0.0),
+    (-1.0, 0.0, 0.0),
+    (0.0, 1.0, 0.0),
+    (0.0, -1.0, 0.0),
+    (0.0, 0.0, 1.0),
+    (0.0, 0.0, -1.0),
+)
+FAINT = 1e-6
+"""Weight of what the currents leave open, which is taken for zero."""
+
+
+class Params(NamedTuple):
+    """The faces with a diode each, the errors of the currents, and the epoch."""
+
+    faces: Annotated[
+        tuple[Row, ...], Parameter("1, 1, 1", columns=("x", "y", "z"), text="a row for each diode: its normal, body axes")
+    ] = CUBE
+    noise: Annotated[float, Parameter("1", at_least=0.0, text="standard deviation of a current")] = 0.0
+    albedo: Annotated[float, Parameter("1", at_least=0.0, at_most=1.0, text="the Earth's light below the Sun")] = 0.0
+    threshold: Annotated[
+        float, Parameter("1", at_least=0.0, at_most=1.0, text="current below which a diode counts as dark")
+    ] = 0.05
+    epoch: Annotated[Date, EPOCH] = START
+    outage: Annotated[Window, OUTAGE] = NEVER
+    mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+
+
+class Numbers(NamedTuple):
+    """Unit normals, as flight software has them; the deviation, the albedo and the threshold; the Sun, the control period
+    (s), the outage (control steps), and the axes of the mounting, () for those of the body."""
+
+    normals: tuple[Vector, ...]
+    noise: Scalar
+    albedo: Scalar
+    threshold: Scalar
+    sun: sun.Numbers
+    period: Scalar
+    outage: Window
+    axes: as_built.Axes
+
+
+class Reading(NamedTuple):
+    """The direction that the currents give, zero where all diodes are dark."""
+
+    sun: Annotated[Vector, Quantity("1", "direction by the currents, 0 if unseen, body axes", "axis")]
+    sun_is_seen: Annotated[float, Quantity("1", "1 where a diode is lit, else 0")]
+
+
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for faces without direction, too many of them, a bad epoch and a bad outage."""
+    if not 0 < len(params.faces) <= RANGE:
+        raise ValueError(f"from 1 to {RANGE} diodes are taken, not {len(params.faces)}")
+    if not all(math.hypot(*face) > 0.0 for face in params.faces):
+        raise ValueError("each diode needs a normal with a direction")
+    normals = tuple(scale(1.0 / math.hypot(*face), face) for face in params.faces)
+    outage, axes = in_steps(params.outage, period), as_built.axes_of(params.mounting_error, ZERO)
+    shares = params.noise, params.albedo, params.threshold
+    return Numbers(normals, *shares, sun.prepared(params.epoch), period, outage, axes)
+
+
+def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
+    """The direction by the currents of this control step."""
+    seen = sun.sun(number_of(step) * params.period, params.sun)
+    up = unit(state.position)
+    light = sun.in_view(state.position, seen)
+    below = params.albedo * maximum(dot(up, seen.direction), 0.0)
+    toward, down = (as_built.along(params.axes, to_body(state.attitude, v)) for v in (seen.direction, scale(-1.0, up)))
+    noises = dice.normals(0, len(params.normals))
+    currents = each(_current, (params.normals, noises), toward, light, down, below, params.noise)
+    weights = each(_weight, (currents,), params.threshold)
+    gram: Matrix = diagonal((FAINT, FAINT, FAINT))
+    for weight, face in zip(weights, params.normals, strict=True):
+        gram = combine(1.0, gram, weight, along_axis(face, 1.0, 0.0))
+    flowing = tuple(weight * current for weight, current in zip(weights, currents, strict=True))
+    found = apply(inverse(gram), weighted(flowing, params.normals))
+    length = norm(found)
+    visible = both(less(params.threshold, length), opposite(is_out(step, params.outage)))
+    shown: Any = tuple(where(visible, divide(x, length), 0.0) for x in found)
+    return Reading(shown, where(visible, 1.0, 0.0)), memory
+
+
+def _current(
+    face: Vector, noise: Scalar, toward: Vector, light: Scalar, down: Vector, below: Scalar, deviation: Scalar
+) -> Scalar:
+    direct, scattered = light * maximum(dot(face, toward), 0.0), below * maximum(dot(face, down), 0.0)
+    return direct + scattered + deviation * noise
+
+
+def _weight(current: Scalar, threshold: Scalar) -> Scalar:
+    """A diode counts as its current is strong, so that light from the other side is only taken off."""
+    return where(less(threshold, current), current, 0.0)
+
+
+def examples() -> list[Params]:
+    """Diodes on a cube in the Earth's light, and on a pyramid of four without noise."""
+    pyramid = tuple((x, y, 1.0) for x in (1.0, -1.0) for y in (1.0, -1.0))
+    return [Params(CUBE, 0.01, 0.3), Params(pyramid, threshold=0.02, mounting_error=(0.0, 0.01, 0.0))]

@@ -1,0 +1,60 @@
+"""Estimates say whether they rest on a measurement, and their deviations are right between measurements too."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import starhold as sh
+from starhold.scenario.building import build
+from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, errors, scenario, tracker
+
+LATE = FIRST | {"outage": [0.0, 10.0]}
+COMPLEMENTARY = {"type": "complementary-filter", "attitude_gain": 0.2, "bias_gain": 0.01}
+ORBIT = {"position": [6.9e6, 0.0, 0.0], "velocity": [0.0, 5.0e3, 5.7e3]}
+DIRECTIONS = ({"type": "gnss"}, {"type": "magnetometer"}, {"type": "sun-sensor", "outage": [0.0, 10.0]})
+
+
+@pytest.mark.parametrize(
+    ("parts", "name"),
+    [
+        ((GYRO, LATE, FILTER), "mekf"),
+        ((GYRO, LATE, COMPLEMENTARY), "complementary_filter"),
+        ((GYRO, *DIRECTIONS, {"type": "triad"}), "triad"),
+        ((GYRO, *DIRECTIONS, {"type": "quest"}), "quest"),
+    ],
+)
+def test_an_estimate_is_valid_from_the_first_fix_on(parts, name):
+    given = scenario(*parts, orbit=ORBIT, record_every=1)
+    run = sh.simulate(given)
+    valid, time = run[f"{name}_is_valid"].values, run["time"].values
+    assert valid.tolist() == (time >= 10.0).astype(float).tolist()
+    # Before its first reading it is where it begins, and not where the body is.
+    loop = build(given, given.laws[0])
+    first = loop.carry().memories.estimate
+    assert first.attitude == (1.0, 0.0, 0.0, 0.0) != loop.start.attitude
+    assert first.is_valid == 0.0
+
+
+def test_an_estimate_that_is_too_uncertain_is_not_valid():
+    lost = FIRST | {"outage": [5.0, 30.0]}
+    run = sh.simulate(scenario(GYRO, lost, FILTER | {"valid_within": "100 arcsec"}, record_every=1))
+    deviation = run["mekf_attitude_deviation"].values.max(axis=1)
+    assert run["mekf_is_valid"].values.tolist() == (deviation <= 100.0 * ARCSEC).astype(float).tolist()
+    assert 0.2 < run["mekf_is_valid"].values.mean() < 0.9
+
+
+def test_errors_are_as_large_as_the_filter_says_between_updates_too():
+    """Squares over the deviation's at each of the four instants of the last cycle, of 80 flights: each in its 95 % band."""
+    random, squares = np.random.default_rng(11), []
+    head = tracker(10.0 * ARCSEC, 40.0 * ARCSEC, interval=2.0)
+    filtered = FILTER | {"cross": head["cross"], "roll": head["roll"]}
+    for seed in range(80):
+        gyro = GYRO | {"bias": random.normal(scale=3e-4, size=3).tolist()}
+        run = sh.simulate(scenario(gyro, head, filtered, seed=seed + 1, record_every=1))
+        squares.append((errors(run)[-5:-1] / run["mekf_attitude_deviation"].values[-5:-1]) ** 2)
+    low, high = stats.chi2(240).ppf([0.025, 0.975])
+    totals = np.sum(squares, axis=(0, 2))
+    assert ((low < totals) & (totals < high)).all(), totals / 240.0
+    assert math.isclose(run["time"].values[-5] % 2.0, 0.0)
