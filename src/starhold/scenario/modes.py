@@ -62,6 +62,13 @@ def read_gains(
     return Read(law, form, validated, spec, gains)
 
 
+class Clock(NamedTuple):
+    """The epoch of a flight, if it has one, and when it ends (s)."""
+
+    epoch: Date | None
+    end: float
+
+
 def _read_time(gain: Gain) -> Annotations:
     """The annotations of a time since the start, or a date."""
     read = reader(gain)
@@ -105,10 +112,10 @@ class _Condition(Table):
         """The names of its tests."""
         return tuple(test for test in TESTS if getattr(self, test) is not None)
 
-    def levels(self, epoch: Date | None, where: str, key: str) -> list[Any]:
+    def levels(self, clock: Clock, where: str, key: str) -> list[Any]:
         """The levels of its tests and their further numbers. InputError for a date where the flight has none, or before it
         begins, and for times of which one excludes the other."""
-        times = {test: _since(getattr(self, test), epoch, where, f"{key}.{test}") for test in TIMES if test in self.tests}
+        times = {test: _since(getattr(self, test), clock, where, f"{key}.{test}") for test in TIMES if test in self.tests}
         if len(times) == len(TIMES) and times["not_before"] > times["not_after"]:
             given = f"a time {times['not_before'] - times['not_after']:g} s before not_before"
             raise InputError(where, f"{key}.not_after", given, "a later one, for nothing is both")
@@ -122,16 +129,18 @@ def _about(key: str, tests: Iterable[str]) -> list[str]:
     return [test for test in tests if key in settings_of([test])]
 
 
-def _since(given: Any, epoch: Date | None, where: str, key: str) -> float:
+def _since(given: Any, clock: Clock, where: str, key: str) -> float:
     """A time (s) since the start."""
-    if not isinstance(given, tuple):
-        return given
-    if epoch is None:
+    dated = isinstance(given, tuple)
+    if dated and clock.epoch is None:
         raise InputError(where, key, iso_text(given), "a time since the start; or a date, with epoch in [orbit]")
-    time = round((days_of(given) - days_of(epoch)) * DAY, 6)
+    time = round((days_of(given) - days_of(clock.epoch)) * DAY, 6) if dated else given
     if time < 0.0:
         described = f"{iso_text(given)}, {-time:g} s before the flight begins"
-        raise InputError(where, key, described, f"a date from the epoch on, {iso_text(epoch)}")
+        raise InputError(where, key, described, f"a date from the epoch on, {iso_text(clock.epoch)}")
+    if time > clock.end and key.endswith("not_before"):
+        described = f"{iso_text(given)}, {time:g} s after the flight begins" if dated else f"{time:g} s"
+        raise InputError(where, key, described, f"a time within the flight, which ends at {clock.end:g} s")
     return time
 
 
@@ -202,7 +211,8 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
     tables = [read.table for read in reads]
     on_loss = _mode_on_loss(table, [one.name for one in tables], where, key)
     epoch = getattr(getattr(scenario.table, "orbit", None), "epoch", None)
-    modes, gains = _joined(tables, reads, on_loss, epoch, where, key)
+    clock = Clock(epoch, scenario.table.simulation.duration)
+    modes, gains = _joined(tables, reads, on_loss, clock, where, key)
     monitors = tuple(
         read_monitor(one, scenario, where, f"{key}.monitor[{place}]") for place, one in enumerate(table.monitor, 1)
     )
@@ -238,7 +248,7 @@ def _targets(reads: Sequence[Read], scenario: Scenario, context: Any, key: str) 
 
 
 def _joined(
-    tables: Sequence[Any], reads: Sequence[Read], on_loss: int | None, epoch: Date | None, where: str, key: str
+    tables: Sequence[Any], reads: Sequence[Read], on_loss: int | None, clock: Clock, where: str, key: str
 ) -> tuple[list[Mode], list[Any]]:
     """The modes with their switches, and the numbers of all of them."""
     names: list[str] = [table.name for table in tables]
@@ -258,7 +268,7 @@ def _joined(
                 continue
             to = _to(condition.to, names, place, beside, where, f"{here}.{way}")
             switches.append(Switch(way, to, condition.tests))
-            gains += [condition.after, condition.dwell, *condition.levels(epoch, where, f"{here}.{way}")]
+            gains += [condition.after, condition.dwell, *condition.levels(clock, where, f"{here}.{way}")]
         modes.append(Mode(table.name, read.law, tuple(switches), table.effectors))
     reached, ahead = {0}, {0} if on_loss is None else {0, on_loss}
     while ahead:
