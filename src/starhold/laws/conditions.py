@@ -76,7 +76,7 @@ class Tested(NamedTuple):
     unit: str
     text: str
     value: Callable[[Facts, Mapping[str, Any]], Scalar]
-    level: Callable[[Scalar], Scalar] = lambda level: level
+    level: Callable[[Scalar], Scalar] | None = None
     least: float | None = None
     most: float | None = None
     settings: tuple[str, ...] = ()
@@ -130,7 +130,7 @@ class Facts:
         tested = TESTED[name]
         given = {key: settings[key] for key in ("station", *tested.settings) if key in settings}
         value = tested.value(self, given) if tested.settings else self.once(name, lambda: tested.value(self, given))
-        level = tested.level(level)
+        level = level if tested.level is None else tested.level(level)
         return less(value, level) if side == "below" else less(level, value)
 
 
@@ -141,6 +141,42 @@ def sine_of_half(angle: Scalar) -> Scalar:
     for n in range(20, 0, -2):
         total = 1.0 - total * x / float(n * (n + 1))
     return 0.5 * angle * total
+
+
+def _sine(angle: Scalar) -> Scalar:
+    return cosine_sine(angle / math.tau)[1]
+
+
+def _minus_cosine(angle: Scalar) -> Scalar:
+    return -cosine_sine(angle / math.tau)[0]
+
+
+def _rate(now: Facts, _: Mapping[str, Any]) -> Scalar:
+    return norm(now.measurement.rate)
+
+
+def _body_rate(now: Facts, _: Mapping[str, Any]) -> Scalar:
+    return norm(now.measurement.body_rate)
+
+
+def _angle(now: Facts, _: Mapping[str, Any]) -> Scalar:
+    return half_angle_sine(now.measurement.attitude)
+
+
+def _wheel_momentum(now: Facts, _: Mapping[str, Any]) -> Scalar:
+    return norm(now.measurement.wheel_momentum)
+
+
+def _sunlight(now: Facts, _: Mapping[str, Any]) -> Scalar:
+    return sun.in_view(now.sight.state.position, now.sun)
+
+
+def _tracker_age(now: Facts, _: Mapping[str, Any]) -> Scalar:
+    return now.watch.fix * now.measurement.period
+
+
+def _attitude_deviation(now: Facts, _: Mapping[str, Any]) -> Scalar:
+    return norm(now.sight.estimate.attitude_deviation)
 
 
 def _elevation(now: Facts, settings: Mapping[str, Any]) -> Scalar:
@@ -158,12 +194,12 @@ def _away_from_sun(now: Facts, settings: Mapping[str, Any]) -> Scalar:
 
 
 TESTED: Mapping[str, Tested] = {
-    "rate": Tested("rad/s", "the rate relative to the target", lambda now, _: norm(now.measurement.rate), watched=False),
-    "body_rate": Tested("rad/s", "the absolute rate", lambda now, _: norm(now.measurement.body_rate), watched=False),
+    "rate": Tested("rad/s", "the rate relative to the target", _rate, watched=False),
+    "body_rate": Tested("rad/s", "the absolute rate", _body_rate, watched=False),
     "angle": Tested(
         "rad",
         "the angle to the target",
-        lambda now, _: half_angle_sine(now.measurement.attitude),
+        _angle,
         sine_of_half,
         most=3.141592653589793,
         watched=False,
@@ -171,14 +207,14 @@ TESTED: Mapping[str, Tested] = {
     "wheel_momentum": Tested(
         "N m s",
         "the norm of the wheels' momentum",
-        lambda now, _: norm(now.measurement.wheel_momentum),
+        _wheel_momentum,
         watched=False,
     ),
     "elevation": Tested(
         "rad",
         "the elevation at which the station at this latitude and longitude sees the craft",
         _elevation,
-        lambda level: cosine_sine(level / math.tau)[1],
+        _sine,
         -0.5 * math.pi,
         0.5 * math.pi,
         ("latitude", "longitude", "height"),
@@ -187,7 +223,7 @@ TESTED: Mapping[str, Tested] = {
     "sunlight": Tested(
         "1",
         "the share of the Sun's disc that the Earth leaves in view",
-        lambda now, _: sun.in_view(now.sight.state.position, now.sun),
+        _sunlight,
         least=0.0,
         most=1.0,
         sky=True,
@@ -196,7 +232,7 @@ TESTED: Mapping[str, Tested] = {
         "rad",
         "the angle between the body axis and the Sun",
         _away_from_sun,
-        lambda level: -cosine_sine(level / math.tau)[0],
+        _minus_cosine,
         0.0,
         math.pi,
         ("axis",),
@@ -205,13 +241,13 @@ TESTED: Mapping[str, Tested] = {
     "tracker_age": Tested(
         "s",
         "the time since the last new attitude of a star tracker",
-        lambda now, _: now.watch.fix * now.measurement.period,
+        _tracker_age,
         reads="attitude_is_new",
     ),
     "attitude_deviation": Tested(
         "rad",
         "the norm of the deviations that the estimator states for its attitude",
-        lambda now, _: norm(now.sight.estimate.attitude_deviation),
+        _attitude_deviation,
         estimates="attitude_deviation",
     ),
 }
@@ -237,8 +273,8 @@ def level_of(test: str) -> Gain:
     tested = quantity_of(test)
     if tested is None:
         return TIMES[test]
-    least = {"above": 0.0} if tested.least is None else {"at_least": tested.least}
-    return Gain(tested.unit, at_most=tested.most, text=f"where {tested.text} is {test.rpartition('_')[2]} this", **least)
+    above, text = 0.0 if tested.least is None else None, f"where {tested.text} is {test.rpartition('_')[2]} this"
+    return Gain(tested.unit, above=above, at_least=tested.least, at_most=tested.most, text=text)
 
 
 def settings_of(tests: Iterable[str]) -> tuple[str, ...]:

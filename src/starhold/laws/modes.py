@@ -355,5 +355,5 @@ def _gains_of(modes: Modes) -> Any:
         for place, mode in enumerate(modes.modes, 1)
         for item in _mode_fields(mode)
     ]
-    named += [(re.sub(r"\W", "", name.format("_")), Annotated[Any, item.gain]) for name, item in modes.shared_fields()]
-    return NamedTuple("Gains", named)  # pyright: ignore
+    shared = [(re.sub(r"\W", "", name.format("_")), Annotated[Any, item.gain]) for name, item in modes.shared_fields()]
+    return NamedTuple("Gains", [*named, *shared])  # pyright: ignore

@@ -4,12 +4,13 @@ is stuck, or differs too much from what the estimator computes."""
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple, TypeAlias
+from functools import reduce
+from typing import Any, Literal, NamedTuple, TypeAlias, cast
 
 from starhold.algebra.quaternion import half_angle_sine, relative
 from starhold.algebra.scalar import Scalar, Truth, absolute, both, either, less, less_equal, minimum, opposite, where
 from starhold.algebra.structure import chosen
-from starhold.algebra.vector import norm, subtract
+from starhold.algebra.vector import Vector, norm
 from starhold.laws.conditions import Facts, sine_of_half
 from starhold.laws.interface import Field, Gain
 
@@ -87,24 +88,24 @@ def watched(monitor: Monitor, guard: Guard, now: Facts, limit: Scalar, times: Sc
 
 def _differ(a: Any, b: Any) -> Truth:
     """Whether two values differ in any number."""
-    if not isinstance(a, tuple):
-        return either(less(a, b), less(b, a))
-    (first, other), *rest = zip(a, b, strict=True)
-    truth = _differ(first, other)
-    for x, y in rest:
-        truth = either(truth, _differ(x, y))
-    return truth
+    truths = [either(less(x, y), less(y, x)) for x, y in zip(_numbers(a), _numbers(b), strict=True)]
+    return reduce(either, truths)
+
+
+def _numbers(value: Any) -> tuple[Scalar, ...]:
+    return cast(tuple[Scalar, ...], value) if isinstance(value, tuple) else (value,)
 
 
 def _size(value: Any) -> Scalar:
     """The size of a number or of a vector."""
-    return norm(value) if isinstance(value, tuple) else absolute(value)
+    numbers = _numbers(value)
+    return absolute(numbers[0]) if len(numbers) == 1 else norm(cast(Vector, numbers))
 
 
 def _apart(a: Any, b: Any, limit: Scalar) -> Truth:
     """Whether two values are farther apart than a limit; two attitudes by the angle (rad) between them."""
-    if isinstance(a, tuple) and len(a) == 4:
+    if len(_numbers(a)) == 4:
         # No two attitudes are farther apart than half a turn.
         most = where(less(limit, math.pi), sine_of_half(minimum(limit, math.pi)), 2.0)
         return less(most, half_angle_sine(relative(b, a)))
-    return less(limit, _size(subtract(a, b) if isinstance(a, tuple) else a - b))
+    return less(limit, _size(tuple(x - y for x, y in zip(_numbers(a), _numbers(b), strict=True))))

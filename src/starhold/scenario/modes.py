@@ -103,8 +103,9 @@ class _Condition(Table):
                 raise at_key(key, f"this key, which {' and '.join(_about(key, self.tests))} needs", None)
             if key not in needed and value is not None:
                 raise at_key(key, f"this key only with {' or '.join(_about(key, TESTS))}", value)
-        if self.axis is not None and not any(self.axis):
-            raise at_key("axis", "a vector that is not zero", list(self.axis))
+        axis: Any = getattr(self, "axis", None)
+        if axis is not None and not any(axis):
+            raise at_key("axis", "a vector that is not zero", list(axis))
         return self
 
     @property
@@ -131,16 +132,17 @@ def _about(key: str, tests: Iterable[str]) -> list[str]:
 
 def _since(given: Any, clock: Clock, where: str, key: str) -> float:
     """A time (s) since the start."""
-    dated = isinstance(given, tuple)
-    if dated and clock.epoch is None:
-        raise InputError(where, key, iso_text(given), "a time since the start; or a date, with epoch in [orbit]")
-    time = round((days_of(given) - days_of(clock.epoch)) * DAY, 6) if dated else given
-    if time < 0.0:
-        described = f"{iso_text(given)}, {-time:g} s before the flight begins"
-        raise InputError(where, key, described, f"a date from the epoch on, {iso_text(clock.epoch)}")
+    time, named = given, f"{given:g} s" if isinstance(given, float) else iso_text(given)
+    if not isinstance(given, float):
+        if clock.epoch is None:
+            raise InputError(where, key, named, "a time since the start; or a date, with epoch in [orbit]")
+        time = round((days_of(given) - days_of(clock.epoch)) * DAY, 6)
+        if time < 0.0:
+            allowed = f"a date from the epoch on, {iso_text(clock.epoch)}"
+            raise InputError(where, key, f"{named}, {-time:g} s before the flight begins", allowed)
+        named = f"{named}, {time:g} s after the flight begins"
     if time > clock.end and key.endswith("not_before"):
-        described = f"{iso_text(given)}, {time:g} s after the flight begins" if dated else f"{time:g} s"
-        raise InputError(where, key, described, f"a time within the flight, which ends at {clock.end:g} s")
+        raise InputError(where, key, named, f"a time within the flight, which ends at {clock.end:g} s")
     return time
 
 
@@ -197,7 +199,7 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
     or that none leads to."""
     where = scenario.where
     rest = {name: value for name, value in data.items() if name != "mode"}
-    table = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)
+    table: Any = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)
     given = data.get("mode")
     if not isinstance(given, list) or len(cast(list[Any], given)) < 2:
         described = "nothing" if given is None else "one mode" if isinstance(given, list) and given else show(given)
