@@ -132,3 +132,18 @@ WATCHFUL = (
     + mode("safe", 'until = { after = "30 s", to = "wait" }')
 )
 """A flight with every kind of condition and of monitor."""
+
+WHEELS = """
+[wheels]
+layout = "pyramid"
+inertia = 2.2e-5
+torque_limit = "2 mN m"
+momentum_limit = "15 mN m s"
+[[part]]
+type = "magnetometer"
+[[part]]
+type = "magnetorquers"
+dipole_limit = "0.2 A m^2"
+"""
+"""Wheels, and rods that a safe mode flies by."""
+SAFE = '[[law.mode]]\nname = "safe"\ntype = "b-dot"\nk = 1e-3\neffectors = ["magnetorquers"]\n'

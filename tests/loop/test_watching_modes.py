@@ -12,7 +12,7 @@ from starhold.algebra.rotation import short_turn
 from starhold.laws.monitors import KINDS, Monitor, watched
 from starhold.scenario.reading import parse
 from tests.making import built, flown
-from tests.missions import GUARDED, HEADS, cubesat, mode
+from tests.missions import GUARDED, HEADS, SAFE, WHEELS, cubesat, mode
 
 FREE = GUARDED.replace('on_loss = "safe"\n', "")
 DAY = sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0
@@ -98,26 +98,13 @@ def test_a_filter_counts_as_converged_by_its_own_covariance():
     assert np.argmax(run["mode"] == 2.0) == first > 12
 
 
-WHEELS = """
-[wheels]
-layout = "pyramid"
-inertia = 2.2e-5
-torque_limit = "2 mN m"
-momentum_limit = "15 mN m s"
-[[part]]
-type = "magnetometer"
-[[part]]
-type = "magnetorquers"
-dipole_limit = "0.2 A m^2"
-"""
 LOST = "".join(f"[[fault]]\ntime = {20 * k}\nwheel = {k}\nlost = true\ndelay = 5\n" for k in (1, 2))
 
 
 @pytest.mark.parametrize(("wheels", "begins"), [(1, 25.0), (2, 45.0)])
 def test_the_safe_mode_begins_as_so_many_wheels_are_known_to_be_lost(wheels, begins):
-    safe = '[[law.mode]]\nname = "safe"\ntype = "b-dot"\nk = 1e-3\neffectors = ["magnetorquers"]\n'
     guarded = GUARDED.replace('"safe"', f'"safe"\nfault_action = "reallocate"\nwheels_lost = {wheels}')
-    text = cubesat(WHEELS, LOST, guarded) + mode("work", 'effectors = ["wheels"]') + safe
+    text = cubesat(WHEELS, LOST, guarded) + mode("work", 'effectors = ["wheels"]') + SAFE
     run = flown(built(parse(text.replace('torque_limit = "2 mN m"\n[orbit]', "[orbit]"), "m.toml")), 200)
     assert run["time"][np.argmax(run["mode"] == 2.0)] == begins
     assert (run["mode"][run["time"] >= begins] == 2.0).all()
