@@ -13,8 +13,8 @@ ALARMS = ("false_alarms", "missed_detections")
 """Losses that were noticed before any fault happened, and whether no loss was noticed from the first fault on."""
 
 
-class Asked(NamedTuple):
-    """The modes whose begin is asked for, counted from 1, and the instant of the first fault: infinite without any, none
+class Wanted(NamedTuple):
+    """The modes whose begin is wanted for, counted from 1, and the instant of the first fault: infinite without any, none
     where losses are not noticed."""
 
     begins: tuple[float, ...] = ()
@@ -28,34 +28,34 @@ class Modal(NamedTuple):
     alarms: tuple[float, ...]
 
 
-def begun(asked: Asked) -> Any:
-    """The notes before a flight; none where nothing is asked."""
-    return Modal((-1.0,) * len(asked.begins), (0.0, 0.0) * len(asked.fault)) if asked.begins or asked.fault else ()
+def begun(wanted: Wanted) -> Any:
+    """The notes before a flight; none where nothing is wanted."""
+    return Modal((-1.0,) * len(wanted.begins), (0.0, 0.0) * len(wanted.fault)) if wanted.begins or wanted.fault else ()
 
 
-def noted(seen: Any, quantities: Mapping[str, Any], now: Any, asked: Asked) -> Any:
+def noted(seen: Any, quantities: Mapping[str, Any], now: Any, wanted: Wanted) -> Any:
     """The notes of an instant."""
     if not seen:
         return seen
     begins = tuple(
         where(both(less(now - 1.5, before), opposite(_is(quantities["mode"], mode))), now, before)
-        for before, mode in zip(seen.begins, asked.begins, strict=True)
+        for before, mode in zip(seen.begins, wanted.begins, strict=True)
     )
     alarms = seen.alarms
     if alarms:
-        trips, early = quantities["trips"], less(now, asked.fault[0])
+        trips, early = quantities["trips"], less(now, wanted.fault[0])
         false = where(early, trips, alarms[0])
         alarms = (false, where(either(early, less(false + 0.5, trips)), 0.0, 1.0))
     return Modal(begins, alarms)
 
 
-def table(names: tuple[str, ...], rows: Any, asked: Asked, period: float) -> dict[str, Metric]:
+def table(names: tuple[str, ...], rows: Any, wanted: Wanted, period: float) -> dict[str, Metric]:
     """The metrics of notes that lie at these rows; names: of the begins. Nothing is missed where there is no fault."""
     if not rows:
         return {}
     begins = {name: Metric("s", INSTANT, (row,), (period,), kept=0.0) for name, row in zip(names, rows.begins, strict=True)}
     alarms = {name: Metric("1", "number", (row,)) for name, row in zip(ALARMS, rows.alarms, strict=False)}
-    if asked.fault == (math.inf,):
+    if wanted.fault == (math.inf,):
         del alarms[ALARMS[1]]
     return begins | alarms
 

@@ -17,7 +17,7 @@ from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
 from starhold.analysis import mode_notes
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
-from starhold.analysis.mode_notes import Asked, Modal
+from starhold.analysis.mode_notes import Modal, Wanted
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.simulation.lane import Recording
 
@@ -82,7 +82,7 @@ class Bounds(NamedTuple):
     tail: float
     last: float
     cones: tuple[Cone, ...]
-    modal: Asked
+    modal: Wanted
 
 
 class Turning(NamedTuple):
@@ -141,15 +141,15 @@ def make_meter(
     limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
     that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
     rest; wheels: the body has some; begins: modes whose first begin is noted, counted from 1, by the names of their metrics;
-    fault: the instant of the first fault, as `Asked` has it."""
+    fault: the instant of the first fault, as `Wanted` has it."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
     begun: Any = (-1.0, -1.0, *(0.0,) * 6, ZERO, ZERO, ZERO, (4.0,) * len(cones), turning, levels, levels, 0.0, 0.0, 0.0)
-    asked = Asked(tuple(map(float, begins.values())), fault)
-    first, tail = Noted(*begun, mode_notes.begun(asked)), tail_start(steps)
+    wanted = Wanted(tuple(map(float, begins.values())), fault)
+    first, tail = Noted(*begun, mode_notes.begun(wanted)), tail_start(steps)
     angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2
-    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()), asked)
+    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()), wanted)
     rows: Any = places(first)
     windows = {
         "attitude_error": Window(rows.window_angle, KINDS["angle"], "angle to the target", "rad"),
@@ -159,7 +159,7 @@ def make_meter(
     early, late = (_note(limit, still, stage, turns, iterations) for stage in (False, True))
     table = (
         _table(rows, period, every, wheels)
-        | mode_notes.table(tuple(begins), rows.modal, asked, period)
+        | mode_notes.table(tuple(begins), rows.modal, wanted, period)
         | {name: Metric("rad", "apart", (row,)) for name, row in zip(cones, rows.cones, strict=True)}
     )
     for name, row, unit in zip(PEAKS, (rows.window_angle, rows.window_rate), ("rad", "rad/s"), strict=True):

@@ -35,7 +35,7 @@ SETTINGS: Mapping[str, Field] = {
 
 
 class Sight(NamedTuple):
-    """What flight software sees beside the law's measurement: the body's state as sensors and estimator give it, the
+    """Flight software sees this beside the law's measurement: the body's state as sensors and estimator give it, the
     readings of all sensors, and the estimate."""
 
     state: Any
@@ -95,7 +95,7 @@ class Facts:
 
     @property
     def sight(self) -> Sight:
-        """What flight software sees; only the control step of a loop gives it."""
+        """The sight of flight software; only the control step of a loop gives it."""
         assert self._sight is not None
         return self._sight
 
@@ -129,8 +129,8 @@ class Facts:
         name, _, side = test.rpartition("_")
         tested = TESTED[name]
         given = {key: settings[key] for key in ("station", *tested.settings) if key in settings}
-        value = tested.value(self, given) if tested.settings else self.once(name, lambda: tested.value(self, given))
         level = level if tested.level is None else tested.level(level)
+        value = tested.value(self, given) if tested.settings else self.once(name, lambda: tested.value(self, given))
         return less(value, level) if side == "below" else less(level, value)
 
 
@@ -304,7 +304,7 @@ def station_at(settings: Mapping[str, Any]) -> Station:
 
 
 def advanced(watch: Watch, sight: Sight) -> Watch:
-    """What flight software keeps as the next control step begins."""
+    """The watch as the next control step begins."""
     fix = watch.fix + 1.0
     new = [less(0.5, reading.attitude_is_new) for reading in sight.readings if hasattr(reading, "attitude_is_new")]
     for one in new:

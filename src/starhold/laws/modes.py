@@ -150,7 +150,7 @@ class Modes:
 
     @property
     def ESTIMATES(self) -> tuple[str, ...]:  # noqa: N802
-        """What conditions and monitors need of an estimate, by name."""
+        """The names of the estimates that conditions and monitors need."""
         looked = [tested.estimates for test in self.tests if (tested := quantity_of(test)) and tested.estimates]
         looked += [one.watches for one in self.monitors if one.sensor is None or one.kind == "residual"]
         return tuple(dict.fromkeys(looked))

@@ -45,7 +45,7 @@ class Monitor(NamedTuple):
 
     @property
     def at_start(self) -> Guard:
-        """What it remembers at the start."""
+        """The memory of it at the start."""
         return Guard(0.0 if self.size == 1 else (0.0,) * self.size, -1.0, 0.0)
 
 
@@ -59,7 +59,7 @@ class Guard(NamedTuple):
 
 
 def value_of(monitor: Monitor, now: Facts) -> Any:
-    """What a monitor looks at."""
+    """The value that a monitor looks at."""
     if monitor.sensor is None:
         return getattr(now.sight.estimate, monitor.watches)
     there = [reading for reading in now.sight.readings if hasattr(reading, monitor.watches)]

@@ -82,7 +82,7 @@ SIZES = {"quaternion": 4, "axis": 3, "": 1}
 
 
 def _known(fitted: Iterable[Fitted]) -> dict[str, Quantity]:
-    """What these sensors or estimators give, by name."""
+    """The quantities that these sensors or estimators give, by name."""
     known: dict[str, Quantity] = {}
     for part in (one.part for one in fitted):
         kind = part.module.Estimate if part.role == "estimator" else part.module.Reading

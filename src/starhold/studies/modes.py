@@ -10,6 +10,7 @@ import numpy as np
 from starhold.algebra.structure import leaves
 from starhold.laws.modes import Modes
 from starhold.loop.modes import loop_of_mode
+from starhold.parts.epoch import Date, date_after
 from starhold.parts.outage import NEVER
 from starhold.scenario.requirement import BEGINS, column_of
 from starhold.studies.body import Issued
@@ -50,10 +51,20 @@ def stretches(run: Recording) -> list[Stretch]:
     ]
 
 
-def modes_flown(law: Law, run: Recording) -> tuple[Begun, ...]:
-    """The modes of a recorded run by their names, with the times at which they begin."""
+def modes_flown(law: Law, run: Recording, epoch: Date | None = None) -> tuple[Begun, ...]:
+    """The modes of a recorded run by their names, with the times at which they begin, which are control instants; epoch: of
+    a flight whose modes have dates."""
     period = run.attrs["control_period"]
-    return tuple(Begun(law.module.modes[one.mode - 1].name, one.first * period) for one in stretches(run))
+    times = [(one.mode, one.first * period) for one in stretches(run)]
+    return tuple(
+        Begun(law.module.modes[mode - 1].name, time, date_after(epoch, time) if epoch else "") for mode, time in times
+    )
+
+
+def epoch_of(scenario: Scenario, law: Law) -> Date | None:
+    """The epoch of a flight whose law has conditions on dates, stations or the Sun; None for other laws."""
+    dated = isinstance(law.module, Modes) and law.module.WATCHES and hasattr(scenario.table, "orbit")
+    return scenario.table.orbit.epoch if dated and scenario.table.orbit is not None else None
 
 
 def begins_asked(scenario: Scenario, law: Law) -> dict[str, int]:
