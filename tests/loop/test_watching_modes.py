@@ -1,6 +1,9 @@
 """Conditions that look beyond the measurement, against ERFA and what was recorded; monitors against counts in Python."""
 
 import math
+import re
+import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import erfa
@@ -8,9 +11,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import starhold as sh
 from starhold.algebra.rotation import short_turn
 from starhold.laws.monitors import KINDS, Monitor, watched
-from starhold.scenario.reading import parse
+from starhold.scenario.reading import builtin_text, parse
+from starhold.studies.compare import record
+from starhold.studies.modes import epoch_of, modes_flown
+from starhold.studies.verification import by_flight
 from tests.making import built, flown
 from tests.missions import GUARDED, HEADS, SAFE, WHEELS, cubesat, mode
 
@@ -128,6 +135,20 @@ def counted(kind, values, estimates, limit, times):
         beyond = (beyond + 1 if wrong else 0) if new or kind == "range" else beyond
         found.append(beyond >= times)
     return found
+
+
+def test_the_mission_of_the_page_about_modes_works_over_its_station_and_ends_in_its_safe_mode():
+    page = (Path(__file__).parents[2] / "docs" / "modes.md").read_text(encoding="utf-8")
+    story = tomllib.loads(re.findall(r"^```toml\n(.*?)^```", page, flags=re.DOTALL | re.MULTILINE)[-1])
+    scenario = sh.scenario(tomllib.loads(builtin_text("cubesat-mission")) | story)
+    entry, run = scenario.laws[0], record(scenario, built(scenario))
+    begun = modes_flown(entry.law, run, epoch_of(scenario, entry.law))
+    assert [one.mode for one in begun] == ["detumble", "nadir", "pass", "nadir", "pass", "safe"]
+    # Three and a half hours, and ten seconds until the loss is known.
+    assert (begun[-1].time, begun[-1].utc) == (12610.0, "2026-03-20T15:30:10.000")
+    assert begun[2].utc > "2026-03-20T13:30:00"
+    assert by_flight(scenario, entry, run)["requirement[1]"].verdict == "met"
+    assert (run["trips"][-1], run["tripped"].max()) == (1.0, 0.0)
 
 
 SIZES = {"number": 1, "vector": 3, "attitude": 4}
