@@ -38,7 +38,7 @@ from starhold.parts.craft import Craft
 from starhold.parts.random import Dice
 from starhold.publications.paper import PAPERS
 from starhold.scenario.reading import builtin_names
-from starhold.scenario.requirement import CONE
+from starhold.scenario.requirement import BEGINS, CONE
 from starhold.studies.deciding import BOUNDS, MARGINS
 from starhold.studies.requirements import LOST
 
@@ -143,7 +143,7 @@ def required_table() -> str:
     """The metrics that requirements may bound, by the method that decides them."""
     flown = make_meter(1, 1.0, "axis", (1.0, 1.0), rigid_body.EXTRAS, wheels=True).units
     shown = {
-        "flight, campaign": [*flown, LOST, CONE],
+        "flight, campaign": [*flown, LOST, CONE, BEGINS],
         "proof": BOUNDS,
         "budget": [index.lower() for index in MEANINGS],
         "margin": MARGINS,

@@ -30,6 +30,7 @@ MADE = [
     "orbital target",
     "pid, example 0, noise",
     "super-twisting, example 0, noise",
+    "modes that watch",
 ]
 """Loops with a memory, or with an input of their own."""
 

@@ -39,7 +39,7 @@ def steps_of(name: str) -> int:
 
 def choices_of(loop: Any) -> set[Any]:
     """What a loop is made of: its law, its parts with what is constant in a kernel, and what it is told to do."""
-    steps = ("in steps", loop.substeps > 1), ("changes", bool(loop.events))
+    steps = ("in steps", loop.substeps > 1), ("changes", bool(loop.events)), ("watches", loop.law.flag("WATCHES"))
     made = [(f.part.name, getattr(f.params, "allocation", None)) for f in loop.parts]
     return {loop.law.name, loop.sign_policy, loop.limit, loop.body.name, *steps, *made}
 

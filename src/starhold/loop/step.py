@@ -13,6 +13,7 @@ from starhold.algebra.scalar import both, less, opposite, side, where
 from starhold.algebra.structure import chosen, runge_kutta
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
+from starhold.laws.conditions import Sight
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import Carry, Composition, can_be_inactive, is_recorded
 from starhold.parts.actuators.limits import LIMITS
@@ -64,7 +65,9 @@ def make_equations(parts: Composition) -> Step:
     still = target is None or target.flag("STILL")
     follows = target is not None and target.flag("FOLLOWS")
     by_mode = target is not None and target.flag("BY_MODE")
-    command_of = parts.law.module.command if by_mode else parts.law.command
+    # Such a law of modes looks at more than its measurement to decide which one commands.
+    watches = parts.law.flag("WATCHES")
+    command_of = parts.law.module.command if by_mode or watches else parts.law.command
 
     def goal_of(carry, state, step, setup):
         if target is None:
@@ -117,25 +120,27 @@ def make_equations(parts: Composition) -> Step:
                 followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=estimator, estimate=estimate
             )
 
-        return show, goal, tuple(every)
+        return show, goal, Sight(known, tuple(every), estimate)
 
     def measure(carry, step, key, craft, setup):
         show, goal, _ = observed(carry, step, key, craft, setup)
         return show(goal)[0]
 
     def sense(carry, step, key, gains, craft, setup):
-        show, goal, readings = observed(carry, step, key, craft, setup)
+        show, goal, sight = observed(carry, step, key, craft, setup)
         measurement, memories = show(goal)
         h = carry.h
+        if by_mode or watches:
+            seen = (sight,) if watches else ()
+            carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory, *seen))
         if by_mode:
             # The measurement of the law of a mode that begins is relative to the mode's own target.
-            carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory))
             measurement, memories = show(goal_of(carry, carry.state, step, setup))
             h = where(less(carry.memory.age, 0.5), side(measurement.attitude[0]), h)
         if policy is not None:
             attitude, h = policy(measurement.attitude, h, setup.width)
             measurement = measurement._replace(attitude=attitude)
-        return Sensed(measurement, readings, memories.estimate, carry, memories, h)
+        return Sensed(measurement, sight.readings, memories.estimate, carry, memories, h)
 
     def update(carry, step, key, gains, craft, setup, given=None):
         measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup)

@@ -66,6 +66,11 @@ def iso_text(epoch: Date) -> str:
     return _instant(epoch).isoformat()
 
 
+def date_after(epoch: Date, time: float) -> str:
+    """The date in ISO 8601, UTC, so many seconds after an epoch, to the millisecond."""
+    return (_instant(epoch) + timedelta(seconds=time)).isoformat(timespec="milliseconds")
+
+
 def precession(days: float) -> Quaternion:
     """The turn from the mean equator and equinox of J2000 to those so many days later (IAU 2006; Capitaine, Wallace and
     Chapront, Expressions for IAU 2000 precession quantities, 2003)."""

@@ -166,6 +166,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         for need in one.reads:
             if need not in readings:
                 raise InputError(where, key, f"no {need}, which {one.name} needs", _measuring(need))
+    _check_estimates(loop, where)
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
     switched = next((f for f in _acting(loop) if f.part.hook("switch") is not None), None)
     if late is not None and switched is not None:
@@ -177,9 +178,24 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         )
 
 
+def _check_estimates(loop: ClosedLoop, where: str) -> None:
+    """InputError where a law needs what no estimator gives, or another body than the one that is orbited."""
+    there = [name for fitted in loop.used("estimator") for name in fitted.part.module.Estimate._fields]
+    for name in getattr(loop.law.module, "ESTIMATES", ()):
+        if name not in there:
+            giving = [one for one, part in parts("estimator").items() if name in part.module.Estimate._fields]
+            allowed = f"an estimator that gives {name}, such as {' or '.join(giving)}"
+            raise InputError(where, f"law {loop.law.name}", f"no {name}, which a condition or a monitor needs", allowed)
+    about = loop.law.about
+    if about and (not loop.has("two-body") or body_of(loop.craft.gravity) != about):
+        given = f"no orbit about {about}, which conditions on the Sun or a station need"
+        raise InputError(where, f"law {loop.law.name}", given, f"an [orbit] about {about}")
+
+
 def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
     """Return the names of what the sensors read. InputError where two read what is taken of one only."""
-    single = {*loop.law.reads, *(name for fitted in loop.parts for name in fitted.part.reads)}
+    single = {*loop.law.reads} - {*getattr(loop.law.module, "SEVERAL", ())}
+    single |= {name for fitted in loop.parts for name in fitted.part.reads}
     several: dict[str, str] = {}
     for estimator in loop.used("estimator"):
         several = getattr(estimator.part.module, "SEVERAL", {})
