@@ -20,7 +20,7 @@ from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import Recording, fly, recorded
 from starhold.simulation.replay import given_like, replay
 from starhold.studies.telemetry import Telemetry, read
-from starhold.studies.telemetry_files import Array
+from starhold.studies.telemetry_files import LABELS, Array
 
 SIGMAS = 3.0
 """Deviations beyond which an estimate is another one."""
@@ -140,7 +140,7 @@ def study(scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None,
 def _given(loop: ClosedLoop, values: dict[str, Array], told: Telemetry, first: int) -> tuple[Array, list[str]]:
     """The rows that `replay` takes, and sentences about what they lack."""
     like, count = given_like(loop), len(next(iter(values.values())))
-    readings, held = _readings(loop, like.readings, values, told)
+    readings, gaps = _readings(loop, like.readings, values, told)
 
     def part(shape: Any, name: str) -> Any:
         numbers = values.get(name, np.full((count, len(flatten((shape,)))), np.nan))
@@ -167,7 +167,7 @@ def _given(loop: ClosedLoop, values: dict[str, Array], told: Telemetry, first: i
     taken = [*fields, *names.values(), "command"]
     lacking = [name for name in taken if name in values and np.isnan(values[name]).any()]
     absent = [name for name in taken if name not in values]
-    notes = [f"{_listed(held)} of {count} control steps, and held between them." if held else ""]
+    notes = [f"{_listed(gaps)} of {count} control steps; between them a rate goes along a straight line." if gaps else ""]
     notes += [f"Not recorded, and taken from the estimate or the model: {_listed(absent)}." if absent else ""]
     notes += [f"Recorded at some control steps alone, and so at the others: {_listed(lacking)}." if lacking else ""]
     return rows, [note for note in notes if note]
@@ -179,7 +179,8 @@ def _whole(numbers: Array) -> NDArray[np.bool_]:
 
 
 def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telemetry) -> tuple[Any, list[str]]:
-    """The readings of all sensors at each control step, the last one where there is none, and how often there is one."""
+    """The readings of all sensors at each control step, and how often there is one: where there is none, that of a sensor
+    that tells whether it is new is not, and any other lies on a straight line between those around it."""
     sensors = [fitted.called.replace("-", "_") for fitted in loop.used("sensor")]
     wanted = {f"{s}_{n}": n for s, reading in zip(sensors, like, strict=True) for n in reading._fields}
     flags = {name for name, field in wanted.items() if "_is_" in field}
@@ -187,20 +188,24 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telem
         allowed = "every reading of the scenario's sensors: leave out the parts that the satellite lacks"
         raise InputError(told.name, "", f"no {_listed(missing)}", allowed)
     filled: dict[str, Array] = {}
-    held: list[str] = []
+    gaps: list[str] = []
     for name in wanted:
         if name in flags:
             continue
         there = _whole(values[name])
         if not there.any():
             raise InputError(told.name, name, "no number within the scenario", "a reading at least")
-        # Before the first reading that one is shown.
-        last = np.maximum.accumulate(np.where(there, np.arange(len(there)), there.argmax()))
-        filled[name] = values[name][last]
-        held += [f"{name} is read at {int(there.sum())}"] * (not there.all())
+        steps, places = np.arange(len(there)), np.flatnonzero(there)
+        own = [flag for flag in flags if flag.startswith(f"{name}_is_")]
+        if own or values[name].shape[1] == len(LABELS["quaternion"]):
+            # An estimator passes over a reading that is not new.
+            filled[name] = values[name][np.maximum.accumulate(np.where(there, steps, places[0]))]
+        else:
+            filled[name] = np.stack([np.interp(steps, places, column[places]) for column in values[name].T], axis=1)
+        gaps += [f"{name} is read at {len(places)}"] * (not there.all())
         changed = np.append(True, (np.diff(filled[name], axis=0) != 0.0).any(axis=1))
-        changed[there.argmax()] = True
-        for flag in (flag for flag in flags if flag.startswith(f"{name}_is_")):
+        changed[places[0]] = True
+        for flag in own:
             shown = changed if flag.endswith("_is_new") else (filled[name] != 0.0).any(axis=1)
             says = values[flag][:, 0] > 0.5 if flag in values else shown
             filled[flag] = np.where(there & says, 1.0, 0.0)[:, None]
@@ -208,7 +213,7 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telem
     readings = tuple(
         type(reading)(*(unflatten(list(next(columns).T), (value,))[0] for value in reading)) for reading in like
     )
-    return readings, held
+    return readings, gaps
 
 
 def _effector_names(loop: ClosedLoop) -> dict[tuple[int, str], str]:
@@ -232,11 +237,14 @@ def _comparisons(loop: ClosedLoop, run: Recording, values: dict[str, Array], sha
     estimators = [fitted.called.replace("-", "_") for fitted in loop.used("estimator")]
     sensors = tuple(f"{fitted.called.replace('-', '_')}_" for fitted in loop.used("sensor"))
     given = {*loop.body.module.Sample._fields, *_effector_names(loop).values()} - {"command"}
-    pairs = [(n, n) for n in run.columns if n in values and n not in given and not n.startswith(sensors)]
+    passed = (*sensors, *(f"{name}_deviation" for name in run.columns))
+    pairs = [(n, n) for n in run.columns if n in values and n not in given and not n.startswith(passed)]
     for one in estimators:
         # What the satellite itself took its attitude and rate for.
         if not any(name.startswith(f"{one}_") for name in values):
             pairs = [(f"{one}_{n}", n) for n in ("attitude", "rate") if n in values] + pairs
+    # Causes stand before what they cause.
+    pairs.sort(key=lambda pair: not pair[0].startswith(tuple(f"{one}_" for one in estimators)))
     for name, against in pairs:
         there = _whole(values[against])
         found, computed = values[against][there], run[name].reshape(len(run["time"]), -1)[there]

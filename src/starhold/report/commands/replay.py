@@ -17,8 +17,8 @@ MOST_PANELS = 6
 def present(scenario: Scenario, entry: LawEntry, telemetry: Any, mapping: Any, tolerance: Any, result: Replay) -> Result:
     """A row for each quantity, where they first part, and what the telemetry lacks."""
     title = f"{scenario.name}, {entry.name}: replay of {result.telemetry.name}"
-    heads = [Column("computed"), Column("recorded"), Column("unit"), Column("samples", "", "d")]
-    heads += [Column("rms difference", "", ".3g"), Column("largest", "", ".3g"), Column("at", "s", ".6g")]
+    heads = [Column("quantity"), Column("unit"), Column("samples", "", "d"), Column("rms difference", "", ".3g")]
+    heads += [Column("largest", "", ".3g"), Column("at", "s", ".6g")]
     heads += [Column("beyond", "%", ".3g"), Column("parts at", "s", ".6g")]
     rows = [_row(one) for one in result.comparisons]
     blocks: list[Block] = [result.sentence, *(["", Table(heads, rows)] if rows else []), *result.notes]
@@ -33,7 +33,8 @@ def _row(one: Comparison) -> list[Any]:
     largest = int(np.argmax(np.where(np.isnan(sizes), np.inf, sizes)))
     rms, share = float(np.sqrt(np.mean(sizes**2))), 100.0 * float(np.mean(one.beyond))
     told = [rms, float(sizes[largest]), float(one.times[largest]), share, one.parted_at]
-    return [one.name, one.against, one.unit, len(one.times), *told]
+    name = one.name if one.name == one.against else f"{one.name}, {one.against} recorded"
+    return [name, one.unit, len(one.times), *told]
 
 
 def _numbers(result: Replay) -> Table:
