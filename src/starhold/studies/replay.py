@@ -167,7 +167,8 @@ def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, fir
     taken = [*fields, *names.values(), "command"]
     lacking = [name for name in taken if name in values and np.isnan(values[name]).any()]
     absent = [name for name in taken if name not in values]
-    notes = [f"{_listed(gaps)} of {count} control steps; between them a rate goes along a straight line." if gaps else ""]
+    every = f"{count} control steps, every {loop.period:g} s"
+    notes = [f"{_listed(gaps)} of {every}; between them none is new, and rates go along straight lines." if gaps else ""]
     notes += [f"Not recorded, and taken from the estimate or the model: {_listed(absent)}." if absent else ""]
     notes += [f"Recorded at some control steps alone, and so at the others: {_listed(lacking)}." if lacking else ""]
     return rows, [note for note in notes if note]
