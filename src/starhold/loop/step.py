@@ -24,8 +24,9 @@ from starhold.parts.roles import Loads, Scene
 
 class Step(NamedTuple):
     """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied,
-    `sense` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` is
-    the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
+    `sense` what the law is given at a control instant, of readings from outside if there are any; `update` decides by it or
+    takes a command from outside; `slope` is the rates of (state, effectors, outputs of actuators that another one follows),
+    which `propagate` integrates."""
 
     measure: Callable[..., Any]
     sense: Callable[..., Sensed]
@@ -75,7 +76,7 @@ def make_equations(parts: Composition) -> Step:
         mode = (carry.memory.mode,) if by_mode else ()
         return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
-    def observed(carry, step, key, craft, setup):
+    def observed(carry, step, key, craft, setup, seen=None):
         """Return a function that gives the law's measurement towards a goal and the memories of sensors and estimator, the
         goal, and the readings of the sensors."""
         state, memories = carry.state, carry.memories
@@ -84,6 +85,7 @@ def make_equations(parts: Composition) -> Step:
         shown = []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
             reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
+            reading = reading if seen is None else seen[len(every)]
             # Of several readings of a name all that do not ask for more are given the first.
             vars(readings).update(reading._asdict() | vars(readings))
             kept.append(memory)
@@ -126,13 +128,13 @@ def make_equations(parts: Composition) -> Step:
         show, goal, _ = observed(carry, step, key, craft, setup)
         return show(goal)[0]
 
-    def sense(carry, step, key, gains, craft, setup):
-        show, goal, sight = observed(carry, step, key, craft, setup)
+    def sense(carry, step, key, gains, craft, setup, seen=None):
+        show, goal, sight = observed(carry, step, key, craft, setup, seen)
         measurement, memories = show(goal)
         h = carry.h
         if by_mode or watches:
-            seen = (sight,) if watches else ()
-            carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory, *seen))
+            watched = (sight,) if watches else ()
+            carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory, *watched))
         if by_mode:
             # The measurement of the law of a mode that begins is relative to the mode's own target.
             measurement, memories = show(goal_of(carry, carry.state, step, setup))
@@ -142,8 +144,8 @@ def make_equations(parts: Composition) -> Step:
             measurement = measurement._replace(attitude=attitude)
         return Sensed(measurement, sight.readings, memories.estimate, carry, memories, h)
 
-    def update(carry, step, key, gains, craft, setup, given=None):
-        measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup)
+    def update(carry, step, key, gains, craft, setup, given=None, seen=None):
+        measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup, seen)
         command, memory = command_of(measurement, gains, craft, carry.memory)
         command = limit(command if given is None else given, setup.limit)
         passed = command
