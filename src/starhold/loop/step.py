@@ -16,6 +16,7 @@ from starhold.algebra.words import number_of, word_of
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import Carry, Composition, can_be_inactive, is_recorded
 from starhold.parts.actuators.limits import LIMITS
+from starhold.parts.contract import CLOCK
 from starhold.parts.part import Part
 from starhold.parts.random import RANGE, Dice
 from starhold.parts.roles import Loads, Scene
@@ -64,6 +65,7 @@ def make_equations(parts: Composition) -> Step:
     still = target is None or target.flag("STILL")
     follows = target is not None and target.flag("FOLLOWS")
     by_mode = target is not None and target.flag("BY_MODE")
+    timed = any(CLOCK in part.reads for part in (parts.law, *parts.effectors))
     command_of = parts.law.module.command if by_mode else parts.law.command
 
     def goal_of(carry, state, step, setup):
@@ -87,6 +89,8 @@ def make_equations(parts: Composition) -> Step:
             every.append(reading)
             if is_recorded(sensor):
                 shown.append(reading)
+        if timed and not hasattr(readings, CLOCK):
+            vars(readings)[CLOCK] = number_of(step) * setup.period
         estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
         if parts.estimator is not None:
             several = SimpleNamespace(**values, every=tuple(every))

@@ -19,6 +19,10 @@ from starhold.algebra.vector import Matrix, Vector
 from starhold.parts.craft import compact
 
 
+CLOCK = "time"
+"""The reading that every loop gives to a law that declares it: seconds since the start. No sensor is needed for it."""
+
+
 class NoMemory(NamedTuple):
     """The memory of a part that keeps nothing."""
 
