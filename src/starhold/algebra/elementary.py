@@ -48,7 +48,8 @@ def _shares(count: int, bits: int, number: Fraction) -> tuple[float, ...]:
     """Return a number as the sum of floats, of so many bits each but the last."""
     shares: list[float] = []
     for place in range(1, count):
-        shares.append(float(Fraction(math.floor(number * 2 ** (bits * place)), 2 ** (bits * place))))
+        scale = 1 << bits * place
+        shares.append(float(Fraction(math.floor(number * scale), scale)))
         number -= Fraction(shares[-1])
     return (*shares, float(number))
 
@@ -56,8 +57,9 @@ def _shares(count: int, bits: int, number: Fraction) -> tuple[float, ...]:
 _GROWTH = tuple(float(Fraction(1, factorial(n))) for n in range(1, 14))
 _QUARTERS = _shares(6, 23, _QUARTER)
 _SINE = tuple(float(Fraction((-1) ** n, factorial(2 * n + 1))) for n in range(1, 10))
-_TURN, _HALF, _ARC, _EIGHTH = (_pair(n) for n in (2 * _QUARTER, _QUARTER, Fraction("0.463647609000806116214256231461214402"), _QUARTER / 2))  # fmt: skip
-"""Angles in two parts: half a turn, a quarter, atan(1/2), and an eighth."""
+_TURN, _HALF, _EIGHTH = (_pair(part * _QUARTER) for part in (Fraction(2), Fraction(1), Fraction(1, 2)))
+_ARC = _pair(Fraction("0.463647609000806116214256231461214402"))
+"""Angles in two parts: half a turn, a quarter, an eighth, and atan(1/2)."""
 _ARCTANGENT = tuple((-1.0) ** n / (2 * n + 1) for n in range(1, 15))
 _LOGARITHMIC = tuple(2.0 / (2 * n + 1) for n in range(1, 12))
 _THIRD = _pair(Fraction(1, 3))
@@ -108,7 +110,10 @@ def _raised(x: Scalar, low: Scalar | None = None) -> Scalar:
 
 
 def _symbolic(name: str) -> Callable[..., Any]:
-    return lambda *values: getattr(library("sympy"), name)(*values)
+    def call(*values: Any) -> Any:
+        return getattr(library("sympy"), name)(*values)
+
+    return call
 
 
 @whole(_symbolic("exp"), lambda x: exp(x))
@@ -160,7 +165,7 @@ def _precise_log(x: Scalar) -> Pair:
     return plus((exponent * _HIGH, exponent * _LOW), (2.0 * small, 2.0 * error))
 
 
-@whole(lambda x, p: x**p, lambda x, p: p * power(x, p - 1.0), lambda x, p: power(x, p) * log(x))
+@whole(_symbolic("Pow"), lambda x, p: p * power(x, p - 1.0), lambda x, p: power(x, p) * log(x))
 def power(x: Scalar, p: Scalar) -> Scalar:
     """Return x^p for x from 0 on, to 1.2 units; 1 for p = 0, NaN for negative x."""
     inside, p = _inside(x), clip(p, 2.0**65)
@@ -227,7 +232,7 @@ def sin(x: Scalar) -> Scalar:
 
 @whole(_symbolic("atan2"), lambda y, x: x / (x * x + y * y), lambda y, x: -y / (x * x + y * y))
 def atan2(y: Scalar, x: Scalar) -> Scalar:
-    """Return the angle (rad) from the first axis to (x, y), to 1 unit, with the sign of y, of zeros and infinities as in C."""
+    """Return the angle (rad) from the first axis to (x, y), to 1 unit, with the sign of y; zeros and infinities as in C."""
     across, along = absolute(y) + 0.0, absolute(x) + 0.0
     steep = less(along, across)
     small, large = where(steep, along, across), where(steep, across, along)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, TypeVar, cast
+from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar, cast
 
 from starhold.errors import InputError
 
@@ -68,7 +68,10 @@ def operation(takes: str, gives: str, **meanings: Any) -> Callable[[_Function], 
     return register
 
 
-def whole(symbolic: Callable[..., Any], *slopes: Callable[..., Any]) -> Callable[[_Function], _Function]:
+_Form: TypeAlias = Callable[[Any], Any] | Callable[[Any, Any], Any]
+
+
+def whole(symbolic: _Form, *slopes: _Form) -> Callable[[_Function], _Function]:
     """Make an equation of numbers a function that readers which prove know as one. symbolic: its form in SymPy; slopes: its
     derivatives by each argument, functions of floats. Floats and traces read the equation itself."""
 

@@ -29,7 +29,9 @@ def labelled(name: str, value: Any) -> Iterator[tuple[str, float]]:
 class _NumbersAlone(Recorder):
     def apply(self, operation: Operation, values: tuple[Any, ...]) -> Any:
         if WORD in (*operation.takes, operation.gives):
-            raise unreadable("a number's bits, of which sin, log and their like are made: proofs read + - * /, sqrt and cases")
+            raise unreadable(
+                "a number's bits, of which sin, log and their like are made: proofs read + - * /, sqrt and cases"
+            )
         return super().apply(operation, values)
 
 

@@ -54,7 +54,7 @@ class Measurement(NamedTuple):
     period: Annotated[float, Quantity("s", "for which the torque will be held")]
     wheel_momentum: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
     magnetic_field: Annotated[Vector, Quantity("T", "as a magnetometer tells it; zero without one")] = ZERO
-    time: Annotated[float, Quantity("s", "since the start, for laws with `READS = (\"time\",)`; others must not use it")] = 0.0
+    time: Annotated[float, Quantity("s", 'since the start, for laws with `READS = ("time",)`; others must not use it')] = 0.0
 
 
 class Sample(NamedTuple):
@@ -125,7 +125,8 @@ def observe(state: State, scene: Scene) -> Measurement:
     goal = scene.goal
     error = relative(goal.attitude, state.attitude)
     position = to_body(state.attitude, state.position)
-    field, time = getattr(scene.readings, "magnetic_field", ZERO), getattr(scene.readings, CLOCK, ABSENT)
+    field: Vector = getattr(scene.readings, "magnetic_field", ZERO)
+    time: Any = getattr(scene.readings, CLOCK, ABSENT)
     known = (scene.torque, position, scene.period, scene.momentum, field, time)
     if scene.still:
         # The arithmetic on the zeros of a target at rest is left out here, for a compiler must not drop it.
