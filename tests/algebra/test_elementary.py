@@ -126,7 +126,7 @@ def test_every_machine_gives_their_bits_at_every_edge(machine):
     agree_with(machine, *cases)
 
 
-@pytest.mark.parametrize("function", (atan2, cbrt, exp, tanh, sin, cos), ids=lambda f: f.__name__)
+@pytest.mark.parametrize("function", [atan2, cbrt, exp, tanh, sin, cos], ids=lambda f: f.__name__)
 def test_edges_are_those_of_c(function):
     for arguments in np.array(np.meshgrid(*[EDGES] * FUNCTIONS[function])).reshape(FUNCTIONS[function], -1).T.tolist():
         found = function(*arguments)

@@ -165,7 +165,7 @@ def _precise_log(x: Scalar) -> Pair:
     return plus((exponent * _HIGH, exponent * _LOW), (2.0 * small, 2.0 * error))
 
 
-@whole(_symbolic("Pow"), lambda x, p: p * power(x, p - 1.0), lambda x, p: power(x, p) * log(x))
+@whole(_symbolic("Pow"), lambda x, p: p * power(x, p - 1.0), lambda x, p: log(x) * power(x, p))  # pyright: ignore[reportUnknownLambdaType]
 def power(x: Scalar, p: Scalar) -> Scalar:
     """Return x^p for x from 0 on, to 1.2 units; 1 for p = 0, NaN for negative x."""
     inside, p = _inside(x), clip(p, 2.0**65)

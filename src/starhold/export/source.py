@@ -117,8 +117,8 @@ def _header(code: Code, types: list[Type], public: dict[str, str], scenario: str
     more = " and memcpy" if helpers("\n".join(code.printed.lines)) else ""
     lines += comment(
         f"One control step: {card.summary}. Takes what was measured at this instant, gives what to command until the next, "
-        f"and changes the state. It calls nothing but sqrt{more} and keeps nothing outside the state. It does not check what "
-        "it is given: a NaN that the law uses comes out as one."
+        f"and changes the state. It calls nothing but sqrt{more} and keeps nothing outside the state. It does not check "
+        "what it is given: a NaN that the law uses comes out as one."
     )
     lines += [f"void {name}_step({name}_state_t *state, const {name}_input_t *input, {name}_command_t *command);", ""]
     lines += ["#ifdef __cplusplus", "}", "#endif", "", f"#endif /* {guard} */", ""]
