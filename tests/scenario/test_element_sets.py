@@ -1,4 +1,4 @@
-"""Orbits from two lines and from messages: SGP4's published vectors, in axes that ERFA agrees with; bad files in one line."""
+"""Orbits from two lines and messages: SGP4's published vectors, in axes that ERFA agrees with; bad files in one line."""
 
 import json
 import pickle
@@ -82,9 +82,7 @@ def written(folder, text, name="own.tle"):
 
 def test_a_flight_begins_where_sgp4_says_and_the_difference_is_said(tmp_path):
     orbit = written(tmp_path, "\n".join(("ISS (ZARYA)", *ISS)))
-    with pytest.warns(
-        UserWarning, match=r"orbit.tle: .* comes to lie 49\.2 km from SGP4's own in 5400 s; a part such as obl"
-    ):
+    with pytest.warns(UserWarning, match=r"orbit.tle: .* lie 49\.2 km from SGP4's orbit in 5400 s; a part such"):
         scenario = sh.scenario(TABLES | {"orbit": orbit}, folder=tmp_path)
     table, elements = scenario.table.orbit, ElementSet("own.tle", ISS)
     assert table.start == elements.state(elements.epoch)
@@ -93,7 +91,7 @@ def test_a_flight_begins_where_sgp4_says_and_the_difference_is_said(tmp_path):
     with pytest.warns(UserWarning, match="orbit.tle"):
         later = scenario.with_({"orbit.epoch": "2008-09-21T00:00:00Z"})
     assert later.table.orbit.start == elements.state((2008.0, 9.0, 21.0, 0.0, 0.0, 0.0))
-    assert pickle.loads(pickle.dumps(scenario)).table.orbit.start == table.start
+    assert pickle.loads(pickle.dumps(table)).tle.satellite().satnum == 25544
     with pytest.warns(UserWarning, match=r"the elements are of \[2008, 9, 20, .*, 103 days from the epoch"):
         sh.scenario(TABLES | {"orbit": orbit | {"epoch": "2009-01-01T00:00:00Z"}}, folder=tmp_path)
 

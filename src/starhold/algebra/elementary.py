@@ -149,8 +149,8 @@ def log(x: Scalar) -> Scalar:
     square, half = s * s, 0.5 * f * f
     # log(1 + f) = 2 atanh(s) = f - f^2/2 + s (f^2/2 + R).
     rest = s * (half + square * series(_LOGARITHMIC, square)) + exponent * _LOW
-    found = exponent * _HIGH - ((half - rest) - f)
-    return where(inside, found, where(less(0.0, x), x, where(less_equal(0.0, x), -math.inf, math.nan)))
+    result = exponent * _HIGH - ((half - rest) - f)
+    return where(inside, result, where(less(0.0, x), x, where(less_equal(0.0, x), -math.inf, math.nan)))
 
 
 def _precise_log(x: Scalar) -> Pair:
@@ -172,9 +172,9 @@ def power(x: Scalar, p: Scalar) -> Scalar:
     logarithm = _precise_log(where(inside, x, 1.0))
     exponent, error = product_of(logarithm[0], p)
     low = where(less(absolute(exponent), 800.0), error + logarithm[1] * p, 0.0)
-    found = _raised(clip(exponent, 800.0), low)
+    result = _raised(clip(exponent, 800.0), low)
     end = where(less(p, 0.0), divide(1.0, x + 0.0), where(less(0.0, p), x + 0.0, p + 1.0))
-    return where(inside, found, where(less_equal(0.0, x), end, math.nan))
+    return where(inside, result, where(less_equal(0.0, x), end, math.nan))
 
 
 @whole(
@@ -255,8 +255,8 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     angle = _where(tiny, (ratio, 0.0), angle)
     angle = _where(steep, plus(_HALF, (-angle[0], -angle[1])), angle)
     angle = _where(_is_negative(x), plus(_TURN, (-angle[0], -angle[1])), angle)
-    found = angle[0] + angle[1]
-    return where(_is_negative(y), -found, found)
+    result = angle[0] + angle[1]
+    return where(_is_negative(y), -result, result)
 
 
 def _where(truth: Truth, a: Pair, b: Pair) -> Pair:

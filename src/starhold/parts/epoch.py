@@ -80,8 +80,8 @@ def precession(days: float) -> Quaternion:
 
 
 def true_to_mean(days: float) -> Quaternion:
-    """The turn from the true equator and mean equinox (TEME) so many days after J2000 to the mean equator and equinox of that
-    date, to 0.2": the four largest terms of the nutation (Meeus, Astronomical Algorithms, chapter 22)."""
+    """The turn from the true equator and mean equinox (TEME) so many days after J2000 to the mean equator and equinox of
+    that date, to 0.2": the four largest terms of the nutation (Meeus, Astronomical Algorithms, chapter 22)."""
     t = days / 36525.0
     node, sun, moon = (
         radians(at + rate * t) for at, rate in ((125.04452, -1934.136261), (280.4665, 36000.7698), (218.3165, 481267.8813))

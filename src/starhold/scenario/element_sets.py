@@ -117,16 +117,16 @@ def apart(elements: ElementSet, epoch: Date, gravity: float, duration: float) ->
 def _two_lines(path: Path) -> ElementSet:
     """The two lines of a file. ValueError says which line is wrong, and why."""
     rows = [(number, line.rstrip()) for number, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
-    found = [(number, line) for number, line in rows if re.match(r"[12] ", line)]
-    if [line[0] for _, line in found] != ["1", "2"] or len(rows) > 3:
-        raise ValueError(f"{len(found)} lines that begin with 1 or 2, of {len(rows)}")
+    pair = [(number, line) for number, line in rows if re.match(r"[12] ", line)]
+    if [line[0] for _, line in pair] != ["1", "2"] or len(rows) > 3:
+        raise ValueError(f"{len(pair)} lines that begin with 1 or 2, of {len(rows)}")
     checksum = import_module("sgp4.io").compute_checksum
-    for number, line in found:
+    for number, line in pair:
         if len(line) != 69:
             raise ValueError(f"line {number} has {len(line)} characters, not 69")
         if line[68] != str(checksum(line)):
             raise ValueError(f"line {number} ends with the checksum {line[68]}, but its digits add up to {checksum(line)}")
-    (_, first), (_, second) = found
+    (_, first), (_, second) = pair
     if first[2:7] != second[2:7]:
         raise ValueError(f"lines of two satellites, {first[2:7].strip()} and {second[2:7].strip()}")
     return ElementSet(path.name, (first, second))
@@ -138,15 +138,15 @@ def _message(path: Path) -> ElementSet:
     parsers = {".xml": omm.parse_xml, ".csv": omm.parse_csv}
     if path.suffix in parsers:
         with path.open(encoding="utf-8") as file:
-            found = list(parsers[path.suffix](file))
+            messages = list(parsers[path.suffix](file))
     elif path.suffix == ".json":
         given = json.loads(text)
-        found = given if isinstance(given, list) else [given]
+        messages = given if isinstance(given, list) else [given]
     else:
-        found = [dict(re.findall(r"^\s*(\w+)\s*=\s*(.*?)\s*(?:\[.*\])?\s*$", text, re.MULTILINE))]
-    if len(found) != 1:
-        raise ValueError(f"{len(found)} satellites")
-    fields = {str(name): str(value) for name, value in found[0].items()}
+        messages = [dict(re.findall(r"^\s*(\w+)\s*=\s*(.*?)\s*(?:\[.*\])?\s*$", text, re.MULTILINE))]
+    if len(messages) != 1:
+        raise ValueError(f"{len(messages)} satellites")
+    fields = {str(name): str(value) for name, value in messages[0].items()}
     if fields.get("MEAN_ELEMENT_THEORY", "SGP4") not in ("SGP4", "SGP/SGP4"):
         raise ValueError(f"MEAN_ELEMENT_THEORY {fields['MEAN_ELEMENT_THEORY']}, not SGP4")
     return ElementSet(path.name, fields=tuple(fields.items()))

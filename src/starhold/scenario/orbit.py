@@ -195,7 +195,7 @@ class Orbit(Table):
         elements: ElementSet | None = getattr(self, kind)
         if elements is not None:
             far = 1e-3 * apart(elements, self.epoch, self.gravitational_parameter, duration)
-            said = f"the orbit flown, a two-body one from SGP4's state, comes to lie {far:.3g} km from SGP4's own in {duration:.6g} s"
+            said = f"two-body motion from SGP4's state comes to lie {far:.3g} km from SGP4's orbit in {duration:.6g} s"
             warnings.warn(f"orbit.{kind}: {said}; a part such as oblateness brings it nearer", stacklevel=2)
         gravity, surface = self.gravitational_parameter, self.surface
         escape = math.sqrt(2.0 * gravity / norm(position))
