@@ -49,7 +49,11 @@ DEMANDED: dict[str, tuple[str, ...]] = {
 """The attributes that a part of each role must define, beside `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
 """Equations that parts of a role have at least one of."""
-BOUNDS = {"bound": ("params", "envelope"), "noise": ("params", "period"), "recursion": ("params", "noise", "period", "rate")}
+BOUNDS: dict[str, tuple[str, ...]] = {
+    "bound": ("params", "envelope"),
+    "noise": ("params", "period"),
+    "recursion": ("params", "noise", "period", "rate"),
+}
 """Functions of a part of any role that bound what it does, and their arguments."""
 
 AnyPart = TypeVar("AnyPart", bound=Part)
@@ -168,11 +172,13 @@ def _check_equations(part: Part) -> None:
     """ValueError for an equation, or a bound, that does not take the arguments of its role."""
     acts = part.role in ("actuator", "effector")
     wanted = BOUNDS | {"error": ("params", "envelope") if acts else ("params",)}
-    for name, declared in vars(getattr(roles, part.role.capitalize())).items():
+    protocol: Any = getattr(roles, part.role.capitalize())
+    declarations: dict[str, Any] = {**vars(protocol)}
+    for name, declared in declarations.items():
         if inspect.isfunction(declared) and not (name == "goal" and part.flag("BY_MODE")):
             wanted[name] = tuple(word for word in inspect.signature(declared).parameters if word != "self")
     for name, words in wanted.items():
-        equation = getattr(part.module, name, None)
+        equation: Any = part.hook(name)
         if inspect.isfunction(equation):
             try:
                 inspect.signature(equation).bind(*words)
