@@ -18,7 +18,7 @@ from generators.kernel import files_table
 from generators.laws import POINT
 from generators.sets import sets_table
 from generators.tables import fields_table, first_sentence, signature, table
-from starhold.algebra import quaternion, scalar, several, structured
+from starhold.algebra import cosines, elementary, quaternion, rotation, scalar, several, structured
 from starhold.algebra import vector as vectors
 from starhold.analysis import libration_point, rigid_body
 from starhold.analysis.pointing import MEANINGS
@@ -84,18 +84,24 @@ def attributes_table(cls: Any) -> str:
     return table(["keyword", "default", "meaning"], [*rows.values()])
 
 
-def functions_table(module: ModuleType) -> str:
-    """The functions that a module defines, and its classes with their methods."""
+FOR_FILES = ("from_angles", "to_angles")
+"""Functions of attitudes that laws cannot use."""
+
+
+def functions_table(*modules: ModuleType) -> str:
+    """The functions that modules define, and their classes with their methods."""
     rows: list[list[str]] = []
-    for name, item in vars(module).items():
-        if name.startswith("_") or getattr(item, "__module__", "") != module.__name__ or name in OPERATORS:
-            continue
-        if inspect.isfunction(item):
-            rows.append([f"`{name}({signature(item)})`", first_sentence(item)])
-        elif inspect.isclass(item):
-            own = [f for n, f in vars(item).items() if inspect.isfunction(f) and not n.startswith("_")]
-            methods = "; ".join(f"`.{f.__name__}({signature(f)})`: {first_sentence(f)}" for f in own)
-            rows.append([f"`{name}`", f"{first_sentence(item)} {methods}"])
+    for module in modules:
+        found = {n: x for n, x in vars(module).items() if getattr(x, "__module__", "") == module.__name__}
+        for name, item in found.items():
+            if name.startswith("_") or name in (*OPERATORS, *FOR_FILES):
+                continue
+            if inspect.isfunction(item):
+                rows.append([f"`{name}({signature(item)})`", first_sentence(item)])
+            elif inspect.isclass(item):
+                own = [f for n, f in vars(item).items() if inspect.isfunction(f) and not n.startswith("_")]
+                methods = "; ".join(f"`.{f.__name__}({signature(f)})`: {first_sentence(f)}" for f in own)
+                rows.append([f"`{name}`", f"{first_sentence(item)} {methods}"])
     return table(["function", "meaning"], rows)
 
 
@@ -186,6 +192,8 @@ TABLES = {
     "measurement": lambda: fields_table(Measurement),
     "craft": lambda: fields_table(Craft),
     "scalar": lambda: functions_table(scalar),
+    "elementary": lambda: functions_table(elementary),
+    "attitudes": lambda: functions_table(rotation, cosines),
     "vector": lambda: functions_table(vectors),
     "quaternion": lambda: functions_table(quaternion),
     "structured": lambda: functions_table(structured),

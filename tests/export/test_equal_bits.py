@@ -28,6 +28,7 @@ MADE = [
     "target from a table",
     "hysteresis, axis",
     "orbital target",
+    "every function, the time",
     "pid, example 0, noise",
     "super-twisting, example 0, noise",
     "modes that watch",

@@ -1,6 +1,7 @@
 """Closed loops of every make: built-in scenarios, and one for each choice that a loop has."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from tests.making import ORBITAL, aimed, built, noise, on_wheels, point_loop
 from tests.missions import WATCHFUL
 
+FUNCTIONS = str(Path(__file__).parent / "every_function.toml")
+"""A scenario whose law uses every elementary function and the time, and whose inertia changes."""
 NOISE = noise(1e-4, 1e-3, 1e-4)
 FAULT = """
 [[fault]]
@@ -59,6 +62,8 @@ def choices() -> dict[str, Any]:
         f"{cover}, {kind}": replace(plain, sign_policy=cover, limit=kind)
         for cover, kind in zip(SIGN_POLICIES, KINDS, strict=True)
     }
+    timed = load(FUNCTIONS)
+    found["every function, the time"] = build(timed, timed.laws[0])
     found["orbital target"] = plain.without("target").with_parts(ORBITAL)
     times = np.arange(12) * 10.0
     table = tabulate(times, np.array(random_quaternions(12)), np.arange(1101) * plain.period)

@@ -13,7 +13,7 @@ from starhold.errors import InputError
 from starhold.export.recording import Copies
 from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories, is_recorded
 from starhold.loop.step import make_equations
-from starhold.parts.contract import NoMemory
+from starhold.parts.contract import CLOCK, NoMemory
 from starhold.parts.part import Part
 from starhold.parts.roles import Goal
 from starhold.trace.recording import Recorder
@@ -128,6 +128,9 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
             readings.update({inputs[name]: first[name] for name in taken})
             units = quantities(part.module.Reading) if is_recorded(part) else {}
             shown.update({inputs.get(name, name): one for name, one in units.items()})
+        if CLOCK in parts.law.reads and CLOCK not in firsts:
+            firsts[CLOCK], readings[CLOCK] = CLOCK, 0.0
+            shown[CLOCK] = quantities(module.Measurement)[CLOCK]._replace(text="since the start")
         fields.update(readings)
         notes.update({name: one for name, one in shown.items() if notes.get(name) is None or name not in UNITS})
         given = (firsts, *again) if readings else ()

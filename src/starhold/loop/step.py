@@ -17,6 +17,7 @@ from starhold.laws.conditions import Sight
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import Carry, Composition, can_be_inactive, is_recorded
 from starhold.parts.actuators.limits import LIMITS
+from starhold.parts.contract import CLOCK
 from starhold.parts.part import Part
 from starhold.parts.random import RANGE, Dice
 from starhold.parts.roles import Loads, Scene
@@ -68,6 +69,7 @@ def make_equations(parts: Composition) -> Step:
     by_mode = target is not None and target.flag("BY_MODE")
     # Such a law of modes looks at more than its measurement to decide which one commands.
     watches = parts.law.flag("WATCHES")
+    timed = any(CLOCK in part.reads for part in (parts.law, *parts.effectors))
     command_of = parts.law.module.command if by_mode or watches else parts.law.command
 
     def goal_of(carry, state, step, setup):
@@ -92,6 +94,8 @@ def make_equations(parts: Composition) -> Step:
             every.append(reading)
             if is_recorded(sensor):
                 shown.append(reading)
+        if timed and not hasattr(readings, CLOCK):
+            vars(readings)[CLOCK] = number_of(step) * setup.period
         estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
         if parts.estimator is not None:
             several = SimpleNamespace(**values, every=tuple(every))

@@ -20,6 +20,7 @@ from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_be_inactive, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, error_line, from_file, parts, read_module, role_of
+from starhold.parts.contract import CLOCK
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -174,7 +175,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
             raise InputError(where, _key(one), given, f"one about {about}, the body of its model")
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
-            if need not in readings:
+            if need not in {*readings, CLOCK}:
                 raise InputError(where, key, f"no {need}, which {one.name} needs", _measuring(need))
     _check_estimates(loop, where)
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
