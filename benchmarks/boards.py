@@ -2,8 +2,8 @@
 
 Each law is exported as a process, compiled for the machine and run by qemu as the law of its scenario. One flight is
 compared with the simulation bit by bit; in a shorter one qemu runs an instruction at a time and lists them, and those
-between the entry into the law's step and the return from it are counted, with all that it calls. Instructions are not cycles: what a
-call costs in time depends on the processor's pipeline, caches and memory.
+between the entry into the law's step and the return from it are counted, with all that it calls. Instructions are not
+cycles: what a call costs in time depends on the processor's pipeline, caches and memory.
 
 Run: python benchmarks/boards.py    (machines whose compiler or emulator is not installed are left out)
 """

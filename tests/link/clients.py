@@ -83,6 +83,8 @@ class Client:
 
     def __init__(self, address, text=False, link=None):
         self.write, self.socket = line if text else binary, link or connected(address)
+        # Of datagrams each has a form of its own.
+        self._whole = isinstance(self.socket, Dealer) or getattr(self.socket, "type", None) is socket.SOCK_DGRAM
         self._decoder, self._ready = Decoder(by_plant=True), []
 
     def send(self, kind, step=0, numbers=()):
@@ -94,7 +96,7 @@ class Client:
             data = self.socket.recv(2**16)
             if not data:
                 return None
-            self._ready += self._decoder.feed(data)
+            self._ready += (Decoder(by_plant=True) if self._whole else self._decoder).feed(data)
         return self._ready.pop(0)
 
     def until(self, kind):

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import starhold as sh
+from starhold.link import server
 from starhold.link.plant import Ending, summary
 from starhold.link.protocol import Fault, Kind, Message, binary
+from starhold.report.timing import write_timing
 from tests.export.flown import built, code_of
 from tests.link.clients import OVER, Client, Dealer, connected, mutated, served
 from tests.tiers import fewer
@@ -77,10 +79,12 @@ def test_exported_c_flies_an_orbit_with_the_bits_of_a_simulation(over, tmp_path)
     assert_same(sh.simulate(scenario), result.recording.dataset())
 
 
-def test_real_time_keeps_to_the_clock_and_counts_what_is_missing():
+def test_real_time_keeps_to_the_clock_and_counts_what_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setattr(server, "SECOND", 0.2)
+    looks = []
     scenario = short("three-laws", 20)
     period = scenario.table.simulation.control_period / 2.0
-    with served(scenario, rate=2.0, missing="zero") as (address, results):
+    with served(scenario, rate=2.0, missing="zero", watch=looks.append) as (address, results):
         client, begun = Client(address), time.monotonic()
         client.greet()
         # A command for the first period and one that is much too late; none for the others.
@@ -92,7 +96,14 @@ def test_real_time_keeps_to_the_clock_and_counts_what_is_missing():
         assert client.until(Kind.STOP).text == Ending.FLOWN
         spent = time.monotonic() - begun
         client.close()
-    plant = results.get().plant
+    result = results.get()
+    plant = result.plant
+    # Each fourth period, or later.
+    assert 2 <= len(looks) <= 6
+    assert write_timing(result.timing, tmp_path).read_bytes().startswith(b"\x89PNG")
+    kept = json.loads((tmp_path / "timing.json").read_text())
+    assert (kept["period"], kept["periods"], kept["missed"]) == (period, 21, plant.missed)
+    assert (kept["latencies"], kept["lateness"]) == (plant.latencies, plant.lateness)
     assert spent >= 20.5 * period
     assert plant.missed + plant.commanded == 21
     assert plant.commanded <= 1
