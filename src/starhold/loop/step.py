@@ -68,7 +68,7 @@ def make_equations(parts: Composition) -> Step:
     follows = target is not None and target.flag("FOLLOWS")
     by_mode = target is not None and target.flag("BY_MODE")
     # Such a law of modes looks at more than its measurement to decide which one commands.
-    watches = parts.law.flag("WATCHES")
+    watches = named.modes is not None and named.modes.WATCHES
     timed = any(CLOCK in part.reads for part in (parts.law, *parts.effectors))
     command_of = parts.law.module.command if by_mode or watches else parts.law.command
 
