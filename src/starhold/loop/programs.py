@@ -162,8 +162,8 @@ def predicting(
     step: Step, sensors: Sequence[Part], made: Callable[..., tuple[Any, Numbers]], free: int, substeps: int, outside: bool
 ) -> tuple[Program, Program, Arguments]:
     """The flight that so many free numbers predict, recorded: the program that makes its carry of them, which `made` gives
-    with the kernel's numbers, and one of `count` control steps from `first` on, with the readings of each in `record`. If
-    `outside`, the commands of all steps lie in `given`, and the law's memory stays. step: see `silent` of `make_step`."""
+    with the kernel's numbers, and one of `count` control steps from `first` on. The readings of all steps lie in `record` and,
+    if `outside`, their commands in `given`; then the law's memory stays as it is. step: see `silent` of `make_step`."""
     recorder = Recorder()
     with recorder.recording():
         cells, numbers = recorder.memory("carry", lanes=True, writable=True), recorder.memory("free", lanes=True)
@@ -181,7 +181,7 @@ def predicting(
         def turn(k: Any, carry: Any) -> Any:
             now, state, memories = first + k, carry.state, carry.memories.sensors
             fitted = zip(sensors, memories, setup.sensors, strict=True)
-            _put_row(record, k, tuple(s.module.measure(state, m, p, Silent(), now)[0] for s, m, p in fitted))
+            _put_row(record, now, tuple(s.module.measure(state, m, p, Silent(), now)[0] for s, m, p in fitted))
             command = tuple(given[now * 3 + i] for i in range(3)) if outside else None
             updated = step.update(carry, now, (0, 0), gains, nominal, setup, command)
             return (_propagated(step, updated, craft, setup, substeps),)

@@ -1,0 +1,392 @@
+"""Numbers of a scenario fitted to telemetry: weighted least squares by Gauss-Newton steps over multiple shooting.
+
+The flight is cut into segments that begin where readings tell the state, so that a wrong guess does not lead astray; the
+gaps between them close with the steps (H. G. Bock's condensing: the columns of the Jacobian fly through the nodes, with one
+more for the gaps). Weights are the noise that sensors state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg, stats
+
+from starhold.algebra.dual import Dual, variables
+from starhold.algebra.quaternion import conjugate, multiply
+from starhold.algebra.structure import flatten
+from starhold.errors import InputError
+from starhold.parts.random import RANGE, Silent
+from starhold.scenario.reading import LawEntry, Scenario
+from starhold.studies.fitting import START, Array, Free, Prediction, Predictor, Reading
+from starhold.studies.observable import UNTOLD, Posterior, posterior_of
+from starhold.studies.telemetry import Telemetry
+
+COMMANDS = {
+    "recorded": "The recorded commands act on the plant, each held until the next.",
+    "law": "The scenario's own law flies on noise-free readings: noise that moved the craft through the law is left out.",
+    "none": "No command acts: the craft tumbles freely.",
+}
+SPAN, SEGMENTS = 0.5, 500
+"""The craft turns by about so much in a segment of the flight (rad), of which there are at most so many."""
+STEPS = 40
+TURN = 0.5
+"""The initial attitude turns by at most so much in a step (rad)."""
+CLOSED = 1.0
+"""Gaps that change residuals by less than this, in deviations of their noise, are closed."""
+SETTLED = 1e-6
+"""The sum of squares has settled once a step is to lower it by less."""
+RELAXED = 0.1
+"""With each step without gaps the damping falls to this share."""
+SINGULAR = 1e-9
+"""Eigenvalues of a noise's covariance below this share of the largest are 0, as along a direction that is a unit vector."""
+LAGS = 20
+GUESSES = 24
+
+
+class Weighed(NamedTuple):
+    """A reading with what it was at some times: its rows, (n, size), the times' places among instants with the share of the
+    next one, and the matrix that makes residuals of unit variance; degrees: those that a row has of freedom."""
+
+    reading: Reading
+    rows: Array
+    place: Any
+    share: Array
+    whiten: Array
+    degrees: int
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is an attitude."""
+        return self.reading.size == 4
+
+    def residuals(self, given: Prediction) -> tuple[Array, Array]:
+        """Residuals (n, size) in deviations, and their slopes (n, size, free + 1)."""
+        rows, share = self.reading.rows, self.share[:, None]
+        now, after = given.values[self.place, rows], given.values[self.place + 1, rows]
+        values = now + share * (after - now)
+        slopes = given.slopes[self.place, rows] + share[..., None] * (
+            given.slopes[self.place + 1, rows] - given.slopes[self.place, rows]
+        )
+        if not self.turns:
+            return (values - self.rows) @ self.whiten.T, np.einsum("ij,njk->nik", self.whiten, slopes)
+        off = _matrices(self.rows)
+        error = np.einsum("nij,nj->ni", off, values)
+        side = np.where(error[:, :1] < 0.0, -2.0, 2.0)
+        turn = np.einsum("nij,njk->nik", off, slopes)[:, 1:] * side[..., None]
+        return (error[:, 1:] * side) @ self.whiten.T, np.einsum("ij,njk->nik", self.whiten, turn)
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What a fit found. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance and
+    what cannot be told; residuals: by name times and whitened residuals (n, size) and the readings with what the fit gives;
+    whiteness: by residual the p-value of Ljung and Box; chi2: the sum of squared residuals, with its degrees of freedom."""
+
+    scenario: Scenario
+    free: Free
+    values: Array
+    start: Array
+    posterior: Posterior
+    residuals: Mapping[str, tuple[Array, Array]]
+    readings: Mapping[str, tuple[Array, Array]]
+    whiteness: Mapping[str, float]
+    chi2: float
+    degrees: int
+    iterations: int
+    settled: bool
+    telemetry: str
+    commands: str
+
+    @property
+    def consistent(self) -> float:
+        """The probability of so large a sum of squares, were the noise as stated."""
+        return float(stats.chi2.sf(self.chi2, self.degrees))
+
+    @property
+    def white(self) -> bool:
+        """Whether no residual is correlated in time, at 1 % for all of them together."""
+        return min(self.whiteness.values()) * len(self.whiteness) >= 0.01
+
+    def fitted(self) -> dict[str, Any]:
+        """The values by key, as a change of the scenario."""
+        return {p.key: _listed(v) for p, v in zip(self.free.places, self.free.shaped(self.values.tolist()), strict=True)}
+
+    def learnt(self) -> Scenario:
+        """The scenario with the numbers that were found, and a campaign over what is left uncertain about them."""
+        found = self.scenario.with_(self.fitted())
+        return self.posterior.over(found, self.free, self.values)
+
+
+def study(scenario: Scenario, entry: LawEntry, telemetry: Telemetry, keys: Sequence[str], commands: str = "") -> Identified:
+    """Fit the numbers at these keys, and the start, to telemetry.
+
+    commands: "recorded", "law" or "none"; by default as recorded where they are, else the law's. InputError for keys that
+    cannot be fitted, sensors that the telemetry lacks or that state no noise, and fewer data than free numbers."""
+    kind = commands or ("recorded" if "command" in telemetry.columns else "law")
+    if kind not in COMMANDS or (kind == "recorded" and "command" not in telemetry.columns):
+        allowed = ", ".join(name for name in COMMANDS if name != "recorded" or "command" in telemetry.columns)
+        raise InputError(scenario.where, "--commands", kind, allowed)
+    free = Free.of(scenario, keys)
+    predictor = Predictor(scenario, entry, free, kind != "law")
+    return Fit(scenario, predictor, telemetry).solved(telemetry.name, kind)
+
+
+class Fit:
+    """Telemetry beside the predictor of a scenario. One predictor serves any number of flights."""
+
+    def __init__(self, scenario: Scenario, predictor: Predictor, telemetry: Telemetry) -> None:
+        self.scenario, self.predictor, self.telemetry = scenario, predictor, telemetry
+        self.period = predictor.loop.period
+        # Damping for a number to change by about the size of its key; none of the start and of keys that are 0.
+        sizes = np.concatenate([np.zeros(len(START)), predictor.free.sizes])
+        self._damping = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
+        times = telemetry.times
+        if not len(times) or times[0] < 0.0:
+            given = f"{telemetry.name} begins at {times[0]:g} s" if len(times) else f"{telemetry.name} is empty"
+            raise InputError(scenario.where, "", given, "samples from the start of the scenario, time 0, on")
+        # Times that are instants of the loop but for rounding are read there.
+        places = times / self.period
+        whole = np.round(places)
+        places = np.where(np.abs(places - whole) < 1e-6, whole, places)
+        self.steps = max(1, int(np.ceil(places[-1])))
+        self.commands = self._held(places)
+        self.weighed = [self._weighed(reading, places) for reading in predictor.readings]
+        count, free = sum(int(np.size(one.rows)) for one in self.weighed), predictor.count
+        if count < free:
+            raise InputError(scenario.where, "--free", f"{free} free numbers with the start", f"at most the {count} data")
+
+    def _held(self, places: Array) -> Array:
+        """The command of each instant: the last recorded one, none before the first."""
+        held = np.zeros((self.steps + 1, 3))
+        given = self.telemetry.columns.get("command") if self.predictor.outside else None
+        if given is not None:
+            known = np.isfinite(given).all(axis=1)
+            latest = np.searchsorted(places[known], np.arange(self.steps + 1), side="right") - 1
+            held[latest >= 0] = given[known][latest[latest >= 0]]
+        return held
+
+    def _weighed(self, reading: Reading, places: Array) -> Weighed:
+        columns = self.telemetry.columns
+        if reading.name not in columns:
+            given = f"{self.telemetry.name} without {reading.name}"
+            raise InputError(self.scenario.where, "", given, "telemetry of every sensor of the scenario, or one without it")
+        good = np.isfinite(columns[reading.name]).all(axis=1)
+        for gate, _ in reading.gates:
+            good &= columns[gate][:, 0] > 0.5 if gate in columns else True
+        whiten, degrees = _whitening(self.scenario, self.predictor, reading)
+        place = np.minimum(places.astype(int), self.steps - 1)[good]
+        return Weighed(reading, columns[reading.name][good], place, places[good] - place, whiten, degrees)
+
+    def _residuals(self, given: Prediction) -> tuple[Array, Array]:
+        """All residuals (n,) in deviations, and their slopes (n, free + 1); 0 where the flight is to read nothing new."""
+        every, slopes = list[Array](), list[Array]()
+        for one in self.weighed:
+            values, by = one.residuals(given)
+            for _, place in one.reading.gates:
+                seen = (given.values[one.place, place] > 0.5) & ((one.share == 0.0) | (given.values[one.place + 1, place] > 0.5))
+                values, by = values * seen[:, None], by * seen[:, None, None]
+            every.append(values.ravel())
+            slopes.append(by.reshape(-1, by.shape[-1]))
+        return np.concatenate(every), np.concatenate(slopes)
+
+    def _told(self, name: str) -> tuple[Array, Array] | None:
+        """Places among instants and rows of a reading of a part of the state, such as a gyro's."""
+        for one in self.weighed:
+            if one.reading.name.endswith(f"_{name}") and len(one.rows):
+                return one.place + one.share, one.rows
+        return None
+
+    def _begun(self) -> tuple[Array, list[int], Callable[[int, Array], Array]]:
+        """Where the search begins: free numbers, the cuts of the flight, and how its segments begin."""
+        x = np.concatenate([np.zeros(3), self.predictor.loop.start.rate, self.predictor.free.values])
+        attitude, rate = self._told("attitude"), self._told("rate")
+        if rate is not None and rate[0][0] < 2.0:
+            x[3:6] = rate[1][0]
+        if attitude is not None and attitude[0][0] < 2.0:
+            x[:3] = 2.0 * _matrices(np.array([self.predictor.reference]))[0, 1:] @ attitude[1][0]
+            # The rotation vector of the normalised (1, x/2) has this tangent.
+            x[:3] /= max(1e-3, abs(float(np.dot(self.predictor.reference, attitude[1][0]))))
+            x[:3] *= np.sign(np.dot(self.predictor.reference, attitude[1][0])) or 1.0
+        fastest = 0.0 if rate is None else float(np.linalg.norm(rate[1], axis=1).max())
+        length = max(1, -(-self.steps // SEGMENTS), int(SPAN / max(1e-9, fastest * self.period)) if fastest else 100)
+        cuts = [*range(length, self.steps, length)] if rate is not None or attitude is not None else []
+
+        def node(number: int, end: Array) -> Array:
+            begun = end.copy()
+            for part, given in ((slice(0, 4), attitude), (slice(4, 7), rate)):
+                if given is not None:
+                    near = int(np.argmin(np.abs(given[0] - cuts[number])))
+                    if abs(given[0][near] - cuts[number]) < 2.0:
+                        begun[part] = given[1][near]
+            begun[:4] *= np.sign(begun[:4] @ end[:4]) or 1.0
+            return begun
+
+        if attitude is None:
+            x = min((np.array([*turn, *x[3:]]) for turn in _turns()), key=lambda guess: self._cost(guess, cuts, node))
+        return x, cuts, node
+
+    def _cost(self, x: Array, cuts: Sequence[int], node: Any) -> float:
+        values = self._residuals(self.predictor(x, self.steps, self.commands, cuts, node))[0]
+        return float(values @ values) if np.isfinite(values).all() else np.inf
+
+    def solved(self, name: str, kind: str) -> Identified:
+        """Fit the free numbers."""
+        x, cuts, node = self._begun()
+        settled, number, misfit = False, 0, 1.0
+        given = self.predictor(x, self.steps, self.commands, cuts, node) if cuts else self._whole(x)
+        for number in range(1, STEPS + 1):  # noqa: B007
+            values, slopes = self._residuals(given)
+            if not np.isfinite(slopes).all():
+                raise InputError(self.scenario.where, "", "", "the flight diverges under the numbers of the file")
+            gap = slopes[:, -1]
+            # What readings hardly tell must not run away while they are far off.
+            misfit *= 1.0 if cuts else RELAXED
+            step = _step(slopes[:, :-1], values + gap, self._damping * misfit * np.sqrt(values @ values / len(values)))
+            part = min(1.0, TURN / max(1e-300, float(np.abs(step[:3]).max())))
+            if cuts:
+                if float(np.abs(gap).max()) < CLOSED or number > STEPS // 2:
+                    cuts, given = [], self._whole(x)
+                    continue
+                starts = given.starts + part * (given.of_starts @ np.append(step, 1.0))
+                starts[:, :4] /= np.linalg.norm(starts[:, :4], axis=1)[:, None]
+                x = x + part * step
+                given = self.predictor(x, self.steps, self.commands, cuts, lambda n, _, s=starts: s[n])
+                continue
+            lowered = values @ values - float(((values + slopes[:, :-1] @ step) ** 2).sum())
+            if lowered < SETTLED:
+                if settled:
+                    break
+                # Once more from where combinations that are not told are nearest to the file's numbers.
+                settled, x = True, self._restored(x, slopes[:, :-1])
+                given = self._whole(x)
+                continue
+            for _ in range(12):
+                other = self._whole(x + part * step)
+                now = self._residuals(other)[0]
+                if now @ now < values @ values:
+                    break
+                part *= 0.5
+            else:
+                break
+            x, given = x + part * step, other
+        return self._identified(x, given, number, settled, name, kind)
+
+    def _restored(self, x: Array, slopes: Array) -> Array:
+        """The free numbers moved along what readings do not tell, to be as near to the file's as can be."""
+        free, own = self.predictor.free, x[len(START) :]
+        untold = posterior_of(slopes, free, own).untold / np.where(free.sizes > 0.0, free.sizes, 1.0)
+        off = (own - free.values) / np.where(free.sizes > 0.0, free.sizes, 1.0)
+        back = untold.T @ linalg.lstsq(untold.T, off)[0] if len(untold) else 0.0 * off
+        return np.concatenate([x[: len(START)], own - back * np.where(free.sizes > 0.0, free.sizes, 1.0)])
+
+    def _whole(self, x: Array) -> Prediction:
+        return self.predictor(x, self.steps, self.commands)
+
+    def _identified(self, x: Array, given: Prediction, number: int, settled: bool, name: str, kind: str) -> Identified:
+        values, slopes = self._residuals(given)
+        free = self.predictor.free
+        posterior = posterior_of(slopes[:, :-1], free, x[len(START) :])
+        residuals, readings, white = dict[str, tuple[Array, Array]](), dict[str, tuple[Array, Array]](), dict[str, float]()
+        degrees = 0
+        for one in self.weighed:
+            times = (one.place + one.share) * self.period
+            errors = one.residuals(given)[0]
+            residuals[one.reading.name] = times, errors
+            now, after = given.values[one.place, one.reading.rows], given.values[one.place + 1, one.reading.rows]
+            readings[one.reading.name] = one.rows, now + one.share[:, None] * (after - now)
+            degrees += one.degrees * len(errors)
+            white |= {f"{one.reading.name}[{k + 1}]": ljung_box(errors[:, k]) for k in range(errors.shape[1])}
+        start = np.array([*self.predictor.start(x), *x[3:6]])
+        chi2 = float(values @ values)
+        return Identified(
+            self.scenario, free, x[len(START) :], start, posterior, residuals, readings, white, chi2,
+            max(1, degrees - posterior.rank), number, settled, name, kind,
+        )  # fmt: skip
+
+
+def ljung_box(values: Array) -> float:
+    """The p-value of the hypothesis that numbers (n,) in order are not correlated, by G. M. Ljung and G. E. P. Box,
+    Biometrika 65 (1978); 1 for too few."""
+    count = len(values)
+    lags = min(LAGS, count // 5)
+    spread = values - values.mean() if count else values
+    total = float(spread @ spread)
+    if not lags or total == 0.0:
+        return 1.0
+    shares = [float(spread[k:] @ spread[:-k]) / total for k in range(1, lags + 1)]
+    return float(stats.chi2.sf(count * (count + 2) * sum(r * r / (count - k) for k, r in enumerate(shares, 1)), lags))
+
+
+def _step(slopes: Array, values: Array, damping: Array) -> Array:
+    """The Gauss-Newton step, each number damped by so much (free,); along what no reading depends on it is 0."""
+    slopes, values = np.vstack([slopes, np.diag(damping)]), np.append(values, np.zeros(len(damping)))
+    sizes = np.linalg.norm(slopes, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    return linalg.lstsq(slopes / sizes, -values, cond=UNTOLD)[0] / sizes
+
+
+def _matrices(quaternions: Array) -> Array:
+    """Matrices (n, 4, 4) that multiply from the left by the conjugates of quaternions (n, 4)."""
+    units = [tuple(row) for row in np.eye(4)]
+    return np.array([[multiply(conjugate(tuple(q)), unit) for unit in units] for q in quaternions]).swapaxes(1, 2)
+
+
+def _turns() -> list[tuple[float, float, float]]:
+    """Tangents of the half angles, twice, of turns about the axes that leave no attitude farther than about 60 degrees."""
+    return [turn for turn in product((0.0, 2.0, -2.0, 60.0), repeat=3) if sum(x == 60.0 for x in turn) <= 1][:GUESSES]
+
+
+class _Varied(Silent):
+    """Random numbers that are 0 and vary, to see how noise enters a reading."""
+
+    def vector(self, place: int, deviation: Any) -> Any:
+        x, y, z = self.normals(place, 3)
+        return (deviation * x, deviation * y, deviation * z)
+
+    def normals(self, place: int, count: int) -> tuple[Any, ...]:
+        return tuple(variables([0.0] * count, place, RANGE))
+
+
+def _whitening(scenario: Scenario, predictor: Predictor, reading: Reading) -> tuple[Array, int]:
+    """The matrix that makes residuals of a reading of unit variance, by the noise that its sensor states, and the degrees of
+    freedom that a row has."""
+    loop, setup = predictor.loop, predictor.loop.setup()
+    carry = loop.carry()
+    slopes = np.zeros((reading.size, RANGE))
+    # A sensor that sees nothing there shows no noise: it is looked at in other attitudes, and on the other side.
+    for turn, side in product(((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0.6, 0.8, 0, 0), (0.6, 0, 0.8, 0)), (1.0, -1.0)):
+        attitude: Any = multiply(carry.state.attitude, tuple(map(float, turn)))
+        state = carry.state._replace(attitude=attitude, position=tuple(side * x for x in carry.state.position))
+        rows = list[Any]()
+        for fitted, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
+            rows += flatten((fitted.part.module.measure(state, memory, params, _Varied(), 0)[0],))
+        shown = rows[reading.rows]
+        if any(isinstance(x, Dual) and x.slopes.any() for x in shown):
+            slopes = np.array([x.slopes if isinstance(x, Dual) else np.zeros(RANGE) for x in shown])
+            if reading.size == 4:
+                values = np.array([x.value if isinstance(x, Dual) else x for x in shown])
+                slopes = 2.0 * (_matrices(values[None])[0] @ slopes)[1:]
+            break
+    else:
+        allowed = "a sensor that states its noise, for readings are weighed by it"
+        raise InputError(scenario.where, reading.name, "no noise", allowed)
+    sizes, axes = np.linalg.eigh(slopes @ slopes.T)
+    known = sizes > SINGULAR * sizes[-1]
+    return (axes / np.sqrt(np.where(known, sizes, sizes[-1]))).T, int(known.sum())
+
+
+def _listed(value: Any) -> Any:
+    return [_listed(item) for item in value] if isinstance(value, tuple) else value
+
+
+def opened(scenario: Scenario, entry: LawEntry, file: Any, mapping: str | Path | None) -> Telemetry:
+    """The telemetry in a file, for the loop of a law."""
+    from starhold.scenario.building import build
+    from starhold.studies.telemetry import read
+
+    return read(scenario, build(scenario, entry), file, mapping)

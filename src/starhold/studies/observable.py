@@ -1,0 +1,124 @@
+"""What a fit tells of its free numbers: their covariance, and which combinations no reading depends on, by name."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg, stats
+
+from starhold.scenario.reading import Scenario
+from starhold.studies.fitting import Array, Free
+
+UNTOLD = 1e-8
+"""A combination of free numbers, each measured by how much readings depend on it, is not told where its singular value is
+below this share of the largest."""
+SHARE = 1e-4
+"""Numbers that take a smaller share in such a combination are not named."""
+ALIKE = 1e-6
+"""Vectors are proportional where the sine between them is below this."""
+LEVEL = 0.95
+WIDTH = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
+"""Half the interval of this level, in standard deviations."""
+
+
+class Posterior(NamedTuple):
+    """The covariance of the free numbers, infinite on the diagonal for those that are not told; untold: directions (m, free)
+    along which readings stay as they are, and sentences that name them; rank: combinations that are told, the start's
+    included; singular: the singular values of the weighted Jacobian with columns of length 1."""
+
+    covariance: Array
+    untold: Array
+    sentences: tuple[str, ...]
+    rank: int
+    singular: Array
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the free numbers."""
+        return np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def told(self) -> Any:
+        """Which numbers are told."""
+        return np.isfinite(np.diagonal(self.covariance))
+
+    @property
+    def correlations(self) -> Array:
+        """Correlations of the free numbers, NaN of those that are not told."""
+        sizes = np.where(self.told, self.deviations, np.nan)
+        return self.covariance / np.outer(sizes, sizes)
+
+    def over(self, scenario: Scenario, free: Free, values: Array) -> Scenario:
+        """The scenario with a campaign over the numbers that are told: together, but for whole matrices."""
+        from starhold.scenario.checking import read_toml
+
+        tables = dict[str, Any](read_toml(scenario.text, scenario.where).get("campaign", {}))
+        dropped = {place.key for place in free.places}
+        over = {
+            keys: table
+            for keys, table in tables.get("over", {}).items()
+            if not any(key.strip().partition("[")[0] in {k.partition("[")[0] for k in dropped} for key in keys.split(","))
+        }
+        matrix = [any(len(p.shape) == 2 and name.startswith(p.key) for p in free.places) for name in free.names]
+        groups = [[k for k, name in enumerate(free.names) if name.startswith(p.key)] for p in free.places if len(p.shape) == 2]
+        groups.append([k for k, whole in enumerate(matrix) if not whole and self.told[k]])
+        for group in groups:
+            if group and self.told[group].all():
+                names = [free.names[k] for k in group]
+                key = names[0].partition("[")[0] if matrix[group[0]] else ", ".join(names)
+                over[key] = _table(self.covariance[np.ix_(group, group)])
+        return scenario.with_({"campaign": tables | {"over": over}}) if over else scenario
+
+
+def _table(covariance: Array) -> dict[str, Any]:
+    """The distribution of numbers about those of the file."""
+    if len(covariance) == 1:
+        return {"distribution": "normal", "sigma": float(np.sqrt(covariance[0, 0]))}
+    return {"distribution": "correlated-normal", "covariance": (0.5 * (covariance + covariance.T)).tolist()}
+
+
+def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
+    """What residuals of unit variance with these slopes (n, start + free) tell; the start is told beside."""
+    sizes = np.linalg.norm(slopes, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    _, singular, axes = linalg.svd(slopes / sizes, full_matrices=False)
+    told = singular > UNTOLD * singular[0]
+    first = slopes.shape[1] - len(free.names)
+    parts = (axes[told] / singular[told, None])[:, first:] / sizes[first:]
+    covariance = parts.T @ parts
+    # Shares of keys that are 0 are measured by how much readings depend on them.
+    own = np.where(free.sizes > 0.0, free.sizes, 1.0 / sizes[first:])
+    shares = _reduced(axes[~told][:, first:], own * sizes[first:])
+    for k in np.flatnonzero((np.abs(shares) > SHARE).any(axis=0)):
+        covariance[k, k] = np.inf
+    sentences = tuple(_sentence(row, free, values / own) for row in shares)
+    return Posterior(covariance, shares * own, sentences, int(told.sum()), singular)
+
+
+def _reduced(rows: Array, sizes: Array) -> Array:
+    """A basis of the space of some rows, of which those of nothing but the start are 0, in units of sizes; each of its rows
+    has a number of its own, the largest, as far as it goes."""
+    if not len(rows):
+        return rows
+    _, parts, axes = linalg.svd(rows, full_matrices=False)
+    basis = axes[parts > SHARE] / sizes
+    if not len(basis):
+        return basis
+    pivots = linalg.qr(basis, pivoting=True, mode="r")[1][: len(basis)]
+    return linalg.solve(basis[:, pivots], basis)
+
+
+def _sentence(row: Array, free: Free, values: Array) -> str:
+    """Name a combination that readings do not depend on; row and values in the sizes of their keys."""
+    named = np.flatnonzero(np.abs(row) > SHARE * np.abs(row).max())
+    names, own, known = [free.names[k] for k in named], row[named], values[named]
+    if len(names) == 1:
+        return f"These data do not tell {names[0]}: no reading depends on it."
+    cosine = abs(own @ known) / max(1e-300, float(np.linalg.norm(own) * np.linalg.norm(known)))
+    keys = ", ".join(dict.fromkeys(name.partition("[")[0] for name in names))
+    if 1.0 - cosine * cosine < ALIKE:
+        scale = "common scale" if "," in keys else "scale"
+        return f"These data do not tell the {scale} of {keys}, only ratios: no reading changes where all grow alike."
+    shares = " : ".join(f"{x:.3g}" for x in own / np.abs(own).max())
+    return f"These data do not tell {', '.join(names)} apart: no reading changes where they change as {shares}, in sizes of their keys."
