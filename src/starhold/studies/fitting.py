@@ -74,7 +74,9 @@ class Free:
             if place.wordy or place.whole:
                 raise _refused(scenario, key, "no real number", "keys of real numbers, for only those have slopes")
             if place.key.startswith("initial."):
-                raise _refused(scenario, key, "the start", "other keys, for attitude and rate at the start are always fitted")
+                raise _refused(
+                    scenario, key, "the start", "other keys, for attitude and rate at the start are always fitted"
+                )
             if place.value is None or not np.isfinite(place.value).all():
                 raise _refused(scenario, key, "no finite value", "a key with a value in the file, to begin with")
             if any(place.path[: len(other.path)] == other.path[: len(place.path)] for other in found):
@@ -84,6 +86,12 @@ class Free:
             names += [place.key + "".join(f"[{n + 1}]" for n in item) for item in index]
             values += [float(np.asarray(place.value)[item]) for item in index]
         return cls(tuple(found), tuple(names), np.array(values))
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """The unit of each number."""
+        counts = [len(components(place.shape, is_symmetric(place))) for place in self.places]
+        return tuple(p.gain.unit if p.gain else "1" for p, n in zip(self.places, counts, strict=True) for _ in range(n))
 
     @cached_property
     def sizes(self) -> Array:
@@ -174,7 +182,9 @@ class Predictor:
         """The attitude that the flight begins with."""
         return tuple(normalise(multiply(self.reference, (1.0, *(0.5 * x[:3]).tolist()))))
 
-    def __call__(self, x: Array, steps: int, commands: Array, cuts: Sequence[int] = (), nodes: Nodes | None = None) -> Prediction:
+    def __call__(
+        self, x: Array, steps: int, commands: Array, cuts: Sequence[int] = (), nodes: Nodes | None = None
+    ) -> Prediction:
         """Fly for so many control steps and one more, which shows the last readings.
 
         x: (free,); commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next segment begins with,

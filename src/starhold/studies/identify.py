@@ -10,21 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy import linalg, stats
 
-from starhold.algebra.dual import Dual, variables
-from starhold.algebra.quaternion import conjugate, multiply
-from starhold.algebra.structure import flatten
 from starhold.errors import InputError
-from starhold.parts.random import RANGE, Silent
+from starhold.scenario.building import build
+from starhold.scenario.checking import nearest
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.studies.fitting import START, Array, Free, Prediction, Predictor, Reading
 from starhold.studies.observable import UNTOLD, Posterior, posterior_of
-from starhold.studies.telemetry import Telemetry
+from starhold.studies.residuals import Weighed, conjugates, ljung_box, noise_of
+from starhold.studies.telemetry import Telemetry, read
 
 COMMANDS = {
     "recorded": "The recorded commands act on the plant, each held until the next.",
@@ -42,43 +40,7 @@ SETTLED = 1e-6
 """The sum of squares has settled once a step is to lower it by less."""
 RELAXED = 0.1
 """With each step without gaps the damping falls to this share."""
-SINGULAR = 1e-9
-"""Eigenvalues of a noise's covariance below this share of the largest are 0, as along a direction that is a unit vector."""
-LAGS = 20
 GUESSES = 24
-
-
-class Weighed(NamedTuple):
-    """A reading with what it was at some times: its rows, (n, size), the times' places among instants with the share of the
-    next one, and the matrix that makes residuals of unit variance; degrees: those that a row has of freedom."""
-
-    reading: Reading
-    rows: Array
-    place: Any
-    share: Array
-    whiten: Array
-    degrees: int
-
-    @property
-    def turns(self) -> bool:
-        """Whether it is an attitude."""
-        return self.reading.size == 4
-
-    def residuals(self, given: Prediction) -> tuple[Array, Array]:
-        """Residuals (n, size) in deviations, and their slopes (n, size, free + 1)."""
-        rows, share = self.reading.rows, self.share[:, None]
-        now, after = given.values[self.place, rows], given.values[self.place + 1, rows]
-        values = now + share * (after - now)
-        slopes = given.slopes[self.place, rows] + share[..., None] * (
-            given.slopes[self.place + 1, rows] - given.slopes[self.place, rows]
-        )
-        if not self.turns:
-            return (values - self.rows) @ self.whiten.T, np.einsum("ij,njk->nik", self.whiten, slopes)
-        off = _matrices(self.rows)
-        error = np.einsum("nij,nj->ni", off, values)
-        side = np.where(error[:, :1] < 0.0, -2.0, 2.0)
-        turn = np.einsum("nij,njk->nik", off, slopes)[:, 1:] * side[..., None]
-        return (error[:, 1:] * side) @ self.whiten.T, np.einsum("ij,njk->nik", self.whiten, turn)
 
 
 @dataclass(frozen=True)
@@ -101,6 +63,8 @@ class Identified:
     settled: bool
     telemetry: str
     commands: str
+    units: Mapping[str, str]
+    notes: tuple[str, ...]
 
     @property
     def consistent(self) -> float:
@@ -112,9 +76,27 @@ class Identified:
         """Whether no residual is correlated in time, at 1 % for all of them together."""
         return min(self.whiteness.values()) * len(self.whiteness) >= 0.01
 
+    def summary(self) -> dict[str, Any]:
+        """All numbers of the fit, for summary.json."""
+        posterior, names = self.posterior, self.free.names
+        return {
+            "estimates": dict(zip(names, self.values.tolist(), strict=True)),
+            "deviations": dict(zip(names, posterior.deviations.tolist(), strict=True)),
+            "correlations": posterior.correlations.tolist(),
+            "start": self.start.tolist(),
+            "singular_values": posterior.singular.tolist(),
+            "not_told": list(posterior.sentences),
+            "chi2": self.chi2,
+            "degrees_of_freedom": self.degrees,
+            "probability": self.consistent,
+            "ljung_box": dict(self.whiteness),
+            "settled": self.settled,
+        }
+
     def fitted(self) -> dict[str, Any]:
         """The values by key, as a change of the scenario."""
-        return {p.key: _listed(v) for p, v in zip(self.free.places, self.free.shaped(self.values.tolist()), strict=True)}
+        shaped = self.free.shaped(self.values.tolist())
+        return {place.key: np.array(value).tolist() for place, value in zip(self.free.places, shaped, strict=True)}
 
     def learnt(self) -> Scenario:
         """The scenario with the numbers that were found, and a campaign over what is left uncertain about them."""
@@ -122,17 +104,23 @@ class Identified:
         return self.posterior.over(found, self.free, self.values)
 
 
-def study(scenario: Scenario, entry: LawEntry, telemetry: Telemetry, keys: Sequence[str], commands: str = "") -> Identified:
-    """Fit the numbers at these keys, and the start, to telemetry.
+def study(
+    scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None, free: Any = None, commands: Any = None
+) -> Identified:
+    """Fit the numbers at some keys, and the start, to the telemetry in a file, a folder of a run or a Dataset.
 
-    commands: "recorded", "law" or "none"; by default as recorded where they are, else the law's. InputError for keys that
-    cannot be fitted, sensors that the telemetry lacks or that state no noise, and fewer data than free numbers."""
-    kind = commands or ("recorded" if "command" in telemetry.columns else "law")
-    if kind not in COMMANDS or (kind == "recorded" and "command" not in telemetry.columns):
-        allowed = ", ".join(name for name in COMMANDS if name != "recorded" or "command" in telemetry.columns)
-        raise InputError(scenario.where, "--commands", kind, allowed)
-    free = Free.of(scenario, keys)
-    predictor = Predictor(scenario, entry, free, kind != "law")
+    mapping: see `telemetry.read`; free: the keys, in a list or with commas between them; commands: "recorded", "law" or
+    "none", by default as recorded where they are, else the law's. InputError for keys that cannot be fitted, sensors that
+    the telemetry lacks or that state no noise, and fewer data than free numbers."""
+    keys = [key.strip() for key in free.split(",")] if isinstance(free, str) else list(free or ())
+    if not any(keys):
+        raise InputError(scenario.where, "--free", "nothing", 'keys with commas between them: "spacecraft.inertia"')
+    telemetry = read(scenario, build(scenario, entry), source, mapping)
+    kinds = [kind for kind in COMMANDS if kind != "recorded" or "command" in telemetry.columns]
+    kind = kinds[0] if commands is None else commands
+    if kind not in kinds:
+        raise InputError(scenario.where, "--commands", str(kind), nearest(str(kind), kinds))
+    predictor = Predictor(scenario, entry, Free.of(scenario, keys), kind != "law")
     return Fit(scenario, predictor, telemetry).solved(telemetry.name, kind)
 
 
@@ -142,6 +130,7 @@ class Fit:
     def __init__(self, scenario: Scenario, predictor: Predictor, telemetry: Telemetry) -> None:
         self.scenario, self.predictor, self.telemetry = scenario, predictor, telemetry
         self.period = predictor.loop.period
+        self.notes = tuple[str, ...]()
         # Damping for a number to change by about the size of its key; none of the start and of keys that are 0.
         sizes = np.concatenate([np.zeros(len(START)), predictor.free.sizes])
         self._damping = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
@@ -178,9 +167,14 @@ class Fit:
         good = np.isfinite(columns[reading.name]).all(axis=1)
         for gate, _ in reading.gates:
             good &= columns[gate][:, 0] > 0.5 if gate in columns else True
-        whiten, degrees = _whitening(self.scenario, self.predictor, reading)
+        noise = noise_of(self.predictor.loop, reading)
+        if noise is None:
+            allowed = "a sensor that states its noise, for readings are weighed by it"
+            raise InputError(self.scenario.where, reading.name, "no noise", allowed)
+        if noise.accumulates:
+            self.notes += (f"The noise that accumulates in {reading.name}, as a bias that walks, is left out.",)
         place = np.minimum(places.astype(int), self.steps - 1)[good]
-        return Weighed(reading, columns[reading.name][good], place, places[good] - place, whiten, degrees)
+        return Weighed(reading, columns[reading.name][good], place, places[good] - place, noise.whiten, noise.degrees)
 
     def _residuals(self, given: Prediction) -> tuple[Array, Array]:
         """All residuals (n,) in deviations, and their slopes (n, free + 1); 0 where the flight is to read nothing new."""
@@ -188,7 +182,9 @@ class Fit:
         for one in self.weighed:
             values, by = one.residuals(given)
             for _, place in one.reading.gates:
-                seen = (given.values[one.place, place] > 0.5) & ((one.share == 0.0) | (given.values[one.place + 1, place] > 0.5))
+                seen = (given.values[one.place, place] > 0.5) & (
+                    (one.share == 0.0) | (given.values[one.place + 1, place] > 0.5)
+                )
                 values, by = values * seen[:, None], by * seen[:, None, None]
             every.append(values.ravel())
             slopes.append(by.reshape(-1, by.shape[-1]))
@@ -208,7 +204,7 @@ class Fit:
         if rate is not None and rate[0][0] < 2.0:
             x[3:6] = rate[1][0]
         if attitude is not None and attitude[0][0] < 2.0:
-            x[:3] = 2.0 * _matrices(np.array([self.predictor.reference]))[0, 1:] @ attitude[1][0]
+            x[:3] = 2.0 * conjugates(np.array([self.predictor.reference]))[0, 1:] @ attitude[1][0]
             # The rotation vector of the normalised (1, x/2) has this tangent.
             x[:3] /= max(1e-3, abs(float(np.dot(self.predictor.reference, attitude[1][0]))))
             x[:3] *= np.sign(np.dot(self.predictor.reference, attitude[1][0])) or 1.0
@@ -239,7 +235,7 @@ class Fit:
         x, cuts, node = self._begun()
         settled, number, misfit = False, 0, 1.0
         given = self.predictor(x, self.steps, self.commands, cuts, node) if cuts else self._whole(x)
-        for number in range(1, STEPS + 1):  # noqa: B007
+        for number in range(1, STEPS + 1):
             values, slopes = self._residuals(given)
             if not np.isfinite(slopes).all():
                 raise InputError(self.scenario.where, "", "", "the flight diverges under the numbers of the file")
@@ -306,20 +302,8 @@ class Fit:
         return Identified(
             self.scenario, free, x[len(START) :], start, posterior, residuals, readings, white, chi2,
             max(1, degrees - posterior.rank), number, settled, name, kind,
+            {one.reading.name: self.telemetry.known[one.reading.name].unit for one in self.weighed}, self.notes,
         )  # fmt: skip
-
-
-def ljung_box(values: Array) -> float:
-    """The p-value of the hypothesis that numbers (n,) in order are not correlated, by G. M. Ljung and G. E. P. Box,
-    Biometrika 65 (1978); 1 for too few."""
-    count = len(values)
-    lags = min(LAGS, count // 5)
-    spread = values - values.mean() if count else values
-    total = float(spread @ spread)
-    if not lags or total == 0.0:
-        return 1.0
-    shares = [float(spread[k:] @ spread[:-k]) / total for k in range(1, lags + 1)]
-    return float(stats.chi2.sf(count * (count + 2) * sum(r * r / (count - k) for k, r in enumerate(shares, 1)), lags))
 
 
 def _step(slopes: Array, values: Array, damping: Array) -> Array:
@@ -330,63 +314,6 @@ def _step(slopes: Array, values: Array, damping: Array) -> Array:
     return linalg.lstsq(slopes / sizes, -values, cond=UNTOLD)[0] / sizes
 
 
-def _matrices(quaternions: Array) -> Array:
-    """Matrices (n, 4, 4) that multiply from the left by the conjugates of quaternions (n, 4)."""
-    units = [tuple(row) for row in np.eye(4)]
-    return np.array([[multiply(conjugate(tuple(q)), unit) for unit in units] for q in quaternions]).swapaxes(1, 2)
-
-
 def _turns() -> list[tuple[float, float, float]]:
     """Tangents of the half angles, twice, of turns about the axes that leave no attitude farther than about 60 degrees."""
     return [turn for turn in product((0.0, 2.0, -2.0, 60.0), repeat=3) if sum(x == 60.0 for x in turn) <= 1][:GUESSES]
-
-
-class _Varied(Silent):
-    """Random numbers that are 0 and vary, to see how noise enters a reading."""
-
-    def vector(self, place: int, deviation: Any) -> Any:
-        x, y, z = self.normals(place, 3)
-        return (deviation * x, deviation * y, deviation * z)
-
-    def normals(self, place: int, count: int) -> tuple[Any, ...]:
-        return tuple(variables([0.0] * count, place, RANGE))
-
-
-def _whitening(scenario: Scenario, predictor: Predictor, reading: Reading) -> tuple[Array, int]:
-    """The matrix that makes residuals of a reading of unit variance, by the noise that its sensor states, and the degrees of
-    freedom that a row has."""
-    loop, setup = predictor.loop, predictor.loop.setup()
-    carry = loop.carry()
-    slopes = np.zeros((reading.size, RANGE))
-    # A sensor that sees nothing there shows no noise: it is looked at in other attitudes, and on the other side.
-    for turn, side in product(((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0.6, 0.8, 0, 0), (0.6, 0, 0.8, 0)), (1.0, -1.0)):
-        attitude: Any = multiply(carry.state.attitude, tuple(map(float, turn)))
-        state = carry.state._replace(attitude=attitude, position=tuple(side * x for x in carry.state.position))
-        rows = list[Any]()
-        for fitted, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
-            rows += flatten((fitted.part.module.measure(state, memory, params, _Varied(), 0)[0],))
-        shown = rows[reading.rows]
-        if any(isinstance(x, Dual) and x.slopes.any() for x in shown):
-            slopes = np.array([x.slopes if isinstance(x, Dual) else np.zeros(RANGE) for x in shown])
-            if reading.size == 4:
-                values = np.array([x.value if isinstance(x, Dual) else x for x in shown])
-                slopes = 2.0 * (_matrices(values[None])[0] @ slopes)[1:]
-            break
-    else:
-        allowed = "a sensor that states its noise, for readings are weighed by it"
-        raise InputError(scenario.where, reading.name, "no noise", allowed)
-    sizes, axes = np.linalg.eigh(slopes @ slopes.T)
-    known = sizes > SINGULAR * sizes[-1]
-    return (axes / np.sqrt(np.where(known, sizes, sizes[-1]))).T, int(known.sum())
-
-
-def _listed(value: Any) -> Any:
-    return [_listed(item) for item in value] if isinstance(value, tuple) else value
-
-
-def opened(scenario: Scenario, entry: LawEntry, file: Any, mapping: str | Path | None) -> Telemetry:
-    """The telemetry in a file, for the loop of a law."""
-    from starhold.scenario.building import build
-    from starhold.studies.telemetry import read
-
-    return read(scenario, build(scenario, entry), file, mapping)

@@ -33,6 +33,10 @@ class Posterior(NamedTuple):
     rank: int
     singular: Array
 
+    def barely(self, free: Free) -> Any:
+        """Which numbers are told no better than to the size of their key."""
+        return self.told & (free.sizes > 0.0) & (WIDTH * self.deviations > free.sizes)
+
     @property
     def deviations(self) -> Array:
         """Standard deviations of the free numbers."""
@@ -50,7 +54,7 @@ class Posterior(NamedTuple):
         return self.covariance / np.outer(sizes, sizes)
 
     def over(self, scenario: Scenario, free: Free, values: Array) -> Scenario:
-        """The scenario with a campaign over the numbers that are told: together, but for whole matrices."""
+        """The scenario with a campaign over the numbers that are told, together, but for whole matrices."""
         from starhold.scenario.checking import read_toml
 
         tables = dict[str, Any](read_toml(scenario.text, scenario.where).get("campaign", {}))
@@ -61,10 +65,13 @@ class Posterior(NamedTuple):
             if not any(key.strip().partition("[")[0] in {k.partition("[")[0] for k in dropped} for key in keys.split(","))
         }
         matrix = [any(len(p.shape) == 2 and name.startswith(p.key) for p in free.places) for name in free.names]
-        groups = [[k for k, name in enumerate(free.names) if name.startswith(p.key)] for p in free.places if len(p.shape) == 2]
-        groups.append([k for k, whole in enumerate(matrix) if not whole and self.told[k]])
+        groups = [
+            [k for k, name in enumerate(free.names) if name.startswith(p.key)] for p in free.places if len(p.shape) == 2
+        ]
+        fit = self.told & ~self.barely(free)
+        groups.append([k for k, whole in enumerate(matrix) if not whole and fit[k]])
         for group in groups:
-            if group and self.told[group].all():
+            if group and fit[group].all():
                 names = [free.names[k] for k in group]
                 key = names[0].partition("[")[0] if matrix[group[0]] else ", ".join(names)
                 over[key] = _table(self.covariance[np.ix_(group, group)])
