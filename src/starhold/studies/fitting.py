@@ -95,9 +95,14 @@ class Free:
 
     @cached_property
     def sizes(self) -> Array:
-        """The size of the key that each number is of: the largest that it has."""
-        every = [np.full(len(components(p.shape, is_symmetric(p))), np.abs(p.value).max()) for p in self.places]
-        return np.concatenate(every)
+        """The size of each number: the largest that its key has; of a key that is 0 the bound nearest to that, or 1 of one
+        without a unit; else 0, for none is known."""
+        every: list[float] = []
+        for place in self.places:
+            ends = [abs(end) for end in (place.bounds.at_least, place.bounds.at_most) if end]
+            size = float(np.abs(place.value).max()) or min(ends, default=1.0 if place.gain and place.gain.unit == "1" else 0.0)
+            every += [size] * len(components(place.shape, is_symmetric(place)))
+        return np.array(every)
 
     def shaped(self, numbers: Sequence[Any]) -> list[Any]:
         """The numbers in the shape of each key."""

@@ -15,8 +15,10 @@ UNTOLD = 1e-8
 below this share of the largest."""
 SHARE = 1e-4
 """Numbers that take a smaller share in such a combination are not named."""
-ALIKE = 1e-6
-"""Vectors are proportional where the sine between them is below this."""
+ALIKE = 1e-4
+"""Vectors are proportional where the square of the sine between them is below this."""
+SIZELESS = 1e4
+"""A key without a size is measured by so many times what its readings alone would leave uncertain."""
 LEVEL = 0.95
 WIDTH = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
 """Half the interval of this level, in standard deviations."""
@@ -87,45 +89,48 @@ def _table(covariance: Array) -> dict[str, Any]:
 
 def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
     """What residuals of unit variance with these slopes (n, start + free) tell; the start is told beside."""
-    sizes = np.linalg.norm(slopes, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    _, singular, axes = linalg.svd(slopes / sizes, full_matrices=False)
-    told = singular > UNTOLD * singular[0]
+    lengths = np.linalg.norm(slopes, axis=0)
+    lengths[lengths == 0.0] = 1.0
     first = slopes.shape[1] - len(free.names)
-    parts = (axes[told] / singular[told, None])[:, first:] / sizes[first:]
+    _, singular, axes = linalg.svd(slopes / lengths, full_matrices=False)
+    told = singular > UNTOLD * singular[0]
+    parts = (axes[told] / singular[told, None])[:, first:] / lengths[first:]
     covariance = parts.T @ parts
-    # Shares of keys that are 0 are measured by how much readings depend on them.
-    own = np.where(free.sizes > 0.0, free.sizes, 1.0 / sizes[first:])
-    shares = _reduced(axes[~told][:, first:], own * sizes[first:])
-    for k in np.flatnonzero((np.abs(shares) > SHARE).any(axis=0)):
+    # Keys without a size are told unless they are as good as another.
+    sizes = np.where(free.sizes > 0.0, free.sizes, SIZELESS / lengths[first:])
+    _, among, combined = linalg.svd(axes[~told][:, first:], full_matrices=False)
+    untold = _reduced(combined[among > SHARE] / lengths[first:] / sizes)
+    for k in np.flatnonzero((np.abs(untold) > SHARE).any(axis=0)):
         covariance[k, k] = np.inf
-    sentences = tuple(_sentence(row, free, values / own) for row in shares)
-    return Posterior(covariance, shares * own, sentences, int(told.sum()), singular)
+    # What is left of the free numbers once the start has explained what it can.
+    rest = linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")[0][first : slopes.shape[1], first:]
+    _, known, axes = linalg.svd(rest)
+    hardly = _reduced(axes[: len(axes) - len(untold)][known[: len(axes) - len(untold)] < WIDTH])
+    sentences = [_sentence(row, free, values / sizes, "do not tell") for row in untold]
+    sentences += [_sentence(row, free, values / sizes, "hardly tell") for row in hardly]
+    return Posterior(covariance, untold * sizes, tuple(sentences), int(told.sum()), singular)
 
 
-def _reduced(rows: Array, sizes: Array) -> Array:
-    """A basis of the space of some rows, of which those of nothing but the start are 0, in units of sizes; each of its rows
-    has a number of its own, the largest, as far as it goes."""
+def _reduced(rows: Array) -> Array:
+    """A basis of the space of independent rows in which each has a number of its own, the largest, as far as it goes."""
     if not len(rows):
         return rows
-    _, parts, axes = linalg.svd(rows, full_matrices=False)
-    basis = axes[parts > SHARE] / sizes
-    if not len(basis):
-        return basis
+    basis = linalg.orth(rows.T).T
     pivots = linalg.qr(basis, pivoting=True, mode="r")[1][: len(basis)]
     return linalg.solve(basis[:, pivots], basis)
 
 
-def _sentence(row: Array, free: Free, values: Array) -> str:
-    """Name a combination that readings do not depend on; row and values in the sizes of their keys."""
+def _sentence(row: Array, free: Free, values: Array, told: str) -> str:
+    """Name a combination on which readings do not depend, or not beyond their noise; row and values in sizes."""
     named = np.flatnonzero(np.abs(row) > SHARE * np.abs(row).max())
     names, own, known = [free.names[k] for k in named], row[named], values[named]
+    why = "no reading depends on it" if told == "do not tell" else "it may change by its own size"
     if len(names) == 1:
-        return f"These data do not tell {names[0]}: no reading depends on it."
+        return f"These data {told} {names[0]}: {why}."
     cosine = abs(own @ known) / max(1e-300, float(np.linalg.norm(own) * np.linalg.norm(known)))
     keys = ", ".join(dict.fromkeys(name.partition("[")[0] for name in names))
-    if 1.0 - cosine * cosine < ALIKE:
+    if 1.0 - cosine * cosine < ALIKE and free.values[named].all():
         scale = "common scale" if "," in keys else "scale"
-        return f"These data do not tell the {scale} of {keys}, only ratios: no reading changes where all grow alike."
+        return f"These data {told} the {scale} of {keys}, only ratios: {why}."
     shares = " : ".join(f"{x:.3g}" for x in own / np.abs(own).max())
-    return f"These data do not tell {', '.join(names)} apart: no reading changes where they change as {shares}, in sizes of their keys."
+    return f"These data {told} {', '.join(names)} apart, which may change as {shares} in their sizes: {why}."
