@@ -161,9 +161,9 @@ def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: b
 def predicting(
     step: Step, sensors: Sequence[Part], made: Callable[..., tuple[Any, Numbers]], free: int, substeps: int, outside: bool
 ) -> tuple[Program, Program, Arguments]:
-    """The flight that so many free numbers predict, recorded: the program that makes its carry of them, which `made` gives
-    with the kernel's numbers, and one of `count` control steps from `first` on. The readings of all steps lie in `record` and,
-    if `outside`, their commands in `given`; then the law's memory stays as it is. step: see `silent` of `make_step`."""
+    """The flight that so many free numbers predict, recorded: the program that makes its carry of them, which `made`
+    gives with the kernel's numbers, and one of `count` control steps from `first` on. The readings of all steps lie in
+    `record` and, if `outside`, their commands in `given`; then the law's memory stays as it is. step: see `silent` of `make_step`."""
     recorder = Recorder()
     with recorder.recording():
         cells, numbers = recorder.memory("carry", lanes=True, writable=True), recorder.memory("free", lanes=True)

@@ -31,7 +31,7 @@ from starhold.trace.tangent import MARK, tangent
 Array: TypeAlias = NDArray[np.float64]
 Nodes: TypeAlias = Callable[[int, Array], Array]
 START = tuple(f"{name}_{axis}" for name in ("initial turn", "initial rate") for axis in "xyz")
-"""The numbers of the start, which are always free: a rotation vector (rad) of the attitude, body axes, and the rate (rad/s)."""
+"""Of the start, which is always free: a rotation vector (rad) of the attitude, body axes, and the rate (rad/s)."""
 WIDTH = 8
 """Slopes that are computed at once."""
 NUDGE = 1e-6
@@ -100,7 +100,9 @@ class Free:
         every: list[float] = []
         for place in self.places:
             ends = [abs(end) for end in (place.bounds.at_least, place.bounds.at_most) if end]
-            size = float(np.abs(place.value).max()) or min(ends, default=1.0 if place.gain and place.gain.unit == "1" else 0.0)
+            size = float(np.abs(place.value).max()) or min(
+                ends, default=1.0 if place.gain and place.gain.unit == "1" else 0.0
+            )
             every += [size] * len(components(place.shape, is_symmetric(place)))
         return np.array(every)
 
@@ -145,12 +147,11 @@ class Predictor:
         if loop.events:
             raise InputError(scenario.where, "fault", "changes during the flight", "a scenario without, to be fitted")
         self.loop, self.count = loop, len(START) + len(free.names)
-        self.reference = tuple(loop.start.attitude)
         parts = loop.composition()
         self._like = loop.carry()
         try:
             begin, fly, arguments = predicting(
-                make_step(parts, silent=True), parts.sensors, self._made, self.count, loop.substeps, outside
+                make_step(parts, silent=True), parts.sensors, self._made, self.count + 4, loop.substeps, outside
             )
         except (InputError, TypeError, ValueError) as error:
             allowed = "keys that enter the loop's numbers by an equation"
@@ -166,7 +167,7 @@ class Predictor:
         """The carry and the numbers of a kernel: an equation."""
         hooks, loop, true, params = self.scenario.hooks, self.loop, dict[str, Any](), dict[str, Any]()
         dials = hooks.dials(self.scenario)
-        for place, value in zip(self.free.places, self.free.shaped(numbers[len(START) :]), strict=True):
+        for place, value in zip(self.free.places, self.free.shaped(numbers[len(START) : self.count]), strict=True):
             if place.path[0] == "part":
                 fitted = self.scenario.parts[int(place.path[1])]
                 params[fitted.called] = put(params.get(fitted.called, fitted.params), place.path[2:], value)
@@ -179,20 +180,25 @@ class Predictor:
         parts = tuple(replace(one, params=params[one.name]) if one.name in params else one for one in moved.parts)
         loop = replace(loop, parts=parts)
         setup = loop.setup()._replace(limit=moved.limit)
-        turn: Any = multiply(self.reference, (1.0, *(0.5 * angle for angle in numbers[:3])))
-        state = moved.made_with._replace(attitude=normalise(turn), rate=tuple(numbers[3:6]))
+        state = moved.made_with._replace(attitude=_turned(numbers), rate=tuple(numbers[3:6]))
         return loop.carry(state, setup=setup), Numbers(loop.gains, moved.nominal, moved.craft, setup)
 
-    def start(self, x: Array) -> tuple[float, ...]:
-        """The attitude that the flight begins with."""
-        return tuple(normalise(multiply(self.reference, (1.0, *(0.5 * x[:3]).tolist()))))
+    def begun(self, attitude: Any, rate: Any) -> Array:
+        """The numbers of a flight from this attitude and rate under those of the file: turn, rate, the free numbers of the
+        file, and after them, which have no slopes, the attitude that the turn begins from."""
+        return np.array([0.0, 0.0, 0.0, *rate, *self.free.values, *attitude])
+
+    def moved(self, x: Array, step: Array) -> Array:
+        """The numbers after a step (free,), in which the turn is 0 again."""
+        x = x + np.pad(step, (0, 4))
+        return np.concatenate([np.zeros(3), x[3 : self.count], _turned(x.tolist())])
 
     def __call__(
         self, x: Array, steps: int, commands: Array, cuts: Sequence[int] = (), nodes: Nodes | None = None
     ) -> Prediction:
         """Fly for so many control steps and one more, which shows the last readings.
 
-        x: (free,); commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next segment begins with,
+        x: (free + 4,), see `begun`; commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next segment begins with,
         attitude and rate (7,), of its number and of what the last one ended with."""
         count, size, given = steps + 1, self._row, np.ascontiguousarray(commands)
         memories = [self._started(x, count * size, block) for block in range(-(-(self.count + 1) // WIDTH))]
@@ -218,13 +224,18 @@ class Predictor:
     def _started(self, x: Array, size: int, block: int) -> dict[str, Array]:
         """The memories with which a block of directions begins; size: of the record."""
         numbers = np.array(numbers_of(self._like))
-        sizes = {"carry": len(numbers), "free": self.count, "record": size}
+        sizes = {"carry": len(numbers), "free": len(x), "record": size}
         memory = {name + mark: aligned(rows, WIDTH) for name, rows in sizes.items() for mark in ("", MARK)}
         memory["carry"][:] = numbers[:, None]
         memory["free"][:] = x[:, None]
-        memory["free" + MARK][:] = np.eye(self.count, WIDTH, -block * WIDTH)
+        memory["free" + MARK][: self.count] = np.eye(self.count, WIDTH, -block * WIDTH)
         self._begin(memory)
         return memory
+
+
+def _turned(numbers: Sequence[Any]) -> Any:
+    """The attitude at the start: the last four numbers turned by the first three."""
+    return normalise(multiply(tuple(numbers[-4:]), (1.0, *(0.5 * angle for angle in numbers[:3]))))
 
 
 def _nudged(scenario: Scenario, free: Free) -> Scenario:

@@ -7,21 +7,22 @@ more for the gaps). Weights are the noise that sensors state.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy import linalg, stats
+from scipy import stats
+from scipy.spatial.transform import Rotation
 
+from starhold.algebra.quaternion import multiply
 from starhold.errors import InputError
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest
 from starhold.scenario.reading import LawEntry, Scenario
-from starhold.studies.fitting import START, Array, Free, Prediction, Predictor, Reading
+from starhold.studies.fitting import START, Array, Free, Nodes, Prediction, Predictor, Reading
 from starhold.studies.observable import UNTOLD, Posterior, posterior_of
-from starhold.studies.residuals import Weighed, conjugates, ljung_box, noise_of
+from starhold.studies.residuals import Weighed, ljung_box, noise_of
 from starhold.studies.telemetry import Telemetry, read
 
 COMMANDS = {
@@ -32,6 +33,8 @@ COMMANDS = {
 SPAN, SEGMENTS = 0.5, 500
 """The craft turns by about so much in a segment of the flight (rad), of which there are at most so many."""
 STEPS = 40
+NEAR = 2.0
+"""A reading tells the state at an instant from which it is fewer control periods away."""
 TURN = 0.5
 """The initial attitude turns by at most so much in a step (rad)."""
 CLOSED = 1.0
@@ -40,13 +43,12 @@ SETTLED = 1e-6
 """The sum of squares has settled once a step is to lower it by less."""
 RELAXED = 0.1
 """With each step without gaps the damping falls to this share."""
-GUESSES = 24
 
 
 @dataclass(frozen=True)
 class Identified:
-    """What a fit found. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance and
-    what cannot be told; residuals: by name times and whitened residuals (n, size) and the readings with what the fit gives;
+    """What a fit gave. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance, and
+    what is not told; residuals: by name times and whitened residuals (n, size) and the readings with what the fit gives;
     whiteness: by residual the p-value of Ljung and Box; chi2: the sum of squared residuals, with its degrees of freedom."""
 
     scenario: Scenario
@@ -190,40 +192,36 @@ class Fit:
             slopes.append(by.reshape(-1, by.shape[-1]))
         return np.concatenate(every), np.concatenate(slopes)
 
-    def _told(self, name: str) -> tuple[Array, Array] | None:
-        """Places among instants and rows of a reading of a part of the state, such as a gyro's."""
-        for one in self.weighed:
-            if one.reading.name.endswith(f"_{name}") and len(one.rows):
-                return one.place + one.share, one.rows
-        return None
+    def _read(self, name: str) -> tuple[Array, Array]:
+        """Places among instants and rows of a reading of a part of the state, such as a gyro's; empty without one."""
+        found = [one for one in self.weighed if one.reading.name.endswith(f"_{name}") and len(one.rows)]
+        return (found[0].place + found[0].share, found[0].rows) if found else (np.empty(0), np.empty(0))
 
-    def _begun(self) -> tuple[Array, list[int], Callable[[int, Array], Array]]:
+    def _begun(self) -> tuple[Array, list[int], Nodes]:
         """Where the search begins: free numbers, the cuts of the flight, and how its segments begin."""
-        x = np.concatenate([np.zeros(3), self.predictor.loop.start.rate, self.predictor.free.values])
-        attitude, rate = self._told("attitude"), self._told("rate")
-        if rate is not None and rate[0][0] < 2.0:
-            x[3:6] = rate[1][0]
-        if attitude is not None and attitude[0][0] < 2.0:
-            x[:3] = 2.0 * conjugates(np.array([self.predictor.reference]))[0, 1:] @ attitude[1][0]
-            # The rotation vector of the normalised (1, x/2) has this tangent.
-            x[:3] /= max(1e-3, abs(float(np.dot(self.predictor.reference, attitude[1][0]))))
-            x[:3] *= np.sign(np.dot(self.predictor.reference, attitude[1][0])) or 1.0
-        fastest = 0.0 if rate is None else float(np.linalg.norm(rate[1], axis=1).max())
-        length = max(1, -(-self.steps // SEGMENTS), int(SPAN / max(1e-9, fastest * self.period)) if fastest else 100)
-        cuts = [*range(length, self.steps, length)] if rate is not None or attitude is not None else []
+        start, attitude, rate = self.predictor.loop.start, self._read("attitude"), self._read("rate")
+        fastest = max(np.linalg.norm(rate[1].reshape(-1, 3), axis=1), default=0.0)
+        length = max(1, -(-self.steps // SEGMENTS), int(SPAN / max(1e-9, fastest * self.period)))
+        cuts = [*range(length, self.steps, length)] if len(rate[0]) or len(attitude[0]) else []
 
-        def node(number: int, end: Array) -> Array:
+        def read(place: int, end: Array) -> Array:
             begun = end.copy()
-            for part, given in ((slice(0, 4), attitude), (slice(4, 7), rate)):
-                if given is not None:
-                    near = int(np.argmin(np.abs(given[0] - cuts[number])))
-                    if abs(given[0][near] - cuts[number]) < 2.0:
-                        begun[part] = given[1][near]
+            for part, (places, rows) in ((slice(0, 4), attitude), (slice(4, 7), rate)):
+                near = int(np.argmin(np.abs(places - place))) if len(places) else -1
+                if near >= 0 and abs(places[near] - place) < NEAR:
+                    begun[part] = rows[near]
             begun[:4] *= np.sign(begun[:4] @ end[:4]) or 1.0
             return begun
 
-        if attitude is None:
-            x = min((np.array([*turn, *x[3:]]) for turn in _turns()), key=lambda guess: self._cost(guess, cuts, node))
+        def node(number: int, end: Array) -> Array:
+            return read(cuts[number], end)
+
+        first = read(0, np.array([*start.attitude, *start.rate]))
+        guesses = [(1.0, 0.0, 0.0, 0.0)]
+        if not (len(attitude[0]) and attitude[0][0] < NEAR):
+            guesses = [tuple(turn) for turn in Rotation.create_group("O").as_quat(scalar_first=True).tolist()]
+        every = [self.predictor.begun(multiply(tuple(first[:4].tolist()), turn), first[4:]) for turn in guesses]
+        x = min(every, key=lambda guess: self._cost(guess, cuts, node)) if len(every) > 1 else every[0]
         return x, cuts, node
 
     def _cost(self, x: Array, cuts: Sequence[int], node: Any) -> float:
@@ -250,7 +248,7 @@ class Fit:
                     continue
                 starts = given.starts + part * (given.of_starts @ np.append(step, 1.0))
                 starts[:, :4] /= np.linalg.norm(starts[:, :4], axis=1)[:, None]
-                x = x + part * step
+                x = self.predictor.moved(x, part * step)
                 given = self.predictor(x, self.steps, self.commands, cuts, lambda n, _, s=starts: s[n])
                 continue
             lowered = values @ values - float(((values + slopes[:, :-1] @ step) ** 2).sum())
@@ -262,23 +260,23 @@ class Fit:
                 given = self._whole(x)
                 continue
             for _ in range(12):
-                other = self._whole(x + part * step)
+                other = self._whole(self.predictor.moved(x, part * step))
                 now = self._residuals(other)[0]
                 if now @ now < values @ values:
                     break
                 part *= 0.5
             else:
                 break
-            x, given = x + part * step, other
+            x, given = self.predictor.moved(x, part * step), other
         return self._identified(x, given, number, settled, name, kind)
 
     def _restored(self, x: Array, slopes: Array) -> Array:
         """The free numbers moved along what readings do not tell, to be as near to the file's as can be."""
-        free, own = self.predictor.free, x[len(START) :]
-        untold = posterior_of(slopes, free, own).untold / np.where(free.sizes > 0.0, free.sizes, 1.0)
-        off = (own - free.values) / np.where(free.sizes > 0.0, free.sizes, 1.0)
-        back = untold.T @ linalg.lstsq(untold.T, off)[0] if len(untold) else 0.0 * off
-        return np.concatenate([x[: len(START)], own - back * np.where(free.sizes > 0.0, free.sizes, 1.0)])
+        free, own = self.predictor.free, x[len(START) : -4]
+        sizes = np.where(free.sizes > 0.0, free.sizes, 1.0)
+        untold, off = posterior_of(slopes, free, own).untold / sizes, (own - free.values) / sizes
+        back = untold.T @ np.linalg.lstsq(untold.T, off)[0] if len(untold) else 0.0 * off
+        return np.concatenate([x[: len(START)], own - back * sizes, x[-4:]])
 
     def _whole(self, x: Array) -> Prediction:
         return self.predictor(x, self.steps, self.commands)
@@ -286,7 +284,7 @@ class Fit:
     def _identified(self, x: Array, given: Prediction, number: int, settled: bool, name: str, kind: str) -> Identified:
         values, slopes = self._residuals(given)
         free = self.predictor.free
-        posterior = posterior_of(slopes[:, :-1], free, x[len(START) :])
+        posterior = posterior_of(slopes[:, :-1], free, x[len(START) : -4])
         residuals, readings, white = dict[str, tuple[Array, Array]](), dict[str, tuple[Array, Array]](), dict[str, float]()
         degrees = 0
         for one in self.weighed:
@@ -297,10 +295,10 @@ class Fit:
             readings[one.reading.name] = one.rows, now + one.share[:, None] * (after - now)
             degrees += one.degrees * len(errors)
             white |= {f"{one.reading.name}[{k + 1}]": ljung_box(errors[:, k]) for k in range(errors.shape[1])}
-        start = np.array([*self.predictor.start(x), *x[3:6]])
+        start = np.array([*x[-4:], *x[3:6]])
         chi2 = float(values @ values)
         return Identified(
-            self.scenario, free, x[len(START) :], start, posterior, residuals, readings, white, chi2,
+            self.scenario, free, x[len(START) : -4], start, posterior, residuals, readings, white, chi2,
             max(1, degrees - posterior.rank), number, settled, name, kind,
             {one.reading.name: self.telemetry.known[one.reading.name].unit for one in self.weighed}, self.notes,
         )  # fmt: skip
@@ -311,9 +309,4 @@ def _step(slopes: Array, values: Array, damping: Array) -> Array:
     slopes, values = np.vstack([slopes, np.diag(damping)]), np.append(values, np.zeros(len(damping)))
     sizes = np.linalg.norm(slopes, axis=0)
     sizes[sizes == 0.0] = 1.0
-    return linalg.lstsq(slopes / sizes, -values, cond=UNTOLD)[0] / sizes
-
-
-def _turns() -> list[tuple[float, float, float]]:
-    """Tangents of the half angles, twice, of turns about the axes that leave no attitude farther than about 60 degrees."""
-    return [turn for turn in product((0.0, 2.0, -2.0, 60.0), repeat=3) if sum(x == 60.0 for x in turn) <= 1][:GUESSES]
+    return np.linalg.lstsq(slopes / sizes, -values, rcond=UNTOLD)[0] / sizes

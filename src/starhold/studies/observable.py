@@ -103,8 +103,8 @@ def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
     for k in np.flatnonzero((np.abs(untold) > SHARE).any(axis=0)):
         covariance[k, k] = np.inf
     # What is left of the free numbers once the start has explained what it can.
-    rest = linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")[0][first : slopes.shape[1], first:]
-    _, known, axes = linalg.svd(rest)
+    rest = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")[first:, first:]
+    _, known, axes = np.linalg.svd(rest)
     hardly = _reduced(axes[: len(axes) - len(untold)][known[: len(axes) - len(untold)] < WIDTH])
     sentences = [_sentence(row, free, values / sizes, "do not tell") for row in untold]
     sentences += [_sentence(row, free, values / sizes, "hardly tell") for row in hardly]
@@ -116,7 +116,7 @@ def _reduced(rows: Array) -> Array:
     if not len(rows):
         return rows
     basis = linalg.orth(rows.T).T
-    pivots = linalg.qr(basis, pivoting=True, mode="r")[1][: len(basis)]
+    pivots = linalg.qr(basis, pivoting=True)[2][: len(basis)]
     return linalg.solve(basis[:, pivots], basis)
 
 

@@ -19,6 +19,8 @@ SINGULAR = 1e-9
 """Eigenvalues of a noise's covariance below this share of the largest are 0, as along a direction that is a unit vector."""
 LAGS = 20
 """Lags of the test of Ljung and Box."""
+TURNS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.6, 0.8, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0))
+"""A sensor that sees nothing at the start is looked at in these attitudes."""
 
 
 class Weighed(NamedTuple):
@@ -97,8 +99,8 @@ def noise_of(loop: ClosedLoop, reading: Reading) -> Noise | None:
     """The noise that the sensor of a reading states; None for none."""
     setup, carry = loop.setup(), loop.carry()
     # A sensor that sees nothing there shows no noise: it is looked at in other attitudes, and on the other side.
-    for turn, side in product(((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0.6, 0.8, 0, 0), (0.6, 0, 0.8, 0)), (1.0, -1.0)):
-        attitude: Any = multiply(carry.state.attitude, tuple(map(float, turn)))
+    for turn, side in product(TURNS, (1.0, -1.0)):
+        attitude = multiply(carry.state.attitude, turn)
         state = carry.state._replace(attitude=attitude, position=tuple(side * x for x in carry.state.position))
         first = 0
         for fitted, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
