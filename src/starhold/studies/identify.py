@@ -47,9 +47,10 @@ RELAXED = 0.1
 
 @dataclass(frozen=True)
 class Identified:
-    """What a fit gave. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance, and
-    what is not told; residuals: by name times and whitened residuals (n, size) and the readings with what the fit gives;
-    whiteness: by residual the p-value of Ljung and Box; chi2: the sum of squared residuals, with its degrees of freedom."""
+    """A fit gives these. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance,
+    and what is not told; residuals: by reading times and residuals (n, size) in deviations; readings: the rows that were
+    read, and those of the fit; whiteness: by residual the p-value of Ljung and Box; chi2: the sum of squared residuals, with
+    its degrees of freedom; units: of the readings; notes: sentences about what is left out."""
 
     scenario: Scenario
     free: Free

@@ -42,9 +42,7 @@ def _words(result: Identified) -> list[str]:
     from starhold.studies.identify import COMMANDS
 
     degrees, spread = result.degrees, (result.chi2 / result.degrees) ** 0.5
-    fits = (
-        "as large as the stated noise makes them" if result.consistent >= 0.01 else "more than the stated noise makes them"
-    )
+    fits = "what the stated noise gives" if result.consistent >= 0.01 else "more than the stated noise gives"
     worst = min(result.whiteness, key=lambda name: result.whiteness[name])
     white = "no residual is correlated in time"
     if not result.white:
@@ -54,7 +52,7 @@ def _words(result: Identified) -> list[str]:
     return [
         "",
         COMMANDS[result.commands],
-        f"{ended}The root mean square of the residuals is {spread:.3f} deviations, {degrees} degrees of freedom: {fits}; {white}.",
+        f"{ended}Residuals are {spread:.3f} deviations in the root mean square of {degrees} degrees of freedom: {fits}; {white}.",
         *result.posterior.sentences,
         *result.notes,
     ]
@@ -98,7 +96,7 @@ def draw(result: Identified, title: str) -> Any:
 
 
 COMMAND = Command(
-    "Fit numbers of a scenario to telemetry: a table, identify.csv, identify.png and identify.toml, a scenario to fly on with.",
+    "Fit numbers of a scenario to telemetry: identify.csv, identify.png, and identify.toml, the scenario to fly on with.",
     "identify",
     later("studies.identify.study"),
     present,
