@@ -153,8 +153,8 @@ def test_the_scale_of_an_inertia_needs_a_torque_that_is_known():
 
 
 def test_scale_factors_that_no_reading_shows_are_named():
-    """At a constant rate a gyro's scale factor is one with the rate, but for the turning that its noise leaves possible; what
-    noise it has shows in no prediction."""
+    """At a constant rate a gyro's scale factor is one with the rate, but for what turning its noise leaves possible; the
+    noise itself shows in no prediction."""
     spinning = TUMBLE.replace('["6 deg/s", "-5 deg/s", "6.2 deg/s"]', "[0.0, 0.0, 0.01]").replace("= true", "= false")
     fit = told_of(scenario(GYRO, text=spinning), "part.gyro.scale_error", "part.gyro.noise", commands="none")
     assert sorted(fit.posterior.sentences) == [

@@ -23,8 +23,9 @@ from starhold.parts.roles import Loads, Scene
 
 class Step(NamedTuple):
     """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied,
-    `sense` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` is
-    the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
+    `sense` what the law is given at a control instant, of readings from outside if there are any; `update` decides by it or
+    takes a command from outside; `slope` is the rates of (state, effectors, outputs of actuators that another one follows),
+    which `propagate` integrates."""
 
     measure: Callable[..., Any]
     sense: Callable[..., Sensed]
@@ -72,7 +73,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         mode = (carry.memory.mode,) if by_mode else ()
         return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
-    def observed(carry, step, key, craft, setup):
+    def observed(carry, step, key, craft, setup, seen=None):
         """Return a function that gives the law's measurement towards a goal and the memories of sensors and estimator, the
         goal, and the readings of the sensors."""
         state, memories = carry.state, carry.memories
@@ -81,6 +82,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         shown = []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
             reading, memory = sensor.module.measure(state, memory, params, dice(key, word_of(step), first), step)
+            reading = reading if seen is None else seen[len(every)]
             # Of several readings of a name all that do not ask for more are given the first.
             vars(readings).update(reading._asdict() | vars(readings))
             kept.append(memory)
@@ -123,8 +125,8 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         show, goal, _ = observed(carry, step, key, craft, setup)
         return show(goal)[0]
 
-    def sense(carry, step, key, gains, craft, setup):
-        show, goal, readings = observed(carry, step, key, craft, setup)
+    def sense(carry, step, key, gains, craft, setup, seen=None):
+        show, goal, readings = observed(carry, step, key, craft, setup, seen)
         measurement, memories = show(goal)
         h = carry.h
         if by_mode:
@@ -137,8 +139,8 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
             measurement = measurement._replace(attitude=attitude)
         return Sensed(measurement, readings, memories.estimate, carry, memories, h)
 
-    def update(carry, step, key, gains, craft, setup, given=None):
-        measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup)
+    def update(carry, step, key, gains, craft, setup, given=None, seen=None):
+        measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup, seen)
         command, memory = command_of(measurement, gains, craft, carry.memory)
         command = limit(command if given is None else given, setup.limit)
         passed = command

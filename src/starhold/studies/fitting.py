@@ -198,8 +198,8 @@ class Predictor:
     ) -> Prediction:
         """Fly for so many control steps and one more, which shows the last readings.
 
-        x: (free + 4,), see `begun`; commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next segment begins with,
-        attitude and rate (7,), of its number and of what the last one ended with."""
+        x: (free + 4,), see `begun`; commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next
+        segment begins with, attitude and rate (7,), of its number and of what the last one ended with."""
         count, size, given = steps + 1, self._row, np.ascontiguousarray(commands)
         memories = [self._started(x, count * size, block) for block in range(-(-(self.count + 1) // WIDTH))]
         flights = [self._fly.on(self._constant | memory | {"given": given}) for memory in memories]
