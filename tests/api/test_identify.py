@@ -176,6 +176,18 @@ def test_readings_correlated_in_time_are_told(cubesat):
     assert fit.consistent < 1e-6
 
 
+def test_samples_between_instants_of_the_loop():
+    """Telemetry every 0.7 s of a flight in steps of 0.1 s, fitted in steps of 1 s: a cubic through four instants is exact to
+    less than the noise, a line is not."""
+    fine = scenario(GYRO, FIELD, DIPOLE, **{"simulation.control_period": 0.1})
+    run = flown(fine).isel(time=slice(0, 1190, 7))
+    fit = sh.identify(
+        scenario(GYRO.replace("1e-4", "3.1623e-4"), FIELD, DIPOLE), telemetry=run, free=[BIAS], commands="none"
+    )
+    assert fit.consistent > 0.01
+    assert fit.white
+
+
 def test_the_noise_that_sensors_state():
     """White noise as the file has it; of a direction both angles; what accumulates is told."""
     sun = '[[part]]\ntype = "sun-sensor"\nnoise = 1e-3\n'

@@ -176,27 +176,18 @@ class Fit:
             raise InputError(self.scenario.where, reading.name, "no noise", allowed)
         if noise.accumulates:
             self.notes += (f"The noise that accumulates in {reading.name}, as a bias that walks, is left out.",)
-        place = np.minimum(places.astype(int), self.steps - 1)[good]
-        return Weighed(reading, columns[reading.name][good], place, places[good] - place, noise.whiten, noise.degrees)
+        return Weighed.of(reading, columns[reading.name][good], places[good], self.steps, noise)
 
     def _residuals(self, given: Prediction) -> tuple[Array, Array]:
-        """All residuals (n,) in deviations, and their slopes (n, free + 1); 0 where the flight is to read nothing new."""
-        every, slopes = list[Array](), list[Array]()
-        for one in self.weighed:
-            values, by = one.residuals(given)
-            for _, place in one.reading.gates:
-                seen = (given.values[one.place, place] > 0.5) & (
-                    (one.share == 0.0) | (given.values[one.place + 1, place] > 0.5)
-                )
-                values, by = values * seen[:, None], by * seen[:, None, None]
-            every.append(values.ravel())
-            slopes.append(by.reshape(-1, by.shape[-1]))
-        return np.concatenate(every), np.concatenate(slopes)
+        """All residuals (n,) in deviations, and their slopes (n, free + 1)."""
+        every = [one.residuals(given) for one in self.weighed]
+        slopes = [by.reshape(-1, by.shape[-1]) for _, by in every]
+        return np.concatenate([values.ravel() for values, _ in every]), np.concatenate(slopes)
 
     def _read(self, name: str) -> tuple[Array, Array]:
         """Places among instants and rows of a reading of a part of the state, such as a gyro's; empty without one."""
         found = [one for one in self.weighed if one.reading.name.endswith(f"_{name}") and len(one.rows)]
-        return (found[0].place + found[0].share, found[0].rows) if found else (np.empty(0), np.empty(0))
+        return (found[0].times, found[0].rows) if found else (np.empty(0), np.empty(0))
 
     def _begun(self) -> tuple[Array, list[int], Nodes]:
         """Where the search begins: free numbers, the cuts of the flight, and how its segments begin."""
@@ -289,11 +280,10 @@ class Fit:
         residuals, readings, white = dict[str, tuple[Array, Array]](), dict[str, tuple[Array, Array]](), dict[str, float]()
         degrees = 0
         for one in self.weighed:
-            times = (one.place + one.share) * self.period
+            times = one.times * self.period
             errors = one.residuals(given)[0]
             residuals[one.reading.name] = times, errors
-            now, after = given.values[one.place, one.reading.rows], given.values[one.place + 1, one.reading.rows]
-            readings[one.reading.name] = one.rows, now + one.share[:, None] * (after - now)
+            readings[one.reading.name] = one.rows, one.at(given.values[:, one.reading.rows])
             degrees += one.degrees * len(errors)
             white |= {f"{one.reading.name}[{k + 1}]": ljung_box(errors[:, k]) for k in range(errors.shape[1])}
         start = np.array([*x[-4:], *x[3:6]])

@@ -23,30 +23,57 @@ TURNS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.6,
 """A sensor that sees nothing at the start is looked at in these attitudes."""
 
 
+class Noise(NamedTuple):
+    """The noise of a reading: the matrix that makes residuals of unit variance, the degrees of freedom that a row has, and
+    whether more noise accumulates in the sensor's memory."""
+
+    whiten: Array
+    degrees: int
+    accumulates: bool
+
+
 class Weighed(NamedTuple):
-    """A reading with what it was at some times: its rows, (n, size), the times' places among instants with the share of the
-    next one, and the matrix that makes residuals of unit variance; degrees: those that a row has of freedom."""
+    """A reading with what it was at some times: its rows, (n, size), the times in control periods, (n,), the instants that a
+    prediction there is made of with their weights, (n, k), and the matrix that makes residuals of unit variance; degrees:
+    those that a row has of freedom."""
 
     reading: Reading
     rows: Array
-    place: Any
-    share: Array
+    times: Array
+    instants: Any
+    weights: Array
     whiten: Array
     degrees: int
+
+    @classmethod
+    def of(cls, reading: Reading, rows: Array, times: Array, steps: int, noise: Noise) -> Weighed:
+        """A reading at times up to so many control steps: predictions between instants are those of a cubic through four."""
+        count = 1 if (times == np.round(times)).all() else min(4, steps + 1)
+        first = np.clip(np.floor(times).astype(int) - (count - 1) // 2, 0, steps + 1 - count)
+        off = times - first
+        ways = [[(off - m) / (j - m) for m in range(count) if m != j] for j in range(count)]
+        weights = np.array([np.prod(way, axis=0) if way else np.ones(len(times)) for way in ways]).T
+        return cls(reading, rows, times, first[:, None] + np.arange(count), weights, noise.whiten, noise.degrees)
 
     @property
     def turns(self) -> bool:
         """Whether it is an attitude."""
         return self.reading.size == 4
 
+    def at(self, rows: Array) -> Array:
+        """Rows at the times, (n, ...), of those at all instants."""
+        return np.einsum("nk,nk...->n...", self.weights, rows[self.instants])
+
     def residuals(self, given: Prediction) -> tuple[Array, Array]:
-        """Residuals (n, size) in deviations, and their slopes (n, size, free + 1)."""
-        rows, share = self.reading.rows, self.share[:, None]
-        now, after = given.values[self.place, rows], given.values[self.place + 1, rows]
-        values = now + share * (after - now)
-        slopes = given.slopes[self.place, rows] + share[..., None] * (
-            given.slopes[self.place + 1, rows] - given.slopes[self.place, rows]
-        )
+        """Residuals (n, size) in deviations, and their slopes (n, size, free + 1); 0 where the flight reads nothing new."""
+        values, slopes = self._residuals(given)
+        for _, gate in self.reading.gates:
+            seen = ((given.values[self.instants, gate] > 0.5) | (self.weights == 0.0)).all(axis=1)
+            values, slopes = values * seen[:, None], slopes * seen[:, None, None]
+        return values, slopes
+
+    def _residuals(self, given: Prediction) -> tuple[Array, Array]:
+        values, slopes = self.at(given.values[:, self.reading.rows]), self.at(given.slopes[:, self.reading.rows])
         if not self.turns:
             return (values - self.rows) @ self.whiten.T, np.einsum("ij,njk->nik", self.whiten, slopes)
         off = conjugates(self.rows)
@@ -84,15 +111,6 @@ class _Varied(Silent):
 
     def normals(self, place: int, count: int) -> tuple[Any, ...]:
         return tuple(variables([0.0] * count, place, RANGE))
-
-
-class Noise(NamedTuple):
-    """The noise of a reading: the matrix that makes residuals of unit variance, the degrees of freedom that a row has, and
-    whether more noise accumulates in the sensor's memory."""
-
-    whiten: Array
-    degrees: int
-    accumulates: bool
 
 
 def noise_of(loop: ClosedLoop, reading: Reading) -> Noise | None:

@@ -52,7 +52,7 @@ def _words(result: Identified) -> list[str]:
     return [
         "",
         COMMANDS[result.commands],
-        f"{ended}Residuals are {spread:.3f} deviations in the root mean square of {degrees} degrees of freedom: {fits}; {white}.",
+        f"{ended}Residuals are {spread:.3f} deviations (root mean square of {degrees} degrees of freedom): {fits}; {white}.",
         *result.posterior.sentences,
         *result.notes,
     ]
