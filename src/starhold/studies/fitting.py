@@ -26,13 +26,14 @@ from starhold.scenario.key_reading import components, is_symmetric
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.scenario.values import Place, locate
 from starhold.trace.machine import aligned
+from starhold.trace.program import Program
 from starhold.trace.tangent import MARK, tangent
 
 Array: TypeAlias = NDArray[np.float64]
 Nodes: TypeAlias = Callable[[int, Array], Array]
 START = tuple(f"{name}_{axis}" for name in ("initial turn", "initial rate") for axis in "xyz")
 """Of the start, which is always free: a rotation vector (rad) of the attitude, body axes, and the rate (rad/s)."""
-WIDTH = 8
+WIDTH = 16
 """Slopes that are computed at once."""
 NUDGE = 1e-6
 """Products of inertia that are 0 and free have this share of the largest moment where a loop is made for them."""
@@ -150,16 +151,17 @@ class Predictor:
         parts = loop.composition()
         self._like = loop.carry()
         try:
-            begin, fly, arguments = predicting(
-                make_step(parts, silent=True), parts.sensors, self._made, self.count + 4, loop.substeps, outside
-            )
+            step = make_step(parts, silent=True)
+            *programs, arguments = predicting(step, parts.sensors, self._made, self.count + 4, loop.substeps, outside)
         except (InputError, TypeError, ValueError) as error:
             allowed = "keys that enter the loop's numbers by an equation"
             raise _refused(scenario, ", ".join(place.key for place in free.places), str(error), allowed) from None
         varied = ("carry", "free", "record")
-        self._begin, self._fly = (Kernel(tangent(program, varied), WIDTH) for program in (begin, fly))
-        self._constant = {"shared": arguments.shared, "tables": arguments.tables, "own": arguments.shared}
-        self.readings, self._row = _readings(loop)
+        self.programs: tuple[Program, Program] = (programs[0], programs[1])
+        """What makes the carry, and what flies, without slopes."""
+        self._begin, self._fly = (Kernel(tangent(program, varied), WIDTH) for program in self.programs)
+        self.constant = {"shared": arguments.shared, "tables": arguments.tables, "own": arguments.shared}
+        self.readings, self.row = _readings(loop)
         state = places(self._like).state
         self._moving = [*state.attitude, *state.rate]
 
@@ -200,9 +202,9 @@ class Predictor:
 
         x: (free + 4,), see `begun`; commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next
         segment begins with, attitude and rate (7,), of its number and of what the last one ended with."""
-        count, size, given = steps + 1, self._row, np.ascontiguousarray(commands)
+        count, size, given = steps + 1, self.row, np.ascontiguousarray(commands)
         memories = [self._started(x, count * size, block) for block in range(-(-(self.count + 1) // WIDTH))]
-        flights = [self._fly.on(self._constant | memory | {"given": given}) for memory in memories]
+        flights = [self._fly.on(self.constant | memory | {"given": given}) for memory in memories]
         starts, of_starts = np.empty((len(cuts), 7)), np.empty((len(cuts), 7, len(memories) * WIDTH))
         for number, (first, last) in enumerate(zip([0, *cuts], [*cuts, count], strict=True)):
             for fly in flights:

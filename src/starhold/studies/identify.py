@@ -42,7 +42,8 @@ CLOSED = 1.0
 SETTLED = 1e-6
 """The sum of squares has settled once a step is to lower it by less."""
 RELAXED = 0.1
-"""With each step without gaps the damping falls to this share."""
+"""With each step of the whole flight the damping falls to this share."""
+HALVINGS = 12
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,7 @@ class Fit:
             self.notes += (f"The noise that accumulates in {reading.name}, as a bias that walks, is left out.",)
         return Weighed.of(reading, columns[reading.name][good], places[good], self.steps, noise)
 
-    def _residuals(self, given: Prediction) -> tuple[Array, Array]:
+    def residuals(self, given: Prediction) -> tuple[Array, Array]:
         """All residuals (n,) in deviations, and their slopes (n, free + 1)."""
         every = [one.residuals(given) for one in self.weighed]
         slopes = [by.reshape(-1, by.shape[-1]) for _, by in every]
@@ -217,50 +218,66 @@ class Fit:
         return x, cuts, node
 
     def _cost(self, x: Array, cuts: Sequence[int], node: Any) -> float:
-        values = self._residuals(self.predictor(x, self.steps, self.commands, cuts, node))[0]
+        values = self.residuals(self.predictor(x, self.steps, self.commands, cuts, node))[0]
         return float(values @ values) if np.isfinite(values).all() else np.inf
 
     def solved(self, name: str, kind: str) -> Identified:
-        """Fit the free numbers."""
-        x, cuts, node = self._begun()
-        settled, number, misfit = False, 0, 1.0
-        given = self.predictor(x, self.steps, self.commands, cuts, node) if cuts else self._whole(x)
+        """Fit the free numbers; name and kind: of the telemetry and of its commands, for the result."""
+        return self.identified(*self.descended(self._closed(*self._begun())), name, kind)
+
+    def _closed(self, x: Array, cuts: Sequence[int], node: Nodes) -> Array:
+        """The free numbers once the gaps between segments have closed, or nearly."""
+        nodes = node
+        for _ in range(STEPS if cuts else 0):
+            given = self.predictor(x, self.steps, self.commands, cuts, nodes)
+            values, slopes = self.residuals(given)
+            if float(np.abs(slopes[:, -1]).max()) < CLOSED:
+                break
+            step, part = self._step(values + slopes[:, -1], slopes, 1.0)
+            starts = given.starts + part * (given.of_starts @ np.append(step, 1.0))
+            starts[:, :4] /= np.linalg.norm(starts[:, :4], axis=1)[:, None]
+            x, nodes = self.predictor.moved(x, part * step), lambda n, _, s=starts: s[n]
+        return x
+
+    def descended(self, x: Array) -> tuple[Array, Prediction, int, bool]:
+        """The free numbers with the least squares from some on, the flight there, the steps it took, and whether they have
+        settled."""
+        given, settled, number = self._whole(x), False, 0
         for number in range(1, STEPS + 1):
-            values, slopes = self._residuals(given)
-            if not np.isfinite(slopes).all():
-                raise InputError(self.scenario.where, "", "", "the flight diverges under the numbers of the file")
-            gap = slopes[:, -1]
-            # What readings hardly tell must not run away while they are far off.
-            misfit *= 1.0 if cuts else RELAXED
-            step = _step(slopes[:, :-1], values + gap, self._damping * misfit * np.sqrt(values @ values / len(values)))
-            part = min(1.0, TURN / max(1e-300, float(np.abs(step[:3]).max())))
-            if cuts:
-                if float(np.abs(gap).max()) < CLOSED or number > STEPS // 2:
-                    cuts, given = [], self._whole(x)
-                    continue
-                starts = given.starts + part * (given.of_starts @ np.append(step, 1.0))
-                starts[:, :4] /= np.linalg.norm(starts[:, :4], axis=1)[:, None]
-                x = self.predictor.moved(x, part * step)
-                given = self.predictor(x, self.steps, self.commands, cuts, lambda n, _, s=starts: s[n])
-                continue
+            values, slopes = self.residuals(given)
+            step, part = self._step(values, slopes, RELAXED**number)
             lowered = values @ values - float(((values + slopes[:, :-1] @ step) ** 2).sum())
+            if lowered < SETTLED and settled:
+                break
             if lowered < SETTLED:
-                if settled:
-                    break
                 # Once more from where combinations that are not told are nearest to the file's numbers.
                 settled, x = True, self._restored(x, slopes[:, :-1])
                 given = self._whole(x)
                 continue
-            for _ in range(12):
+            for _ in range(HALVINGS):
                 other = self._whole(self.predictor.moved(x, part * step))
-                now = self._residuals(other)[0]
+                now = self.residuals(other)[0]
                 if now @ now < values @ values:
                     break
                 part *= 0.5
             else:
                 break
             x, given = self.predictor.moved(x, part * step), other
-        return self._identified(x, given, number, settled, name, kind)
+        return x, given, number, settled
+
+    def _step(self, values: Array, slopes: Array, relaxed: float) -> tuple[Array, float]:
+        """A Gauss-Newton step, (free,), and the part of it to go. It is damped, that what readings hardly tell does not run
+        away while they are far off, and 0 along what no reading depends on."""
+        if not np.isfinite(slopes).all():
+            raise InputError(self.scenario.where, "", "", "the flight diverges under the numbers of the file")
+        damping = self._damping * relaxed * np.sqrt(values @ values / len(values))
+        # As few rows as there are numbers have the same squares.
+        few = np.linalg.qr(np.column_stack([slopes[:, :-1], values]), mode="r")
+        rows = np.vstack([few[:, :-1], np.diag(damping)])
+        sizes = np.linalg.norm(rows, axis=0)
+        sizes[sizes == 0.0] = 1.0
+        step = np.linalg.lstsq(rows / sizes, -np.append(few[:, -1], np.zeros(len(damping))), rcond=UNTOLD)[0] / sizes
+        return step, min(1.0, TURN / max(1e-300, float(np.abs(step[:3]).max())))
 
     def _restored(self, x: Array, slopes: Array) -> Array:
         """The free numbers moved along what readings do not tell, to be as near to the file's as can be."""
@@ -273,8 +290,9 @@ class Fit:
     def _whole(self, x: Array) -> Prediction:
         return self.predictor(x, self.steps, self.commands)
 
-    def _identified(self, x: Array, given: Prediction, number: int, settled: bool, name: str, kind: str) -> Identified:
-        values, slopes = self._residuals(given)
+    def identified(self, x: Array, given: Prediction, number: int, settled: bool, name: str, kind: str) -> Identified:
+        """The result of a fit that has ended at these numbers."""
+        values, slopes = self.residuals(given)
         free = self.predictor.free
         posterior = posterior_of(slopes[:, :-1], free, x[len(START) : -4])
         residuals, readings, white = dict[str, tuple[Array, Array]](), dict[str, tuple[Array, Array]](), dict[str, float]()
@@ -293,11 +311,3 @@ class Fit:
             max(1, degrees - posterior.rank), number, settled, name, kind,
             {one.reading.name: self.telemetry.known[one.reading.name].unit for one in self.weighed}, self.notes,
         )  # fmt: skip
-
-
-def _step(slopes: Array, values: Array, damping: Array) -> Array:
-    """The Gauss-Newton step, each number damped by so much (free,); along what no reading depends on it is 0."""
-    slopes, values = np.vstack([slopes, np.diag(damping)]), np.append(values, np.zeros(len(damping)))
-    sizes = np.linalg.norm(slopes, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    return np.linalg.lstsq(slopes / sizes, -values, rcond=UNTOLD)[0] / sizes

@@ -89,6 +89,8 @@ def _table(covariance: Array) -> dict[str, Any]:
 
 def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
     """What residuals of unit variance with these slopes (n, start + free) tell; the start is told beside."""
+    # As few rows as there are numbers have the same squares.
+    slopes = np.linalg.qr(slopes, mode="r")
     lengths = np.linalg.norm(slopes, axis=0)
     lengths[lengths == 0.0] = 1.0
     first = slopes.shape[1] - len(free.names)
