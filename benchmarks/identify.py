@@ -96,7 +96,7 @@ def main() -> None:
         print(f"{what}: {spent[f'{what}, {other}'].work / spent[f'{what}, exact'].work:.2f} times as fast")
     one, other = exact(), differences()
     sums = [float(values @ values) for values in map(residuals, (one, other))]
-    deviations = fit.identified(one, predictor(one, fit.steps, fit.commands), 0, True, "", "none").posterior.deviations
+    deviations = fit.identified(one, predictor(one, fit.steps, fit.commands), 0, True).posterior.deviations
     apart = np.abs(one - other)[len(START) : count] / deviations
     print(f"Sums of squares: {sums[0]:.4f} and, by differences, {sums[1]:.4f}, up to {apart.max():.1e} deviations apart.")
 

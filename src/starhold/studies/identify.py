@@ -125,14 +125,15 @@ def study(
     if kind not in kinds:
         raise InputError(scenario.where, "--commands", str(kind), nearest(str(kind), kinds))
     predictor = Predictor(scenario, entry, Free.of(scenario, keys), kind != "law")
-    return Fit(scenario, predictor, telemetry).solved(telemetry.name, kind)
+    return Fit(scenario, predictor, telemetry, kind).solved()
 
 
 class Fit:
     """Telemetry beside the predictor of a scenario. One predictor serves any number of flights."""
 
-    def __init__(self, scenario: Scenario, predictor: Predictor, telemetry: Telemetry) -> None:
-        self.scenario, self.predictor, self.telemetry = scenario, predictor, telemetry
+    def __init__(self, scenario: Scenario, predictor: Predictor, telemetry: Telemetry, kind: str = "recorded") -> None:
+        """kind: of the commands, see COMMANDS."""
+        self.scenario, self.predictor, self.telemetry, self.kind = scenario, predictor, telemetry, kind
         self.period = predictor.loop.period
         self.notes = tuple[str, ...]()
         # Damping for a number to change by about the size of its key; none of the start and of keys that are 0.
@@ -156,7 +157,7 @@ class Fit:
     def _held(self, places: Array) -> Array:
         """The command of each instant: the last recorded one, none before the first."""
         held = np.zeros((self.steps + 1, 3))
-        given = self.telemetry.columns.get("command") if self.predictor.outside else None
+        given = self.telemetry.columns.get("command") if self.kind == "recorded" else None
         if given is not None:
             known = np.isfinite(given).all(axis=1)
             latest = np.searchsorted(places[known], np.arange(self.steps + 1), side="right") - 1
@@ -221,9 +222,9 @@ class Fit:
         values = self.residuals(self.predictor(x, self.steps, self.commands, cuts, node))[0]
         return float(values @ values) if np.isfinite(values).all() else np.inf
 
-    def solved(self, name: str, kind: str) -> Identified:
-        """Fit the free numbers; name and kind: of the telemetry and of its commands, for the result."""
-        return self.identified(*self.descended(self._closed(*self._begun())), name, kind)
+    def solved(self) -> Identified:
+        """Fit the free numbers."""
+        return self.identified(*self.descended(self._closed(*self._begun())))
 
     def _closed(self, x: Array, cuts: Sequence[int], node: Nodes) -> Array:
         """The free numbers once the gaps between segments have closed, or nearly."""
@@ -290,7 +291,7 @@ class Fit:
     def _whole(self, x: Array) -> Prediction:
         return self.predictor(x, self.steps, self.commands)
 
-    def identified(self, x: Array, given: Prediction, number: int, settled: bool, name: str, kind: str) -> Identified:
+    def identified(self, x: Array, given: Prediction, number: int, settled: bool) -> Identified:
         """The result of a fit that has ended at these numbers."""
         values, slopes = self.residuals(given)
         free = self.predictor.free
@@ -308,6 +309,6 @@ class Fit:
         chi2 = float(values @ values)
         return Identified(
             self.scenario, free, x[len(START) : -4], start, posterior, residuals, readings, white, chi2,
-            max(1, degrees - posterior.rank), number, settled, name, kind,
+            max(1, degrees - posterior.rank), number, settled, self.telemetry.name, self.kind,
             {one.reading.name: self.telemetry.known[one.reading.name].unit for one in self.weighed}, self.notes,
         )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from starhold.errors import InputError
 from starhold.report.commands import Block, Column, Command, Option, Result, Table, later
 
 if TYPE_CHECKING:
@@ -19,8 +20,16 @@ def present(scenario: Scenario, entry: LawEntry, *given: Any) -> Result:
     title = f"{scenario.name}: numbers fitted to {result.telemetry}"
     pasted = [f"{key} = {value}" for key, value in result.fitted().items()]
     blocks: list[Block] = ["", _table(result), *_words(result), "", *pasted]
+    try:
+        learnt = result.learnt().text
+    except InputError as error:
+        # A fit of a model that lacks something may end at numbers that no file may have.
+        learnt = None
+        blocks.append(
+            f"The scenario refuses these numbers, so that there is no identify.toml: {error.key}: {error.allowed}."
+        )
     summary = {entry.name: result.summary()}
-    return Result(title, blocks, _numbers(result), lambda: draw(result, title), summary, toml=result.learnt().text)
+    return Result(title, blocks, _numbers(result), lambda: draw(result, title), summary, toml=learnt)
 
 
 def _table(result: Identified) -> Table:
