@@ -128,7 +128,7 @@ def many(
 
 
 class Given(NamedTuple):
-    """What comes from outside at a control instant: the readings of each sensor and, where they are finite, the numbers of
+    """A row gives this from outside at a control instant: the readings of each sensor and, where they are finite, numbers of
     the body's state, of the effectors' states and of the command that acts."""
 
     readings: Any
@@ -169,7 +169,7 @@ def replaying(step: Step, carry: Any, numbers: Numbers, substeps: int, like: Giv
 
 
 def _finite(given: Any, other: Any) -> Any:
-    """The numbers that are given, where they are finite, else others of the same structure."""
+    """Take the numbers that are given, where they are finite, else others of the same structure."""
     source = iter(flatten(given))
     return mapped(other, lambda leaf: where(is_finite(number := next(source)), number, leaf))
 

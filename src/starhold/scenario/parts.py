@@ -1,6 +1,7 @@
 """The [[part]] tables of a scenario are read: parts of any role that stand in a file of their own, here or in another
 package."""
 
+import csv
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -120,8 +121,7 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
         if item.gain.columns and isinstance(given, str):
             allowed = f"a CSV file of {', '.join(item.gain.columns)}, a line of names first or none"
             try:
-                text = read_text(folder / given)
-                lines = [line.split(",") for line in text.splitlines() if line.strip() and not line.startswith("#")]
+                lines = [cells for _, cells in csv_lines(folder / given)]
                 if lines and number_in(lines[0][0]) is None:
                     lines = lines[1:]
                 if any(len(line) != len(item.gain.columns) for line in lines):
@@ -132,6 +132,16 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
             except ValueError as error:
                 raise InputError(where, f"{key}.{item.name}", f"{given}: {error}", allowed) from None
     return filled
+
+
+def csv_lines(path: Path) -> list[tuple[int, list[str]]]:
+    """The lines of a CSV file that are neither empty nor comments: their numbers, and their cells without spaces around.
+    Raises OSError, or ValueError where it is no CSV file."""
+    try:
+        rows = [(k, [cell.strip() for cell in row]) for k, row in enumerate(csv.reader(read_text(path).splitlines()), 1)]
+    except csv.Error as error:
+        raise ValueError(str(error)) from None
+    return [(number, cells) for number, cells in rows if any(cells) and not cells[0].startswith("#")]
 
 
 def number_in(text: str) -> float | None:

@@ -67,7 +67,7 @@ class Comparison:
 
 @dataclass(frozen=True, repr=False)
 class Replay:
-    """What was computed from telemetry: the recording, a sample each control step, comparisons, and sentences about what
+    """A replay gives the recording of what was computed, a sample each control step, comparisons, and sentences about what
     the telemetry lacks."""
 
     telemetry: Telemetry
@@ -118,29 +118,29 @@ def study(scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None,
     of the largest recorded value by which quantities may differ whose deviation is not known. InputError where readings are
     missing."""
     loop = build(scenario, entry)
-    told = read(scenario, loop, source, mapping)
-    steps = np.round(told.times / loop.period).astype(int)
+    telemetry = read(scenario, loop, source, mapping)
+    steps = np.round(telemetry.times / loop.period).astype(int)
     duration = scenario.table.simulation.steps
     inside = (steps >= 0) & (steps <= duration)
     if not inside.any():
-        times = f"times from {told.times[0]:g} to {told.times[-1]:g} s"
-        raise InputError(told.name, "", times, f"some within the scenario, 0 to {duration * loop.period:g} s")
+        times = f"times from {telemetry.times[0]:g} to {telemetry.times[-1]:g} s"
+        raise InputError(telemetry.name, "", times, f"some within the scenario, 0 to {duration * loop.period:g} s")
     first, last = int(steps[inside].min()), int(steps[inside].max())
     rows = np.full(last - first + 1, -1)
     # Of several samples of a control step the last one counts.
     rows[steps[inside] - first] = np.flatnonzero(inside)
-    values = {name: np.where((rows >= 0)[:, None], numbers[rows], np.nan) for name, numbers in told.columns.items()}
-    given, notes = _given(loop, values, told, first)
+    values = {name: np.where((rows >= 0)[:, None], numbers[rows], np.nan) for name, numbers in telemetry.columns.items()}
+    given, notes = _given(loop, values, telemetry, first)
     run = replay(loop, given, first)
     notes += [f"{int((~inside).sum())} samples lie outside the scenario's duration."] * bool((~inside).any())
     comparisons = list(_comparisons(loop, run, values, TOLERANCE if tolerance is None else tolerance))
-    return Replay(told, run, comparisons, [told.sentence, *notes])
+    return Replay(telemetry, run, comparisons, [telemetry.sentence, *notes])
 
 
-def _given(loop: ClosedLoop, values: dict[str, Array], told: Telemetry, first: int) -> tuple[Array, list[str]]:
+def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, first: int) -> tuple[Array, list[str]]:
     """The rows that `replay` takes, and sentences about what they lack."""
     like, count = given_like(loop), len(next(iter(values.values())))
-    readings, gaps = _readings(loop, like.readings, values, told)
+    readings, gaps = _readings(loop, like.readings, values, telemetry)
 
     def part(shape: Any, name: str) -> Any:
         numbers = values.get(name, np.full((count, len(flatten((shape,)))), np.nan))
@@ -149,7 +149,7 @@ def _given(loop: ClosedLoop, values: dict[str, Array], told: Telemetry, first: i
     fields = [name for name in like.state._fields if name != loop.body.module.COMMAND]
     needed = [name for name in (fields[:2] if not readings else []) if name not in values]
     if needed:
-        raise InputError(told.name, "", f"no {_listed(needed)}", "what the law knows: this scenario has no sensors")
+        raise InputError(telemetry.name, "", f"no {_listed(needed)}", "what the law knows: this scenario has no sensors")
     known = {name: part(getattr(like.state, name), name if name in fields else "") for name in like.state._fields}
     state = like.state._replace(**known)
     if first and "position" in fields and "position" not in values:
@@ -167,7 +167,8 @@ def _given(loop: ClosedLoop, values: dict[str, Array], told: Telemetry, first: i
     taken = [*fields, *names.values(), "command"]
     lacking = [name for name in taken if name in values and np.isnan(values[name]).any()]
     absent = [name for name in taken if name not in values]
-    notes = [f"{_listed(gaps)} of {count} control steps; between them a rate goes along a straight line." if gaps else ""]
+    every = f"{count} control steps, every {loop.period:g} s"
+    notes = [f"{_listed(gaps)} of {every}; between them none is new, and rates go along straight lines." if gaps else ""]
     notes += [f"Not recorded, and taken from the estimate or the model: {_listed(absent)}." if absent else ""]
     notes += [f"Recorded at some control steps alone, and so at the others: {_listed(lacking)}." if lacking else ""]
     return rows, [note for note in notes if note]
@@ -178,7 +179,7 @@ def _whole(numbers: Array) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(numbers).all(axis=1))
 
 
-def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telemetry) -> tuple[Any, list[str]]:
+def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], telemetry: Telemetry) -> tuple[Any, list[str]]:
     """The readings of all sensors at each control step, and how often there is one: where there is none, that of a sensor
     that tells whether it is new is not, and any other lies on a straight line between those around it."""
     sensors = [fitted.called.replace("-", "_") for fitted in loop.used("sensor")]
@@ -186,7 +187,7 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telem
     flags = {name for name, field in wanted.items() if "_is_" in field}
     if missing := [name for name in wanted if name not in values and name not in flags]:
         allowed = "every reading of the scenario's sensors: leave out the parts that the satellite lacks"
-        raise InputError(told.name, "", f"no {_listed(missing)}", allowed)
+        raise InputError(telemetry.name, "", f"no {_listed(missing)}", allowed)
     filled: dict[str, Array] = {}
     gaps: list[str] = []
     for name in wanted:
@@ -194,10 +195,10 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telem
             continue
         there = _whole(values[name])
         if not there.any():
-            raise InputError(told.name, name, "no number within the scenario", "a reading at least")
+            raise InputError(telemetry.name, name, "no number within the scenario", "a reading at least")
         steps, places = np.arange(len(there)), np.flatnonzero(there)
-        own = [flag for flag in flags if flag.startswith(f"{name}_is_")]
-        if own or values[name].shape[1] == len(LABELS["quaternion"]):
+        marks = [flag for flag in flags if flag.startswith(f"{name}_is_")]
+        if marks or values[name].shape[1] == len(LABELS["quaternion"]):
             # An estimator passes over a reading that is not new.
             filled[name] = values[name][np.maximum.accumulate(np.where(there, steps, places[0]))]
         else:
@@ -205,7 +206,7 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telem
         gaps += [f"{name} is read at {len(places)}"] * (not there.all())
         changed = np.append(True, (np.diff(filled[name], axis=0) != 0.0).any(axis=1))
         changed[places[0]] = True
-        for flag in own:
+        for flag in marks:
             shown = changed if flag.endswith("_is_new") else (filled[name] != 0.0).any(axis=1)
             says = values[flag][:, 0] > 0.5 if flag in values else shown
             filled[flag] = np.where(there & says, 1.0, 0.0)[:, None]
@@ -219,7 +220,7 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], told: Telem
 def _effector_names(loop: ClosedLoop) -> dict[tuple[int, str], str]:
     """The recorded name of each number of an effector's state that goes on from one control step to the next."""
     names = [name for name, _, _ in recorded(loop)][len(loop.body.module.Sample._fields) :]
-    found: dict[tuple[int, str], str] = {}
+    matched: dict[tuple[int, str], str] = {}
     for place, (fitted, inner) in enumerate(zip(loop.used("effector"), loop.carry().effectors, strict=True)):
         if fitted.part.hook("record") is None:
             continue
@@ -227,9 +228,9 @@ def _effector_names(loop: ClosedLoop) -> dict[tuple[int, str], str]:
         for name in names[:count] if fitted.part.hook("switch") is None else []:
             field = next((field for field in inner._fields if name.endswith(f"_{field}")), None)
             if field is not None:
-                found.setdefault((place, field), name)
+                matched.setdefault((place, field), name)
         names = names[count:]
-    return found
+    return matched
 
 
 def _comparisons(loop: ClosedLoop, run: Recording, values: dict[str, Array], share: float) -> Iterator[Comparison]:
@@ -247,23 +248,23 @@ def _comparisons(loop: ClosedLoop, run: Recording, values: dict[str, Array], sha
     pairs.sort(key=lambda pair: not pair[0].startswith(tuple(f"{one}_" for one in estimators)))
     for name, against in pairs:
         there = _whole(values[against])
-        found, computed = values[against][there], run[name].reshape(len(run["time"]), -1)[there]
+        seen, computed = values[against][there], run[name].reshape(len(run["time"]), -1)[there]
         angle = run.columns[name].dimension == "quaternion"
-        largest = 1.0 if angle else float(np.abs(found).max(initial=0.0))
+        largest = 1.0 if angle else float(np.abs(seen).max(initial=0.0))
         sigma = _deviation(loop, run, name)
         allowed = np.full(len(there), share * largest) if sigma is None else SIGMAS * sigma
         rule = f"beyond {SIGMAS:g} sigma of" if sigma is not None else f"beyond {100.0 * share:g} % of the largest,"
-        difference = _angles(computed, found) if angle else np.linalg.norm(computed - found, axis=1)
+        difference = _angles(computed, seen) if angle else np.linalg.norm(computed - seen, axis=1)
         unit = "rad" if angle else run.columns[name].unit
         limits = np.maximum(allowed[there], ROUNDING * largest)
-        yield Comparison(name, against, unit, rule, run["time"][there], computed, found, difference, limits)
+        yield Comparison(name, against, unit, rule, run["time"][there], computed, seen, difference, limits)
 
 
-def _angles(computed: Array, found: Array) -> Array:
+def _angles(computed: Array, seen: Array) -> Array:
     """The angles (n,) between attitudes (n, 4), in rad; 0 between equal ones."""
-    turn: Any = relative(tuple(found.T), tuple(computed.T))  # type: ignore[arg-type]
+    turn: Any = relative(tuple(seen.T), tuple(computed.T))  # type: ignore[arg-type]
     angles = 2.0 * np.arctan2(np.linalg.norm(turn[1:], axis=0), np.abs(turn[0]))
-    return np.where((computed == found).all(axis=1), 0.0, angles)
+    return np.where((computed == seen).all(axis=1), 0.0, angles)
 
 
 def _deviation(loop: ClosedLoop, run: Recording, name: str) -> Array | None:
@@ -273,8 +274,8 @@ def _deviation(loop: ClosedLoop, run: Recording, name: str) -> Array | None:
     prefix, _, field = name.rpartition("_")
     if prefix not in [fitted.called.replace("-", "_") for fitted in loop.used("estimator")]:
         return None
-    told = [(f, f.part.hook("noise")) for f in loop.used("sensor") if field in f.part.module.Reading._fields]
-    noises = [make(fitted.params, loop.period) for fitted, make in told if make is not None]
+    measured = [(f, f.part.hook("noise")) for f in loop.used("sensor") if field in f.part.module.Reading._fields]
+    noises = [make(fitted.params, loop.period) for fitted, make in measured if make is not None]
     sizes = {"rate": lambda n: math.sqrt(3.0) * n.rate, "attitude": lambda n: float(np.linalg.norm(n.attitude))}
     if field not in sizes or not noises:
         return None

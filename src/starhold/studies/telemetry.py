@@ -50,10 +50,10 @@ class Gaps(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """What is there, and what is missing."""
+        """Tell what is there, and what is missing."""
         words = ("missing", "without a time", "at the time of another", "out of order")
-        found = [f"{count} {word}" for count, word in zip(self[1:5], words, strict=True) if count]
-        return f"{self.rows} rows, one every {self.interval:g} s; {', '.join(found) if found else 'none missing'}"
+        faults = [f"{count} {word}" for count, word in zip(self[1:5], words, strict=True) if count]
+        return f"{self.rows} rows, one every {self.interval:g} s; {', '.join(faults) if faults else 'none missing'}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -76,7 +76,7 @@ class Telemetry:
 
     @property
     def sentence(self) -> str:
-        """What was read and what is missing."""
+        """Tell what was read and what is missing."""
         files = [f"{name} has {gaps.sentence}" for name, gaps in self.gaps.items()]
         counts = {name: int(np.isnan(values).any(axis=1).sum()) for name, values in self.columns.items()}
         empty = [f"{name} in {count}" for name, count in counts.items() if count]
@@ -138,12 +138,12 @@ def _columns(
     known: Mapping[str, tuple[Quantity, int]], table: MappingTable, frame: Any, path: Path
 ) -> dict[str, ColumnsTable]:
     """The columns of each quantity: those that a mapping names, or those under the names that starhold gives."""
-    own = {name: heads_of(name, *meant) for name, meant in known.items()}
+    named = {name: heads_of(name, *meant) for name, meant in known.items()}
     if table.columns:
-        return {n: c if c.columns else c.model_copy(update={"columns": own[n]}) for n, c in table.columns.items()}
-    columns = {name: ColumnsTable(columns=heads) for name, heads in own.items() if set(heads) <= {*frame.columns}}
+        return {n: c if c.columns else c.model_copy(update={"columns": named[n]}) for n, c in table.columns.items()}
+    columns = {name: ColumnsTable(columns=heads) for name, heads in named.items() if set(heads) <= {*frame.columns}}
     if not columns:
-        allowed = f"a mapping of its columns, or columns such as time, {', '.join(next(iter(own.values())))}"
+        allowed = f"a mapping of its columns, or columns such as time, {', '.join(next(iter(named.values())))}"
         raise InputError(str(path), "", f"columns {', '.join(map(str, frame.columns[:8]))}", allowed)
     return columns
 

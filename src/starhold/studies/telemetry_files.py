@@ -146,8 +146,8 @@ def _message(path: Path, mapping: MappingTable) -> tuple[Any, MappingTable]:
     begun = np.datetime64(message.epoch, "ns").astype(float) * 1e-9 - (GPS_EPOCH if base == "gps" else 0.0)
     frame = pd.DataFrame({"time": begun + message.times} | dict(zip(LABELS["quaternion"], message.attitudes.T, strict=True)))
     says = {"frame": OF_J2000 if message.frame == OF_J2000 else "", "columns": LABELS["quaternion"]}
-    asked = mapping.columns or {"attitude": ColumnsTable()}
-    columns = {name: column.model_copy(update=says) for name, column in asked.items()}
+    wanted = mapping.columns or {"attitude": ColumnsTable()}
+    columns = {name: column.model_copy(update=says) for name, column in wanted.items()}
     return frame, mapping.model_copy(update={"time": TimeTable.model_validate({"base": base}), "columns": columns})
 
 

@@ -32,9 +32,9 @@ def _row(one: Comparison) -> list[Any]:
     sizes = one.difference
     largest = int(np.argmax(np.where(np.isnan(sizes), np.inf, sizes)))
     rms, share = float(np.sqrt(np.mean(sizes**2))), 100.0 * float(np.mean(one.beyond))
-    told = [rms, float(sizes[largest]), float(one.times[largest]), share, one.parted_at]
+    numbers = [rms, float(sizes[largest]), float(one.times[largest]), share, one.parted_at]
     name = one.name if one.name == one.against else f"{one.name}, {one.against} recorded"
-    return [name, one.unit, len(one.times), *told]
+    return [name, one.unit, len(one.times), *numbers]
 
 
 def _numbers(result: Replay) -> Table:
