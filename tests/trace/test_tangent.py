@@ -14,7 +14,7 @@ from starhold.algebra.words import bits_of, with_bits
 from starhold.trace.calling import record_call
 from starhold.trace.machine import aligned, load
 from starhold.trace.tangent import tangent
-from tests.algebra.test_dual import EQUATIONS, POINT
+from tests.algebra.smooth import EQUATIONS, POINT
 
 WIDTH = 8
 

@@ -65,7 +65,7 @@ class Free:
     @classmethod
     def of(cls, scenario: Scenario, keys: Sequence[str]) -> Free:
         """InputError for what is no key with a number that an equation follows."""
-        found: list[Place] = []
+        located: list[Place] = []
         names, values = list[str](), list[float]()
         for key in keys:
             try:
@@ -80,13 +80,13 @@ class Free:
                 )
             if place.value is None or not np.isfinite(place.value).all():
                 raise _refused(scenario, key, "no finite value", "a key with a value in the file, to begin with")
-            if any(place.path[: len(other.path)] == other.path[: len(place.path)] for other in found):
+            if any(place.path[: len(other.path)] == other.path[: len(place.path)] for other in located):
                 raise _refused(scenario, key, "a number given twice", "each number once")
             index = components(place.shape, is_symmetric(place))
-            found.append(place)
+            located.append(place)
             names += [place.key + "".join(f"[{n + 1}]" for n in item) for item in index]
             values += [float(np.asarray(place.value)[item]) for item in index]
-        return cls(tuple(found), tuple(names), np.array(values))
+        return cls(tuple(located), tuple(names), np.array(values))
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -155,7 +155,8 @@ class Predictor:
             *programs, arguments = predicting(step, parts.sensors, self._made, self.count + 4, loop.substeps, outside)
         except (InputError, TypeError, ValueError) as error:
             allowed = "keys that enter the loop's numbers by an equation"
-            raise _refused(scenario, ", ".join(place.key for place in free.places), str(error), allowed) from None
+            given = error.given if isinstance(error, InputError) else str(error)
+            raise _refused(scenario, ", ".join(place.key for place in free.places), given, allowed) from None
         varied = ("carry", "free", "record")
         self.programs: tuple[Program, Program] = (programs[0], programs[1])
         """What makes the carry, and what flies, without slopes."""
@@ -253,7 +254,7 @@ def _nudged(scenario: Scenario, free: Free) -> Scenario:
 
 def _readings(loop: ClosedLoop) -> tuple[tuple[Reading, ...], int]:
     """The vectors that sensors read, and how many numbers all readings have."""
-    found: list[Reading] = []
+    readings: list[Reading] = []
     setup, row = loop.setup(), 0
     carry = loop.carry()
     for fitted, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
@@ -265,5 +266,5 @@ def _readings(loop: ClosedLoop) -> tuple[tuple[Reading, ...], int]:
         for name, (first, size) in where.items():
             gates = tuple((f"{prefix}_{n}", place) for n, (place, _) in where.items() if n.startswith(f"{name}_is_"))
             if not any(name.startswith(f"{other}_is_") for other in where):
-                found.append(Reading(f"{prefix}_{name}", first, size, gates))
-    return tuple(found), row
+                readings.append(Reading(f"{prefix}_{name}", first, size, gates))
+    return tuple(readings), row

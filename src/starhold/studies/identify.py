@@ -104,8 +104,8 @@ class Identified:
 
     def learnt(self) -> Scenario:
         """The scenario with the numbers that were found, and a campaign over what is left uncertain about them."""
-        found = self.scenario.with_(self.fitted())
-        return self.posterior.over(found, self.free, self.values)
+        changed = self.scenario.with_(self.fitted())
+        return self.posterior.over(changed, self.free, self.values)
 
 
 def study(
@@ -156,13 +156,13 @@ class Fit:
 
     def _held(self, places: Array) -> Array:
         """The command of each instant: the last recorded one, none before the first."""
-        held = np.zeros((self.steps + 1, 3))
+        commands = np.zeros((self.steps + 1, 3))
         given = self.telemetry.columns.get("command") if self.kind == "recorded" else None
         if given is not None:
             known = np.isfinite(given).all(axis=1)
             latest = np.searchsorted(places[known], np.arange(self.steps + 1), side="right") - 1
-            held[latest >= 0] = given[known][latest[latest >= 0]]
-        return held
+            commands[latest >= 0] = given[known][latest[latest >= 0]]
+        return commands
 
     def _weighed(self, reading: Reading, places: Array) -> Weighed:
         columns = self.telemetry.columns
@@ -188,8 +188,8 @@ class Fit:
 
     def _read(self, name: str) -> tuple[Array, Array]:
         """Places among instants and rows of a reading of a part of the state, such as a gyro's; empty without one."""
-        found = [one for one in self.weighed if one.reading.name.endswith(f"_{name}") and len(one.rows)]
-        return (found[0].times, found[0].rows) if found else (np.empty(0), np.empty(0))
+        those = [one for one in self.weighed if one.reading.name.endswith(f"_{name}") and len(one.rows)]
+        return (those[0].times, those[0].rows) if those else (np.empty(0), np.empty(0))
 
     def _begun(self) -> tuple[Array, list[int], Nodes]:
         """Where the search begins: free numbers, the cuts of the flight, and how its segments begin."""
@@ -273,7 +273,7 @@ class Fit:
             raise InputError(self.scenario.where, "", "", "the flight diverges under the numbers of the file")
         damping = self._damping * relaxed * np.sqrt(values @ values / len(values))
         # As few rows as there are numbers have the same squares.
-        few = np.linalg.qr(np.column_stack([slopes[:, :-1], values]), mode="r")
+        few: Any = np.linalg.qr(np.column_stack([slopes[:, :-1], values]), mode="r")
         rows = np.vstack([few[:, :-1], np.diag(damping)])
         sizes = np.linalg.norm(rows, axis=0)
         sizes[sizes == 0.0] = 1.0
@@ -282,11 +282,11 @@ class Fit:
 
     def _restored(self, x: Array, slopes: Array) -> Array:
         """The free numbers moved along what readings do not tell, to be as near to the file's as can be."""
-        free, own = self.predictor.free, x[len(START) : -4]
+        free, now = self.predictor.free, x[len(START) : -4]
         sizes = np.where(free.sizes > 0.0, free.sizes, 1.0)
-        untold, off = posterior_of(slopes, free, own).untold / sizes, (own - free.values) / sizes
+        untold, off = posterior_of(slopes, free, now).untold / sizes, (now - free.values) / sizes
         back = untold.T @ np.linalg.lstsq(untold.T, off)[0] if len(untold) else 0.0 * off
-        return np.concatenate([x[: len(START)], own - back * sizes, x[-4:]])
+        return np.concatenate([x[: len(START)], now - back * sizes, x[-4:]])
 
     def _whole(self, x: Array) -> Prediction:
         return self.predictor(x, self.steps, self.commands)

@@ -1,4 +1,4 @@
-"""What a fit tells of its free numbers: their covariance, and which combinations no reading depends on, by name."""
+"""A fit tells so much of its free numbers: their covariance, and by name the combinations that no reading depends on."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Posterior(NamedTuple):
 
     def barely(self, free: Free) -> Any:
         """Which numbers are told no better than to the size of their key."""
-        return self.told & (free.sizes > 0.0) & (WIDTH * self.deviations > free.sizes)
+        return self.is_told & (free.sizes > 0.0) & (WIDTH * self.deviations > free.sizes)
 
     @property
     def deviations(self) -> Array:
@@ -45,14 +45,14 @@ class Posterior(NamedTuple):
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
-    def told(self) -> Any:
+    def is_told(self) -> Any:
         """Which numbers are told."""
         return np.isfinite(np.diagonal(self.covariance))
 
     @property
     def correlations(self) -> Array:
         """Correlations of the free numbers, NaN of those that are not told."""
-        sizes = np.where(self.told, self.deviations, np.nan)
+        sizes = np.where(self.is_told, self.deviations, np.nan)
         return self.covariance / np.outer(sizes, sizes)
 
     def over(self, scenario: Scenario, free: Free, values: Array) -> Scenario:
@@ -70,7 +70,7 @@ class Posterior(NamedTuple):
         groups = [
             [k for k, name in enumerate(free.names) if name.startswith(p.key)] for p in free.places if len(p.shape) == 2
         ]
-        fit = self.told & ~self.barely(free)
+        fit = self.is_told & ~self.barely(free)
         groups.append([k for k, whole in enumerate(matrix) if not whole and fit[k]])
         for group in groups:
             if group and fit[group].all():
@@ -88,29 +88,30 @@ def _table(covariance: Array) -> dict[str, Any]:
 
 
 def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
-    """What residuals of unit variance with these slopes (n, start + free) tell; the start is told beside."""
+    """Return what residuals of unit variance with these slopes (n, start + free) tell; the start is free beside."""
     # As few rows as there are numbers have the same squares.
-    slopes = np.linalg.qr(slopes, mode="r")
+    few: Any = np.linalg.qr(slopes, mode="r")
+    slopes = few
     lengths = np.linalg.norm(slopes, axis=0)
     lengths[lengths == 0.0] = 1.0
     first = slopes.shape[1] - len(free.names)
     _, singular, axes = linalg.svd(slopes / lengths, full_matrices=False)
-    told = singular > UNTOLD * singular[0]
-    parts = (axes[told] / singular[told, None])[:, first:] / lengths[first:]
+    kept = singular > UNTOLD * singular[0]
+    parts = (axes[kept] / singular[kept, None])[:, first:] / lengths[first:]
     covariance = parts.T @ parts
     # Keys without a size are told unless they are as good as another.
     sizes = np.where(free.sizes > 0.0, free.sizes, SIZELESS / lengths[first:])
-    _, among, combined = linalg.svd(axes[~told][:, first:], full_matrices=False)
+    _, among, combined = linalg.svd(axes[~kept][:, first:], full_matrices=False)
     untold = _reduced(combined[among > SHARE] / lengths[first:] / sizes)
     for k in np.flatnonzero((np.abs(untold) > SHARE).any(axis=0)):
         covariance[k, k] = np.inf
     # What is left of the free numbers once the start has explained what it can.
-    rest = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")[first:, first:]
+    rest: Any = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")[first:, first:]
     _, known, axes = np.linalg.svd(rest)
     hardly = _reduced(axes[: len(axes) - len(untold)][known[: len(axes) - len(untold)] < WIDTH])
     sentences = [_sentence(row, free, values / sizes, "do not tell") for row in untold]
     sentences += [_sentence(row, free, values / sizes, "hardly tell") for row in hardly]
-    return Posterior(covariance, untold * sizes, tuple(sentences), int(told.sum()), singular)
+    return Posterior(covariance, untold * sizes, tuple(sentences), int(kept.sum()), singular)
 
 
 def _reduced(rows: Array) -> Array:
@@ -118,21 +119,22 @@ def _reduced(rows: Array) -> Array:
     if not len(rows):
         return rows
     basis = linalg.orth(rows.T).T
-    pivots = linalg.qr(basis, pivoting=True)[2][: len(basis)]
+    order: Any = linalg.qr(basis, pivoting=True)
+    pivots = order[2][: len(basis)]
     return linalg.solve(basis[:, pivots], basis)
 
 
-def _sentence(row: Array, free: Free, values: Array, told: str) -> str:
+def _sentence(row: Array, free: Free, values: Array, verb: str) -> str:
     """Name a combination on which readings do not depend, or not beyond their noise; row and values in sizes."""
     named = np.flatnonzero(np.abs(row) > SHARE * np.abs(row).max())
-    names, own, known = [free.names[k] for k in named], row[named], values[named]
-    why = "no reading depends on it" if told == "do not tell" else "it may change by its own size"
+    names, shares, known = [free.names[k] for k in named], row[named], values[named]
+    why = "no reading depends on it" if verb == "do not tell" else "it may change by its own size"
     if len(names) == 1:
-        return f"These data {told} {names[0]}: {why}."
-    cosine = abs(own @ known) / max(1e-300, float(np.linalg.norm(own) * np.linalg.norm(known)))
+        return f"These data {verb} {names[0]}: {why}."
+    cosine = abs(shares @ known) / max(1e-300, float(np.linalg.norm(shares) * np.linalg.norm(known)))
     keys = ", ".join(dict.fromkeys(name.partition("[")[0] for name in names))
     if 1.0 - cosine * cosine < ALIKE and free.values[named].all():
         scale = "common scale" if "," in keys else "scale"
-        return f"These data {told} the {scale} of {keys}, only ratios: {why}."
-    shares = " : ".join(f"{x:.3g}" for x in own / np.abs(own).max())
-    return f"These data {told} {', '.join(names)} apart, which may change as {shares} in their sizes: {why}."
+        return f"These data {verb} the {scale} of {keys}, only ratios: {why}."
+    text = " : ".join(f"{x:.3g}" for x in shares / np.abs(shares).max())
+    return f"These data {verb} {', '.join(names)} apart, which may change as {text} in their sizes: {why}."

@@ -41,7 +41,7 @@ def _table(result: Identified) -> Table:
     rows: list[list[Any]] = []
     numbers = zip(result.free.names, result.free.units, result.free.values, result.values, strict=True)
     for k, (name, unit, before, value) in enumerate(numbers):
-        width = WIDTH * posterior.deviations[k] if posterior.told[k] else None
+        width = WIDTH * posterior.deviations[k] if posterior.is_told[k] else None
         words = "[red]no[/red]" if width is None else "barely" if barely[k] else "yes"
         rows.append([name, unit, before, value, width, words])
     return Table(columns, rows)
