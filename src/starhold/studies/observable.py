@@ -106,8 +106,8 @@ def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
     for k in np.flatnonzero((np.abs(untold) > SHARE).any(axis=0)):
         covariance[k, k] = np.inf
     # What is left of the free numbers once the start has explained what it can.
-    rest: Any = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")[first:, first:]
-    _, known, axes = np.linalg.svd(rest)
+    few = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")
+    _, known, axes = np.linalg.svd(few[first:, first:])
     hardly = _reduced(axes[: len(axes) - len(untold)][known[: len(axes) - len(untold)] < WIDTH])
     sentences = [_sentence(row, free, values / sizes, "do not tell") for row in untold]
     sentences += [_sentence(row, free, values / sizes, "hardly tell") for row in hardly]
