@@ -119,8 +119,8 @@ def study(scenario: Scenario, entry: LawEntry, source: Any, mapping: Any = None,
     missing."""
     loop = build(scenario, entry)
     telemetry = read(scenario, loop, source, mapping)
-    steps = np.round(telemetry.times / loop.period).astype(int)
     duration = scenario.table.simulation.steps
+    steps = np.round(np.clip(telemetry.times / loop.period, -1.0, duration + 1.0)).astype(int)
     inside = (steps >= 0) & (steps <= duration)
     if not inside.any():
         times = f"times from {telemetry.times[0]:g} to {telemetry.times[-1]:g} s"
@@ -253,7 +253,7 @@ def _comparisons(loop: ClosedLoop, run: Recording, values: dict[str, Array], sha
         largest = 1.0 if angle else float(np.abs(seen).max(initial=0.0))
         sigma = _deviation(loop, run, name)
         allowed = np.full(len(there), share * largest) if sigma is None else SIGMAS * sigma
-        rule = f"beyond {SIGMAS:g} sigma of" if sigma is not None else f"beyond {100.0 * share:g} % of the largest,"
+        rule = f"beyond {SIGMAS:g} sigma," if sigma is not None else f"beyond {100.0 * share:g} % of the largest,"
         difference = _angles(computed, seen) if angle else np.linalg.norm(computed - seen, axis=1)
         unit = "rad" if angle else run.columns[name].unit
         limits = np.maximum(allowed[there], ROUNDING * largest)

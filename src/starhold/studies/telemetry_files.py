@@ -19,7 +19,7 @@ from starhold.export.aem import open_run, read_aem
 from starhold.files import read_text
 from starhold.laws.interface import Gain
 from starhold.parts.epoch import OF_J2000
-from starhold.scenario.checking import nearest, read_toml, show, validate
+from starhold.scenario.checking import cut, nearest, read_toml, show, validate
 from starhold.scenario.quantity import quantity
 from starhold.scenario.tables import Flag, Table
 from starhold.scenario.units import to_number
@@ -36,6 +36,8 @@ _LEAPS = """1981-07 1982-07 1983-07 1985-07 1988-01 1990-01 1991-01 1992-07 1993
 2009-01 2012-07 2015-07 2017-01"""
 LEAPS = np.array([np.datetime64(f"{month}-01", "s") for month in _LEAPS.split()]).astype(float)
 """UTC in s since 1970 from which on there is one leap second more since 1980 (IERS Bulletin C)."""
+MOST_SHOWN = 200
+"""Characters of a list of columns in an error."""
 OFF_AXES = 1e-6
 """By how much a matrix between axes may fail to be orthogonal."""
 
@@ -154,7 +156,9 @@ def _message(path: Path, mapping: MappingTable) -> tuple[Any, MappingTable]:
 def column_of(frame: Any, name: str, path: Path) -> Any:
     """A column of a table. InputError where it has none of this name."""
     if name not in frame:
-        raise InputError(str(path), "", f"no column {name}", nearest(name, [str(head) for head in frame.columns]))
+        raise InputError(
+            str(path), "", f"no column {name}", cut(nearest(name, [str(head) for head in frame.columns]), MOST_SHOWN)
+        )
     return frame[name]
 
 
