@@ -101,4 +101,4 @@ def test_every_file_of_the_folder_is_a_command_of_everything():
     names = {path.stem.replace("_", "-") for path in folder.glob("[a-z]*.py")}
     assert set(commands.names()) == names >= {"budget", "design", "failures", "invariant", "modal-roots", "sail"}
     # The studio has those that are about a scenario alone.
-    assert names & set(KINDS) == names - {"invariant", "sail", "replay"}
+    assert names & set(KINDS) == names - {"identify", "invariant", "sail", "replay"}

@@ -3,7 +3,7 @@ over the calls of a law."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from starhold.algebra.scalar import is_finite, less, where
@@ -13,6 +13,8 @@ from starhold.algebra.words import number_of, whole_word, word_add, word_of
 from starhold.loop.closed_loop import Composition
 from starhold.loop.kernels import Arguments, Kernel, Numbers, Observer, form, make_step, numbers_of
 from starhold.loop.step import Step
+from starhold.parts.part import Part
+from starhold.parts.random import Silent
 from starhold.trace.program import Loop, Program, Store
 from starhold.trace.recording import Cells, Recorder
 from starhold.trace.sharing import differing, split
@@ -201,6 +203,40 @@ def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: b
 
         repeat(blocks, block)
     return recorder.program("fly", "Flies a step of closed loops.")
+
+
+def predicting(
+    step: Step, sensors: Sequence[Part], made: Callable[..., tuple[Any, Numbers]], free: int, substeps: int, outside: bool
+) -> tuple[Program, Program, Arguments]:
+    """The flight that so many free numbers predict, recorded: the program that makes its carry of them, which `made`
+    gives with the kernel's numbers, and one of `count` control steps from `first` on. All readings lie in `record` and, if
+    `outside`, all commands in `given`; then the law's memory stays. step: see `silent` of `make_step`."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, numbers = recorder.memory("carry", lanes=True, writable=True), recorder.memory("free", lanes=True)
+        for place, number in enumerate(numbers_of(made([numbers[k] for k in range(free)])[0])):
+            cells[place] = number
+    begin, recorder = recorder.program("begin"), Recorder()
+    with recorder.recording():
+        cells, numbers = recorder.memory("carry", lanes=True, writable=True), recorder.memory("free", lanes=True)
+        record, given = recorder.memory("record", lanes=True, writable=True), recorder.memory("given")
+        first, count = recorder.input("first", "index"), recorder.input("count", "index")
+        like, values = made([numbers[k] for k in range(free)])
+        arguments = Arguments(*values)
+        gains, nominal, craft, setup = arguments.bound(recorder, 0)
+
+        def turn(k: Any, carry: Any) -> Any:
+            now, state, memories = first + k, carry.state, carry.memories.sensors
+            fitted = zip(sensors, memories, setup.sensors, strict=True)
+            _put_row(record, now, tuple(s.module.measure(state, m, p, Silent(), now)[0] for s, m, p in fitted))
+            command = tuple(given[now * 3 + i] for i in range(3)) if outside else None
+            updated = step.update(carry, now, (0, 0), gains, nominal, setup, command)
+            return (_propagated(step, updated, craft, setup, substeps),)
+
+        begun = _state(like, cells, 0)
+        end = repeat(count, turn, begun)[0]
+        _put(cells, 0, end._replace(memory=begun.memory) if outside else end)
+    return begin, recorder.program("predict"), arguments
 
 
 def _put_row(cells: Cells, row: Any, values: Any) -> None:

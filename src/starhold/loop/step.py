@@ -58,8 +58,8 @@ def total(vectors: Any) -> Any:
     return result
 
 
-def make_equations(parts: Composition) -> Step:
-    """Compose the equations of a control step of these parts."""
+def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step:
+    """Compose the equations of a control step of these parts; dice: what makes their random numbers, as `Dice` does."""
     body, target = parts.body.module, parts.target
     limit = LIMITS[parts.limit]
     policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
@@ -86,7 +86,7 @@ def make_equations(parts: Composition) -> Step:
         readings, kept, every = SimpleNamespace(), [], []
         shown = []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
-            reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
+            reading, memory = sensor.module.measure(state, memory, params, dice(key, word_of(step), first), step)
             reading = reading if seen is None else seen[len(every)]
             # Of several readings of a name all that do not ask for more are given the first.
             vars(readings).update(reading._asdict() | vars(readings))
@@ -162,7 +162,7 @@ def make_equations(parts: Composition) -> Step:
         )
         state = carry.state if named.dynamic else carry.state._replace(**{body.COMMAND: passed})
         environments = [
-            e.module.update(m, carry.state, p, Dice(key, word_of(step), first), step) if e.hook("update") else m
+            e.module.update(m, carry.state, p, dice(key, word_of(step), first), step) if e.hook("update") else m
             for e, m, p, first in zip(
                 parts.environments, memories.environments, setup.environments, named.environments, strict=True
             )

@@ -82,8 +82,8 @@ Block: TypeAlias = Table | Heading | str
 class Result(NamedTuple):
     """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
     and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; xml is the text of NAME.xml; certificate writes one; document is for NAME.html and NAME.md. outcome:
-    whether all that is required is met, or proved."""
+    summary.json; xml is the text of NAME.xml, toml that of NAME.toml; certificate writes one; document is for NAME.html and
+    NAME.md. outcome: whether all that is required is met, or proved."""
 
     title: str
     blocks: Sequence[Block]
@@ -94,6 +94,7 @@ class Result(NamedTuple):
     certificate: Callable[[Path], None] | None = None
     document: Sequence[Section] | None = None
     outcome: Literal["met", "missed", "undecided"] = "met"
+    toml: str | None = None
 
 
 class Option(NamedTuple):
