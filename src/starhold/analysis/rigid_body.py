@@ -145,9 +145,25 @@ def make_meter(
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
-    begun: Any = (-1.0, -1.0, *(0.0,) * 6, ZERO, ZERO, ZERO, (4.0,) * len(cones), turning, levels, levels, 0.0, 0.0, 0.0)
     wanted = Wanted(tuple(map(float, begins.values())), fault)
-    first, tail = Noted(*begun, mode_notes.begun(wanted)), tail_start(steps)
+    modal = mode_notes.begun(wanted)
+    begun: Any = (
+        -1.0,
+        -1.0,
+        *(0.0,) * 6,
+        ZERO,
+        ZERO,
+        ZERO,
+        (4.0,) * len(cones),
+        turning,
+        levels,
+        levels,
+        0.0,
+        0.0,
+        0.0,
+        modal,
+    )
+    first, tail = Noted(*begun), tail_start(steps)
     angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2
     bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()), wanted)
     rows: Any = places(first)

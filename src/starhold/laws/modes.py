@@ -350,10 +350,8 @@ def _mode_fields(mode: Mode) -> list[Field]:
 
 @cache
 def _gains_of(modes: Modes) -> Any:
-    named = [
-        (f"{item.name}_of_{place}".replace(".", "_"), Annotated[Any, item.gain])
-        for place, mode in enumerate(modes.modes, 1)
-        for item in _mode_fields(mode)
-    ]
-    shared = [(re.sub(r"\W", "", name.format("_")), Annotated[Any, item.gain]) for name, item in modes.shared_fields()]
-    return NamedTuple("Gains", [*named, *shared])  # pyright: ignore
+    places = enumerate(modes.modes, 1)
+    pairs = [(f"{one.name}_of_{k}".replace(".", "_"), one.gain) for k, mode in places for one in _mode_fields(mode)]
+    pairs += [(re.sub(r"\W", "", name.format("_")), one.gain) for name, one in modes.shared_fields()]
+    named = [(name, Annotated[Any, gain]) for name, gain in pairs]
+    return NamedTuple("Gains", named)  # pyright: ignore

@@ -107,7 +107,10 @@ def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: M
 def orbit_of(scenario: Scenario) -> float | None:
     """How long (s) an orbit of a scenario takes; None without one that comes back."""
     orbit = getattr(scenario.table, "orbit", None)
-    time = math.inf if orbit is None else period_of(*orbit.start, orbit.gravitational_parameter)
+    if orbit is None:
+        return None
+    position, velocity = orbit.start
+    time = period_of(position, velocity, orbit.gravitational_parameter)
     return time if math.isfinite(time) else None
 
 
