@@ -1,7 +1,8 @@
 """Counts how many small errors in the source the tests find: `python tests/mutation.py --help`.
 
-Each mutant is one changed expression in a copy of the tree. The test files nearest to its module run first, those first that
-took least in the last run, then the rest; the first failure kills it, and so does a run without end. What survives is a gap in the tests or a change without effect.
+Each mutant is one changed expression in a copy of the tree. The test files nearest to its module run first, those that took
+least in the last run before others, then all the rest; the first failure kills it, and so does a run without end. What
+survives is a gap in the tests or a change without effect.
 """
 
 import argparse

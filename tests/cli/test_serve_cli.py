@@ -95,6 +95,8 @@ def test_a_law_leaves_and_flies_in_a_process(tmp_path):
             assert np.array_equal(run[quantity], whole[quantity]), quantity
         assert run.attrs["law_process"] == "./flight"
         assert "law_program" not in run.attrs
+    brief = sh.load("three-laws").with_({"simulation.duration": 20.0})
+    assert sh.simulate(brief, process=str(tmp_path / "flight")).equals(sh.simulate(brief))
     done = starhold("run", "three-laws", "--law-process", "./none", "-o", "no", cwd=tmp_path, code=2)
     assert done.stderr.startswith("starhold: run: --law-process: found ./none; allowed: a program that runs")
     starhold("run", "three-laws", "--law-process", "./flight", "--check-step", cwd=tmp_path, code=2)
