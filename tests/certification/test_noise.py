@@ -64,7 +64,6 @@ def test_a_claim_for_a_share_takes_in_the_parts_that_say_their_noise():
         ("gyro", {"limit": 1.0}),
         ("star-tracker", {"delay": 0.5}),
         ("star-tracker", {"outage": (10.0, 20.0)}),
-        ("mekf", {"bias_walk": 0.0}),
     ],
 )
 def test_what_is_not_noise_is_left_out(name, params):
@@ -195,6 +194,7 @@ def test_a_share_is_told_and_a_flight_before_the_filter_settles_leaves_it():
     assert departures(certificate, loop, flown)["pointing"][0].time == time[40]
 
 
+@pytest.mark.slow
 def test_against_more_noise_than_can_be_shown_the_claim_leaves_it_out():
     given = sh.load("three-laws-noise")
     loop = build(given, given.pick("lyapunov"))

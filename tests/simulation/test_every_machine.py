@@ -99,8 +99,8 @@ def test_one_lane(name):
 
 
 EIGHT = [pytest.param(*flown.values, 8, marks=flown.marks) for flown in FLOWN]
-LANES = [*EIGHT, *leading([(name, 16) for name in LOOPS if not is_costly(name)], 2)]
-"""Every loop on eight lanes; on sixteen two, and by `make test-all` all."""
+LANES = [*EIGHT, *leading([(name, 16) for name in LOOPS if not is_costly(name)])]
+"""Every loop on eight lanes; on sixteen one, and by `make test-all` all."""
 
 
 @pytest.mark.parametrize(("name", "width"), LANES)
