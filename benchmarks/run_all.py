@@ -22,6 +22,7 @@ SCRIPTS: dict[str, tuple[str, ...]] = {
     "cubesat": (),
     "wheels": (),
     "stepper": (),
+    "identify": (),
     "law_cost": (),
     "mpc": (),
     "modal_roots": (),
@@ -30,7 +31,8 @@ SCRIPTS: dict[str, tuple[str, ...]] = {
     "campaign": ("--quick",),
     "cli": (),
 }
-"""Scripts in the order of the page, with their arguments; `peer.py` needs another version of the tree and is left out."""
+"""Scripts in the order of the page, with their arguments. Left out are `peer.py`, which needs another version of the tree,
+`boards.py`, which needs emulators, and `real_time.py`, which measures the machine's idleness for a minute."""
 RULE = re.compile(r"-+(?:  -+)*")
 
 
@@ -64,7 +66,7 @@ def measure(name: str, arguments: tuple[str, ...]) -> tuple[str, str, dict[str, 
         raise SystemExit(f"{path.name} failed:\n{run.stderr[-3000:]}")
     machine, versions, *lines = run.stdout.splitlines()
     about = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n\n")[0]
-    missed = [line.strip() for line in lines if "MISSES" in line]
+    missed = [" ".join(line.split()) for line in lines if "MISSES" in line]
     seconds = round(time.perf_counter() - begun, 1)
     return machine, versions, {"about": " ".join(about.split()), "seconds": seconds, "missed": missed, "blocks": read(lines)}
 

@@ -14,7 +14,7 @@
 
    Program of the law: sha256 4f874e55fa16eec8b64cc78923eef683c9775f1cdd52baf71d83b3a67f9942c4
 
-   Certificate: certificate.json, sha256 5bf166e1d098561950e51b6e95fa9b7a9998e25a74421d1e515cfbc9de362729:
+   Certificate: certificate.json, sha256 b64ee89e3f79f9ced86701eff87a38baba707a484a6e2e352c2c9e18c773a5f1:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
@@ -61,7 +61,8 @@ typedef struct {
     double e[4];
 } wheel_doubles4_t;
 
-/* The absolute angular momentum of each rotor about its spin axis (N m s). */
+/* The absolute momentum of each rotor about its axis (N m s), and the angles (turns) of rotors out of
+   balance. */
 typedef struct {
     wheel_doubles4_t momentum;
 } wheel_wheels_state_t;
