@@ -55,11 +55,6 @@ class Weighed(NamedTuple):
         weights = np.array([np.prod(way, axis=0) if way else np.ones(len(times)) for way in ways]).T
         return cls(reading, rows, times, first[:, None] + np.arange(count), weights, noise.whiten, noise.degrees)
 
-    @property
-    def turns(self) -> bool:
-        """Whether it is an attitude."""
-        return self.reading.size == 4
-
     def at(self, rows: Array) -> Array:
         """Rows at the times, (n, ...), of those at all instants."""
         return np.einsum("nk,nk...->n...", self.weights, rows[self.instants])
@@ -74,7 +69,7 @@ class Weighed(NamedTuple):
 
     def _residuals(self, given: Prediction) -> tuple[Array, Array]:
         values, slopes = self.at(given.values[:, self.reading.rows]), self.at(given.slopes[:, self.reading.rows])
-        if not self.turns:
+        if self.reading.size != 4:
             return (values - self.rows) @ self.whiten.T, np.einsum("ij,njk->nik", self.whiten, slopes)
         off = conjugates(self.rows)
         error = np.einsum("nij,nj->ni", off, values)
