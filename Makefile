@@ -29,19 +29,16 @@ check: $(VENV)/.test
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.bench
-	for script in benchmarks/[a-z]*.py; do case $$script in */common.py|*/basilisk_*.py) ;; *) echo "== $$script"; $(BIN)/python $$script || exit 1 ;; esac; done
+	$(BIN)/python benchmarks/run_all.py
 
 docs: $(VENV)/.docs
 	$(BIN)/python docs/generate.py
 	$(BIN)/mkdocs build --strict
 
-$(VENV)/.run: pyproject.toml constraints.txt
-	$(PYTHON) -m venv $(VENV)
-	$(PIP) -e .
-	touch $@
-
-$(VENV)/.test $(VENV)/.bench $(VENV)/.docs: $(VENV)/.%: $(VENV)/.run
-	$(PIP) -e .[$*]
+# One installation for each purpose; Python compiles what is imported, a small part of what is installed.
+$(VENV)/.run $(VENV)/.test $(VENV)/.bench $(VENV)/.docs: $(VENV)/.%: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(PIP) --no-compile -e .$(if $(filter run,$*),,[$*])
 	touch $@
 
 clean:

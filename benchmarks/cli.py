@@ -49,7 +49,7 @@ HEAD = "─" * 40
 """What stands in the line below the head of a table, and nowhere before."""
 START = "import sys; sys.argv[0] = 'starhold'; from starhold.cli.main import main; main()"
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-ROUNDS, IMPORTS = 7, 5
+ROUNDS, IMPORTS = 3, 3
 """Rounds of each kind."""
 LIBRARIES = (
     "numpy",

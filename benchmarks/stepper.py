@@ -31,9 +31,9 @@ SERVED, COUNT = "three-laws", 400
 
 
 @contextmanager
-def served(*options: str) -> Iterator[tuple[str, int]]:
-    """The address of a plant that another process serves."""
-    command = [sys.executable, "-m", "starhold", "serve", SERVED, "--port", "0", *options]
+def served(*options: str, scenario: str = SERVED) -> Iterator[tuple[str, int]]:
+    """The address of a plant that another process serves, which ends when it is left."""
+    command = [sys.executable, "-m", "starhold", "serve", scenario, "--port", "0", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         host, _, port = process.stdout.readline().split("//")[1].split(". ")[0].rpartition(":")
@@ -44,13 +44,18 @@ def served(*options: str) -> Iterator[tuple[str, int]]:
             process.stdout.read()
 
 
-def commanded(address: tuple[str, int], write: Callable[[Message], bytes], udp: bool) -> Callable[[], None]:
-    """A round of steps in lockstep, each commanded after the readings of the one before."""
+def connected(address: tuple[str, int], udp: bool = False) -> socket.socket:
+    """A socket that sends at once."""
     link = socket.socket(type=socket.SOCK_DGRAM if udp else socket.SOCK_STREAM)
     link.connect(address)
     if not udp:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    decoder = Decoder(by_plant=True)
+    return link
+
+
+def commanded(address: tuple[str, int], write: Callable[[Message], bytes], udp: bool) -> Callable[[], None]:
+    """A round of steps in lockstep, each commanded after the readings of the one before."""
+    link, decoder = connected(address, udp), Decoder(by_plant=True)
 
     def readings(step: int) -> None:
         while True:

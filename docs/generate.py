@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from generators import api, commands, gallery, laws, parts, publications
+from generators import api, benchmarks, commands, gallery, laws, parts, publications
 from generators import keys as scenario_keys
 from generators.authors import filled
 
 PAGES = {
     "api.md": api.page,
+    "benchmarks.md": benchmarks.page,
     "commands.md": commands.page,
     "gallery.md": gallery.page,
     "keys.md": scenario_keys.page,

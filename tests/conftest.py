@@ -1,5 +1,6 @@
 """Settings of the whole test run."""
 
+import gc
 import os
 import signal
 import sys
@@ -67,6 +68,12 @@ def pytest_configure(config):
     # Of workers the one process that starts them counts.
     if not hasattr(config, "workerinput") and getattr(config, "cache", None) is not None:
         config.pluginmanager.register(Stopwatch(config.cache))
+
+
+def pytest_collection_finish():
+    """Leave what is loaded by now out of the collections of garbage: it stays to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -54,3 +54,96 @@ k_attitude = 0.0008
 k_integral = 1e-5
 integral_limit = 1e-4
 """
+
+HEADS = """
+[[part]]
+type = "gyro"
+noise = 2e-5
+[[part]]
+type = "star-tracker"
+cross = "10 arcsec"
+roll = "60 arcsec"
+boresight = [0, -1, 0]
+interval = 1.0
+outage = [100, 160]
+[[part]]
+type = "mekf"
+noise = 2e-5
+bias_walk = 1e-5
+bias = "0.03 deg/s"
+cross = "10 arcsec"
+roll = "60 arcsec"
+boresight = [0, -1, 0]
+"""
+"""A gyro and a star tracker, which is lost for a minute, with their filter."""
+GUARDED = """
+[[law]]
+name = "mission"
+type = "modes"
+quaternion_sign = "shortest"
+on_loss = "safe"
+"""
+MONITORS = """
+[[law.monitor]]
+name = "tracker"
+kind = "stuck"
+reading = "attitude"
+limit = "5 s"
+[[law.monitor]]
+name = "jump"
+kind = "rate"
+reading = "rate"
+limit = "1 deg/s^2"
+times = 2
+[[law.monitor]]
+name = "filter"
+kind = "residual"
+reading = "attitude"
+limit = "5 deg"
+[[law.monitor]]
+name = "divergence"
+kind = "range"
+estimate = "attitude_deviation"
+limit = "3 deg"
+times = 20
+"""
+"""One of each kind."""
+
+
+def mode(name, *lines):
+    """A mode whose law is the same in all modes."""
+    head = f'[[law.mode]]\nname = "{name}"\ntype = "lyapunov"\nk_rate = 0.006\nk_attitude = 0.0008\n'
+    return "\n".join((head, *lines, ""))
+
+
+WATCHFUL = (
+    cubesat(HEADS, GUARDED, MONITORS)
+    + mode(
+        "wait",
+        'until = { not_before = "2026-03-05T06:30:20.2Z", attitude_deviation_below = "0.1 deg", tracker_age_below = "2 s" }',
+    )
+    + mode(
+        "point",
+        'target = { mode = "orbital" }',
+        'until = { elevation_below = "5 deg", latitude = "10 deg", longitude = "20 deg", sun_angle_above = "2 deg", '
+        'axis = [1, 0, 0], sunlight_above = 0.5, not_after = 280, after = "10 s" }',
+    )
+    + mode("sun", 'until = { not_before = "200 s", to = "point" }')
+    + mode("safe", 'until = { after = "30 s", to = "wait" }')
+)
+"""A flight with every kind of condition and of monitor."""
+
+WHEELS = """
+[wheels]
+layout = "pyramid"
+inertia = 2.2e-5
+torque_limit = "2 mN m"
+momentum_limit = "15 mN m s"
+[[part]]
+type = "magnetometer"
+[[part]]
+type = "magnetorquers"
+dipole_limit = "0.2 A m^2"
+"""
+"""Wheels, and rods that a safe mode flies by."""
+SAFE = '[[law.mode]]\nname = "safe"\ntype = "b-dot"\nk = 1e-3\neffectors = ["magnetorquers"]\n'

@@ -1,7 +1,8 @@
 """Counts how many small errors in the source the tests find: `python tests/mutation.py --help`.
 
-Each mutant is one changed expression in a copy of the tree. The test files nearest to its module run first, then the rest;
-the first failure kills it, and so does a run without end. What survives is a gap in the tests or a change without effect.
+Each mutant is one changed expression in a copy of the tree. The test files nearest to its module run first, those that took
+least in the last run before others, then all the rest; the first failure kills it, and so does a run without end. What
+survives is a gap in the tests or a change without effect.
 """
 
 import argparse
@@ -98,8 +99,10 @@ def nearest(root: Path, module: Path) -> list[str]:
 class Trials:
     """Runs of the tests in a copy of the tree; those that fail there without any change are left out."""
 
-    def __init__(self, root: Path) -> None:
-        self.root, self.clean, self.broken, self.time = root, set[str](), set[str](), 0
+    def __init__(self, root: Path, limit: int) -> None:
+        self.root, self.limit, self.clean, self.broken, self.time = root, limit, set[str](), set[str](), 0
+        known = ROOT / ".pytest_cache" / "v" / "starhold" / "seconds"
+        self.seconds: dict[str, float] = json.loads(known.read_text()) if known.exists() else {}
         shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".*", "__pycache__", "results"), dirs_exist_ok=True)
 
     def write(self, path: Path, source: bytes) -> None:
@@ -110,7 +113,7 @@ class Trials:
 
     def failure(self, words: list[str]) -> str:
         """The first test that fails, or why there is none; nothing if all pass."""
-        command = ["timeout", "-s", "KILL", "3600", sys.executable, "-m", "pytest", "-x", "-q", "--tb=no"]
+        command = ["timeout", "-s", "KILL", str(self.limit), sys.executable, "-m", "pytest", "-x", "-q", "--tb=no"]
         command += ["-p", "no:cacheprovider", *words, *(f"--deselect={test}" for test in self.broken)]
         environment = os.environ | {"PYTHONPATH": str(self.root / "src")}
         done = subprocess.run(command, cwd=self.root, env=environment, capture_output=True, text=True)
@@ -120,7 +123,8 @@ class Trials:
     def killer(self, path: Path, mutant: Mutant, rest: list[str]) -> str:
         """What kills a mutant; nothing if it survives."""
         source = path.read_bytes()
-        for words in (nearest(self.root, path.relative_to(self.root / "src")), rest):
+        near = nearest(self.root, path.relative_to(self.root / "src"))
+        for words in (sorted(near, key=lambda file: self.seconds.get(file, 0.0)), rest):
             failed = "again" if words else ""
             while failed in self.broken | {"again"}:
                 self.write(path, source[: mutant.start] + mutant.after.encode() + source[mutant.end :])
@@ -140,11 +144,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=[*GROUPS], nargs="+", default=[*GROUPS], help="groups")
     parser.add_argument("--tests", default="-n 2 --dist loadfile tests", help="words for pytest after the nearest; '': none")
+    parser.add_argument("--limit", type=int, default=1800, help="seconds after which a run counts as one without end")
     parser.add_argument("--output", type=Path, default=Path(os.devnull), help="a JSON file")
     options = parser.parse_args()
     results, draw = [], random.Random(options.seed)
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
-        trials, source = Trials(Path(folder)), Path(folder) / "src" / "starhold"
+        trials, source = Trials(Path(folder), options.limit), Path(folder) / "src" / "starhold"
         files = {g: [p for pattern in GROUPS[g] for p in sorted(source.glob(pattern))] for g in options.only}
         pools = {g: [(p, m) for p in there for m in mutants(p.read_bytes())] for g, there in files.items() if there}
         for place, (group, pool) in enumerate(pools.items()):

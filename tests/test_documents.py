@@ -303,7 +303,7 @@ WITH_EFFECTORS = {
 
 @pytest.mark.slow
 def test_mission_of_the_page_about_modes_flies():
-    example, rods = blocks("docs/modes.md", "toml")
+    example, rods, _ = blocks("docs/modes.md", "toml")
     scenario = sh.scenario(tomllib.loads(example))
     (flight,) = sh.compare(scenario)
     assert [one.mode for one in flight.modes] == ["detumble", "sun", "nadir"]

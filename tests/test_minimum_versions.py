@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-EXTRAS = ("campaign", "interop", "studio")
+EXTRAS = ("campaign", "interop", "serial", "studio", "zmq")
 COMMANDS = [
     ("run", "three-laws", "--law", "lyapunov", "-o", "out"),
     ("run", "--help"),
@@ -25,6 +25,7 @@ import starhold as sh
 sh.margins(sh.load("three-laws").with_({"simulation.duration": "0.1 h"}), "lyapunov")
 sh.linearise("three-laws", "lyapunov")
 import starhold.studio.server
+import serial, zmq.asyncio, zmq.utils.monitor
 """
 
 

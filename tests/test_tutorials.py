@@ -11,6 +11,7 @@ import pytest
 import typer
 
 from starhold.cli.main import app
+from tests.export.flown import build_in, need
 from tests.running import starhold
 from tests.tiers import WHOLE, leading
 
@@ -35,6 +36,9 @@ def plain(text):
 def run(line, folder):
     command, _, code = line.partition(" # exit code ")
     start, *words = shlex.split(command)
+    if start.endswith("cc"):
+        build_in(folder, start, *words)
+        return ""
     assert start == "starhold", line
     done = starhold(*words, cwd=folder)
     assert done.returncode == int(code or 0), (line, done.stderr)
@@ -44,6 +48,7 @@ def run(line, folder):
 @pytest.mark.parametrize("page", leading(TUTORIALS), ids=lambda page: page.stem)
 def test_tutorial_runs(page, tmp_path, monkeypatch):
     """All of it in `make test-all`, else all but the commands that draw pictures once more."""
+    need(*re.findall(r"[^\s,]+", "".join(re.findall("<!-- needs: (.*) -->", page.read_text(encoding="utf-8")))))
     go_through(page, tmp_path, monkeypatch, lambda block: block["unrun"] or (block["slow"] and not WHOLE))
 
 

@@ -18,7 +18,7 @@ from generators.kernel import files_table
 from generators.laws import POINT
 from generators.sets import sets_table
 from generators.tables import fields_table, first_sentence, signature, table
-from starhold.algebra import quaternion, scalar, several, structured
+from starhold.algebra import cosines, elementary, quaternion, rotation, scalar, several, structured
 from starhold.algebra import vector as vectors
 from starhold.analysis import libration_point, rigid_body
 from starhold.analysis.pointing import MEANINGS
@@ -38,7 +38,7 @@ from starhold.parts.craft import Craft
 from starhold.parts.random import Dice
 from starhold.publications.paper import PAPERS
 from starhold.scenario.reading import builtin_names
-from starhold.scenario.requirement import CONE
+from starhold.scenario.requirement import BEGINS, CONE
 from starhold.studies.deciding import BOUNDS, MARGINS
 from starhold.studies.requirements import LOST
 
@@ -84,18 +84,24 @@ def attributes_table(cls: Any) -> str:
     return table(["keyword", "default", "meaning"], [*rows.values()])
 
 
-def functions_table(module: ModuleType) -> str:
-    """The functions that a module defines, and its classes with their methods."""
+FOR_FILES = ("from_angles", "to_angles")
+"""Functions of attitudes that laws cannot use."""
+
+
+def functions_table(*modules: ModuleType) -> str:
+    """The functions that modules define, and their classes with their methods."""
     rows: list[list[str]] = []
-    for name, item in vars(module).items():
-        if name.startswith("_") or getattr(item, "__module__", "") != module.__name__ or name in OPERATORS:
-            continue
-        if inspect.isfunction(item):
-            rows.append([f"`{name}({signature(item)})`", first_sentence(item)])
-        elif inspect.isclass(item):
-            own = [f for n, f in vars(item).items() if inspect.isfunction(f) and not n.startswith("_")]
-            methods = "; ".join(f"`.{f.__name__}({signature(f)})`: {first_sentence(f)}" for f in own)
-            rows.append([f"`{name}`", f"{first_sentence(item)} {methods}"])
+    for module in modules:
+        found = {n: x for n, x in vars(module).items() if getattr(x, "__module__", "") == module.__name__}
+        for name, item in found.items():
+            if name.startswith("_") or name in (*OPERATORS, *FOR_FILES):
+                continue
+            if inspect.isfunction(item):
+                rows.append([f"`{name}({signature(item)})`", first_sentence(item)])
+            elif inspect.isclass(item):
+                own = [f for n, f in vars(item).items() if inspect.isfunction(f) and not n.startswith("_")]
+                methods = "; ".join(f"`.{f.__name__}({signature(f)})`: {first_sentence(f)}" for f in own)
+                rows.append([f"`{name}`", f"{first_sentence(item)} {methods}"])
     return table(["function", "meaning"], rows)
 
 
@@ -132,7 +138,7 @@ def claims_table() -> str:
             continue
         found: dict[str, list[str]] = {"every claim": [], "pointing": [], "none": []}
         for name, part in parts(role).items():
-            tells = any(part.hook(hook) is not None for hook in ("bound", "error", "noise", "recursion"))
+            tells = any(part.hook(hook) is not None for hook in ("bound", "error", "noise", "perturbation", "recursion"))
             by = "every claim" if name in READ.get(role, ()) else "pointing" if tells else "none"
             found[by].append(f"`{name}`")
         rows.append([role, *(", ".join(names) for names in found.values())])
@@ -143,7 +149,7 @@ def required_table() -> str:
     """The metrics that requirements may bound, by the method that decides them."""
     flown = make_meter(1, 1.0, "axis", (1.0, 1.0), rigid_body.EXTRAS, wheels=True).units
     shown = {
-        "flight, campaign": [*flown, LOST, CONE],
+        "flight, campaign": [*flown, LOST, CONE, BEGINS],
         "proof": BOUNDS,
         "budget": [index.lower() for index in MEANINGS],
         "margin": MARGINS,
@@ -186,6 +192,8 @@ TABLES = {
     "measurement": lambda: fields_table(Measurement),
     "craft": lambda: fields_table(Craft),
     "scalar": lambda: functions_table(scalar),
+    "elementary": lambda: functions_table(elementary),
+    "attitudes": lambda: functions_table(rotation, cosines),
     "vector": lambda: functions_table(vectors),
     "quaternion": lambda: functions_table(quaternion),
     "structured": lambda: functions_table(structured),

@@ -7,7 +7,9 @@ from typing import Any
 
 from generators.tables import table
 from starhold.scenario.json_schema import json_schema
-from starhold.scenario.modes import Condition, ModeTable
+from starhold.scenario.modes import Condition, ModeTable, modes_model
+from starhold.scenario.monitors import MonitorTable
+from starhold.scenario.schema import LawTable
 
 HEAD = """# Scenario keys
 
@@ -49,7 +51,8 @@ def page() -> str:
             head = f"[[{key}]]" if many else f"[{key}]"
             lines += _table(head, name, known, seen)
     lines += ["## Modes", "", MODES, ""]
-    for head, model in (("[[law.mode]]", ModeTable), ("until, back", Condition)):
+    heads = {"[[law]]": modes_model(LawTable), "[[law.mode]]": ModeTable, "until, back": Condition}
+    for head, model in (heads | {"[[law.monitor]]": MonitorTable}).items():
         told = model.model_json_schema()
         lines += [f"### `{head}`", "", " ".join(told["description"].split()), "", *keys_of(told), ""]
     return "\n".join(lines)

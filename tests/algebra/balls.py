@@ -35,6 +35,10 @@ class Ball:
             return Ball(self.arb.sqrt())
         if entry.name == "select":
             return entry.plain(*values)
+        if "slopes" in entry.meanings:
+            first, *more = map(arb_of, values)
+            name = {"power": "__pow__", "cbrt": "root"}.get(entry.name, entry.name)
+            return Ball(getattr(arb, name)(first, *(more or [3] * (name == "root"))))
         if entry.name not in ("less", "less_equal"):
             # The remaining operations on numbers are those of arithmetic.
             return entry.meanings["symbolic"](*values)

@@ -17,6 +17,7 @@ from starhold.studies.budget import TOGETHER
 from starhold.studies.failures import _flown, _left
 from starhold.studies.pointing import ProvedPointing, prove_pointing
 from tests.running import starhold
+from tests.tiers import fewer
 
 HELD = {
     "name": "held",
@@ -71,7 +72,7 @@ def test_shares_are_what_the_bound_without_each_source_lacks(held):
     assert set(held.proof.shares) == {"gravity gradient", "attitude noise", "rate noise"}
     assert all(share > 0.0 for share in held.proof.shares.values())
     assert sum(held.proof.shares.values()) < 1.05 * held.proof.angle
-    for name, (key, none) in SWITCHES.items():
+    for name, (key, none) in [*SWITCHES.items()][: fewer(2)]:
         other = proved_of(sh.scenario(HELD).with_({key: none}))
         assert held.proof.angle - held.proof.shares[name] == pytest.approx(other.angle, rel=0.05)
 
@@ -94,6 +95,7 @@ def test_what_is_not_proved_is_told_with_the_reason():
     assert proved_of(unstable).angle is None
 
 
+@pytest.mark.slow
 def test_a_loss_of_a_wheel_is_flown_within_what_is_proved_after_it():
     """From the start of the file, which lies in the set, until long after the settling."""
     scenario = sh.scenario(WHEELED)

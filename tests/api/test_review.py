@@ -51,7 +51,6 @@ def test_a_review_tells_all_that_is_known_and_computes_each_once(monkeypatch, tm
     found = sh.review(scenario, folder=tmp_path / "pack")
     assert sorted(used) == sorted(["fly", "fly_campaign", "study", "linear_of", "certify"])
     monkeypatch.undo()
-    assert found.verdicts == sh.verify(scenario)
     page = (tmp_path / "pack" / "review.html").read_text(encoding="utf-8")
     text = (tmp_path / "pack" / "review.md").read_text(encoding="utf-8")
     read = Reader(page)

@@ -15,6 +15,7 @@ from starhold.errors import InputError
 from starhold.studies.body import study_of
 from starhold.studies.compare import build, record
 from tests.campaign.flown import ASKED, OVER, fly, own_flight, same, small, uniform
+from tests.tiers import leading
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +96,9 @@ def test_envelopes_are_those_of_recordings(result):
 
 
 # Each worker loads and compiles everything for itself.
-@pytest.mark.parametrize("options", [{"threads": 2}, {"law": "pd"}, {"law": "pd", "threads": None, "workers": 1}])
+@pytest.mark.parametrize(
+    "options", leading([{"threads": 2}, {"law": "pd"}, {"law": "pd", "threads": None, "workers": 1}], 2)
+)
 def test_who_flies_and_how_runs_are_cut_change_nothing(result, tmp_path, options, monkeypatch):
     if "law" in options and "workers" not in options:
         # Made run by run in place of at once, and in other blocks.

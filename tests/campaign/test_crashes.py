@@ -17,6 +17,7 @@ from starhold.campaign.store import Store
 from starhold.errors import InputError
 from tests.campaign.cluster import cluster, start
 from tests.campaign.toy import Toy, fly, manifest, missing
+from tests.tiers import leading
 
 
 @pytest.fixture
@@ -75,6 +76,7 @@ def test_blocks_of_a_killed_worker_are_flown_by_others(store, trail, expected, c
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_killed_worker_of_a_cluster_leaves_its_blocks_to_the_others(tmp_path, store, trail, expected):
     with cluster(tmp_path, workers=2) as (address, _, workers):
         killed, progress = kill_worker_once(trail)
@@ -82,6 +84,7 @@ def test_a_killed_worker_of_a_cluster_leaves_its_blocks_to_the_others(tmp_path, 
         assert killed[0] in [worker.pid for worker in workers]
 
 
+@pytest.mark.slow
 def test_without_any_worker_left_the_campaign_ends_and_can_be_resumed(tmp_path, store, trail, expected):
     with cluster(tmp_path) as (address, _, _):
         _, progress = kill_worker_once(trail)
@@ -109,7 +112,7 @@ def test_a_killed_scheduler_ends_the_campaign_which_can_be_resumed(tmp_path, sto
     assert resumed(store) == expected
 
 
-@pytest.mark.parametrize("engine", ["threads", "workers"])
+@pytest.mark.parametrize("engine", leading(["workers", "threads"]))
 def test_a_killed_driver_leaves_what_can_be_resumed(tmp_path, expected, engine):
     folder = tmp_path / "campaign"
     told = {"stdout": subprocess.PIPE, "start_new_session": True}

@@ -114,6 +114,18 @@ def test_correlated_normals_have_the_covariance_that_is_asked():
     assert stats.kstest(distance, stats.chi2(3).cdf).pvalue > 1e-3
 
 
+def test_a_symmetric_matrix_has_the_covariance_of_its_six_numbers():
+    tensor = [[2.0, 0.1, 0.0], [0.1, 3.0, 0.0], [0.0, 0.0, 4.0]]
+    covariance = (np.diag([4.0, 1.0, 2.0, 9.0, 3.0, 16.0]) + np.full((6, 6), 0.5)) * 1e-6
+    table = {"distribution": "correlated-normal", "covariance": covariance.tolist()}
+    found = one(NOISE.with_({"spacecraft.inertia": tensor}), spacecraft__inertia=table)
+    drawn = found.draw(random(6))
+    assert np.abs(np.cov(drawn) - covariance).max() < 4e-7
+    whole = found.arrays(dict(zip(found.columns, drawn, strict=True)))["spacecraft.inertia"]
+    assert (whole == whole.swapaxes(1, 2)).all()
+    assert whole.mean(axis=0) == pytest.approx(np.array(tensor), abs=2e-4)
+
+
 def test_rotations_are_uniform():
     found = made("rotations").draw(random(3))
     assert np.abs(np.linalg.norm(found, axis=0) - 1.0).max() < 1e-15

@@ -32,11 +32,6 @@ def reference(tmp_path):
     return fly(Store.create(tmp_path / "reference", manifest()))
 
 
-def test_workers_find_the_same_results_and_say_nothing(tmp_path, store, capfd):
-    assert fly(store, Workers(2)) == reference(tmp_path)
-    assert capfd.readouterr() == ("", "")
-
-
 def test_an_existing_cluster_finds_the_same_results(tmp_path, store, running):
     assert fly(store, Scheduler(running)) == reference(tmp_path)
 
@@ -84,9 +79,9 @@ def cut(chunk):
 
 
 FAULTS = {
+    "has another bit": r"other numbers in run 32 of pd \(flown.pd\)",
     "raises": r"process \d+ on .*: failed in runs 32 to 47 of pd: TypeError: no number; what was flown is kept",
     "ends": "a block ended all workers that tried it",
-    "has another bit": r"other numbers in run 32 of pd \(flown.pd\)",
     "is something else": r"process \d+ on .*: found something else than runs 32 to 47 of pd; allowed: what",
     "is of other runs": "something else than runs 32 to 47 of pd",
     "has other columns": "something else than runs 32 to 47 of pd",
@@ -94,7 +89,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("how", leading(FAULTS, 3))
+@pytest.mark.parametrize("how", leading(FAULTS))
 def test_a_worker_that_goes_wrong_is_told_in_one_line(store, how, monkeypatch):
     monkeypatch.setattr(engines, "_CHECKED", 1.0)
     with pytest.raises(InputError, match=FAULTS[how]) as caught:
@@ -116,7 +111,7 @@ def test_a_fault_of_this_process_is_no_user_error(store):
         fly(store, Threads(1), Toy(pause="long"))
 
 
-def test_workers_listen_to_nobody_else(store):
+def test_workers_find_the_same_results_say_nothing_and_listen_to_nobody_else(tmp_path, store, capfd):
     """Not to other users of the machine, nor by the network."""
     here, seen = psutil.Process(), set()
     before = set(here.children(recursive=True))
@@ -132,10 +127,12 @@ def test_workers_listen_to_nobody_else(store):
             assert not listening(process)
         assert listening(here) <= held
 
-    fly(store, Workers(2), progress=progress)
+    assert fly(store, Workers(2), progress=progress) == reference(tmp_path)
+    assert capfd.readouterr() == ("", "")
     assert len(seen) >= 2
 
 
+@pytest.mark.slow
 def test_workers_of_a_script_without_its_guard_leave_nothing(tmp_path):
     """Each worker reads the script too."""
     text = (

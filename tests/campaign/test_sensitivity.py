@@ -62,7 +62,7 @@ def test_sobol_indices_are_those_of_salib_where_it_crosses_points_both_ways():
     assert found.total == pytest.approx(np.mean([way["ST"] for way in ways], axis=0), abs=1e-12)
 
 
-@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("name", leading(KNOWN))
 @pytest.mark.parametrize("size", leading([64, 512]))
 def test_intervals_of_sobol_hold_the_truth_as_often_as_they_say(name, size):
     names, function, truth = KNOWN[name]
@@ -114,7 +114,7 @@ def test_morris_effects_are_those_of_salib():
         assert getattr(found, name) == pytest.approx(np.asarray(theirs[name]), abs=1e-12)
 
 
-@pytest.mark.parametrize(("trajectories", "least"), [(8, 0.88), (20, 0.93)])
+@pytest.mark.parametrize(("trajectories", "least"), leading([(8, 0.88), (20, 0.93)]))
 def test_intervals_of_morris_hold_the_truth_as_often_as_they_say(trajectories, least):
     """Of few trajectories nearly so, for their effects are far from normal; the truth is that of very many."""
 

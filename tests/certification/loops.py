@@ -99,9 +99,14 @@ def is_pointing(claim):
 
 
 def says(fitted):
-    """Whether a part tells a bound of its torque, or finite ones of its errors and no noise; or shows what is not read."""
+    """Whether a part tells a bound of its torque or acceleration, or finite ones of its errors and no noise; or shows what
+    is not read."""
     if fitted.part.role == "sensor" and not {*fitted.part.module.Reading._fields} & {*State._fields}:
         return True
     bound, error, noise = (fitted.part.hook(name) for name in ("bound", "error", "noise"))
     quiet = noise is None or noise(fitted.params, 0.1) == Noise()
-    return bound is not None or (quiet and error is not None and np.isfinite(error(fitted.params)).all())
+    return (
+        bound is not None
+        or fitted.part.hook("perturbation") is not None
+        or (quiet and error is not None and np.isfinite(error(fitted.params)).all())
+    )

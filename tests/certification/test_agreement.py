@@ -19,11 +19,11 @@ from tests.certification.hunt import contradicted, fault_in, random_scenario
 from tests.certification.loops import energy, free, loop_of, rotors
 from tests.tiers import leading
 
-FOUND = (12, 15, 30, 58, 66, 90, 91, 98, 118, 2489, 3239, 22, 71, 111, 196, 2102)
+FOUND = (12, 15, 30, 90, 58, 66, 91, 98, 118, 2489, 3239, 22, 71, 111, 196, 2102)
 """Seeds of scenarios that certifier, checker or flights once did not agree on, last those that take long."""
 
 
-@pytest.mark.parametrize("seed", leading(FOUND, 6))
+@pytest.mark.parametrize("seed", leading(FOUND, 4))
 def test_hunted_scenarios(seed, tmp_path):
     text = random_scenario(np.random.default_rng(seed), tmp_path)
     assert fault_in(text, tmp_path) == ""
@@ -50,7 +50,7 @@ def test_no_flight_contradicts_what_is_proved_of_flights_like_it(first, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("law", "wheels"), leading([("sliding", True), ("modal", False), ("sliding", False), ("modal", True)], 2)
+    ("law", "wheels"), leading([("sliding", True), ("modal", False), ("sliding", False), ("modal", True)])
 )
 def test_what_cannot_be_shown_is_undecided_for_the_checker_too(law, wheels, tmp_path):
     wanted = Wanted(rate=math.inf, slew_angle=1.0, inertia_tolerance=0.1)
@@ -105,8 +105,8 @@ THIN = ([1e-14, 1.0, 1.0], [1e-20, 1.0, 1.0], [1e-14, 1e-14, 1e-14], [1e3, 1e3, 
 @pytest.mark.parametrize(
     ("law", "number", "moments"),
     [
-        # Each body with the first gains of one law; what is left is slow.
-        pytest.param(law, number, moments, marks=pytest.mark.slow if number or place != turn else ())
+        # Two bodies with the first gains of one law; what is left is slow.
+        pytest.param(law, number, moments, marks=pytest.mark.slow if number or place != turn or turn < 2 else ())
         for turn, law in enumerate(("lqr", "modal", "wheel", "sliding", "pd", "lyapunov"))
         for number in range(1 if law == "modal" else len(catalogue()[law].examples()))
         for place, moments in enumerate(THIN)

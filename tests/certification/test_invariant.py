@@ -171,9 +171,9 @@ def test_v_that_has_no_least_value_at_the_equilibrium_leads_into_a_proved_set():
     ("V", "core", "rates"),
     leading(
         [
-            # V does not decrease up to its zero; the core holds less than that; the core does not attract.
-            (f"{ROUND} - 2", ROUND, ("-x + x**3", "-y")),
+            # The core holds less than the zero of V; V does not decrease up to it; the core does not attract.
             (f"{ROUND} - 1/2", f"({ROUND})*(1 - 4*({ROUND}))", ("-x", "-y")),
+            (f"{ROUND} - 2", ROUND, ("-x + x**3", "-y")),
             (f"{ROUND} - 1", ROUND, (f"-x*({ROUND} - 1/2)", f"-y*({ROUND} - 1/2)")),
         ]
     ),

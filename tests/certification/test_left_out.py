@@ -6,7 +6,7 @@ from functools import cache
 import pytest
 
 from starhold.certification.assumptions import ASSUMPTIONS
-from starhold.certification.certificate import write
+from starhold.certification.certificate import ORBIT, write
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.openness import envelope_of, named, pushes
 from starhold.certification.station import certify_station
@@ -41,7 +41,7 @@ def made(name):
     return textbook()[name], certified(name, disturbance=1e-4)
 
 
-@pytest.mark.parametrize("name", leading(LAWS, 3))
+@pytest.mark.parametrize("name", leading(LAWS))
 def test_every_part_is_named_in_every_claim_that_does_not_take_it_in(name):
     loop, certificate = made(name)
     assert any(claim.outcome == "proved" for claim in certificate.claims)
@@ -52,12 +52,13 @@ def test_every_part_is_named_in_every_claim_that_does_not_take_it_in(name):
     for fitted in found:
         composed = loop.with_parts(fitted)
         enters = says(fitted)
-        assert enters or pushes(composed, envelope_of(composed, 1.0, noisy=False)) == (0.0,) * 6, fitted.called
+        assert enters or pushes(composed, envelope_of(composed, 1.0, noisy=False)) == (0.0,) * 8, fitted.called
         claims = named(list(certificate.claims), composed, 1.0)
         for claim, plain in zip(claims, certificate.claims, strict=True):
             told = f"without:{fitted.part.role} {fitted.called}"
             assert (told in claim.assumptions) != (enters and is_pointing(claim)), (claim.kind, fitted.called)
-            assert [text for text in claim.assumptions if text != told] == list(plain.assumptions)
+            kept = [text for text in claim.assumptions if text != told and not text.startswith(ORBIT)]
+            assert kept == list(plain.assumptions)
 
 
 @pytest.mark.parametrize("name", ["pd-0", "sliding-1"])

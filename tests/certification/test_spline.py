@@ -24,6 +24,7 @@ from starhold.parts.craft import tensor
 from starhold.parts.targets.history import knots_of, tabulate
 from tests.certification.edits import checked
 from tests.certification.loops import FULL, energy, free, loop_of
+from tests.tiers import leading
 
 
 def history(seed, count, step, spread=0.4):
@@ -67,7 +68,7 @@ def test_signs_and_lengths_of_quaternions_do_not_matter(seed, factor):
     assert all(number(a) == pytest.approx(number(b), rel=1e-6) for a, b in pairs)
 
 
-@pytest.mark.parametrize("count", [2, 5])
+@pytest.mark.parametrize("count", leading([2, 5]))
 def test_a_history_of_one_attitude_is_a_target_at_rest(count, tmp_path):
     attitudes = np.tile([0.5, -0.5, 0.1, 0.7], (count, 1))
     times = np.arange(count) * 10.0
@@ -90,7 +91,7 @@ def followed(period):
     return loop, peaks(times, attitudes)
 
 
-@pytest.mark.parametrize("period", [0.05, 2.0])
+@pytest.mark.parametrize("period", leading([2.0, 0.05]))
 def test_claims_do_not_depend_on_how_often_the_law_looks(period, tmp_path):
     loop, found = followed(period)
     certificate = certify(loop, "pd")

@@ -9,6 +9,7 @@ from starhold.laws.catalogue import from_file
 HEAD = """
 from typing import Annotated, NamedTuple
 
+from starhold.algebra.elementary import tanh
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import absolute, clip, less, less_equal, opposite, side, sqrt, where
 from starhold.algebra.vector import add, apply, dot, norm, scale
@@ -40,6 +41,7 @@ def torque(measurement, gains, craft, memory):
 SIZES = {
     "a square root": "sqrt(1.0 + dot(measurement.rate, measurement.rate))",
     "a division by what varies": "1.0 / (1.5 + measurement.attitude[0])",
+    "a number's bits": "tanh(1.0 + dot(measurement.rate, measurement.rate))",
     "less_equal": "where(less_equal(measurement.attitude[0], 0.5), 1.0, 2.0)",
     "opposite": "where(opposite(less(measurement.attitude[0], 0.5)), 1.0, 2.0)",
 }

@@ -205,7 +205,7 @@ def test_a_run_is_flown_again_and_its_file_flies_the_same(flown, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     assert "The same bits as in the campaign." in done.stdout
     assert {"run.nc", "scenario.toml", "report.html", "summary.json"} <= {*listed(tmp_path / "seven")}
-    words = ("run", "seven/scenario.toml", "--law", "lyapunov", "--no-certify", "-o", "own")
+    words = ("run", "seven/scenario.toml", "--law", "lyapunov", "--no-certify", "--pictures", "none", "-o", "own")
     assert starhold(*words, cwd=tmp_path).returncode == 0
     (again, own) = (json.loads((tmp_path / name / "summary.json").read_text())["laws"] for name in ("seven", "own"))
     metrics = again["lyapunov"]

@@ -124,7 +124,6 @@ REFUSED = {
     "failures": [("l2-deficit", "libration: found a scenario of a libration-point; allowed: here one of a rigid-body")],
     "modal-roots": [
         ("l2-deficit", "libration: found a scenario of a libration-point; allowed: here one of a rigid-body"),
-        ("tight.toml", "transient.acceleration_limit: found 5 deg/s^2"),
         ("three-laws", "found no such table"),
         ("landing-limits --law own", "did you mean own-fit?"),
         ("no.toml", "no such file"),
@@ -155,7 +154,6 @@ REFUSED = {
 
 @pytest.mark.parametrize("command", REFUSED)
 def test_user_errors_are_one_line_and_exit_code_2(command, short):
-    (short / "tight.toml").write_text(builtin_text("landing-limits").replace('"50 deg/s^2"', '"5 deg/s^2"'))
     (short / "bad.toml").write_text(invariant_file(y="sinh(x)"))
     for words, said in REFUSED[command]:
         done = starhold(command, *(word.replace("_", " ") for word in words.split()), cwd=short)

@@ -40,7 +40,7 @@ def test_a_disk_that_is_full_is_told_in_one_line(folder, most):
 def test_results_are_whole_though_nobody_reads_the_output(folder):
     reading, writing = os.pipe()
     os.close(reading)
-    done = run("run", "short.toml", "--no-certify", "-o", "out", cwd=folder, stdout=writing)
+    done = run("run", "short.toml", "--no-certify", "--pictures", "page", "-o", "out", cwd=folder, stdout=writing)
     os.close(writing)
     assert (done.returncode, done.stderr) == (0, "")
     assert {"run.nc", "summary.json", "report.html"} <= set(os.listdir(folder / "out"))

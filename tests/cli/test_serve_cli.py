@@ -28,6 +28,11 @@ from tests.running import starhold
         (["--law", "none"], "none"),
         (["--host", "192.0.2.1"], "serve: --host, --port: found 192.0.2.1:5750"),
         (["--host", "no such host"], "serve: --host, --port: found no such host:5750"),
+        (["--udp", "--zmq"], "serve: --zmq: found --udp too; allowed: one of the two"),
+        (["--zmq", "--host", "no such host"], "serve: --host, --port: found no such host:5750"),
+        (["--serial", "/nowhere"], "serve: --serial, --baud: found /nowhere at 115200 baud, No such file"),
+        (["--serial", "/dev/null"], "serve: --serial, --baud: found /dev/null at 115200 baud, "),
+        (["--serial", "/dev/null", "--baud", "-1"], "serve: --serial, --baud: found /dev/null at -1 baud, "),
     ],
 )
 def test_a_wrong_argument_is_one_line(words, message, tmp_path):
@@ -44,6 +49,13 @@ def test_a_port_in_use_and_a_time_without_seconds(tmp_path):
     assert f"found 127.0.0.1:{port}" in done.stderr
     done = starhold("serve", "l2-circle", "--rate", "1", cwd=tmp_path, code=2)
     assert "a scenario whose time is in 1/Omega" in done.stderr
+
+
+@pytest.mark.parametrize(("option", "package"), [({"zmq": True}, "zmq"), ({"serial": "/dev/null"}, "serial")])
+def test_an_extra_that_is_missing_is_named(option, package, monkeypatch):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(sh.InputError, match=rf"^serve --{package}: need {package}: pip install 'starhold\[{package}\]'$"):
+        sh.serve("three-laws", **option)
 
 
 def test_results_that_are_there_are_kept(tmp_path):
@@ -82,9 +94,13 @@ def test_a_law_leaves_and_flies_in_a_process(tmp_path):
     starhold("export", "c", "three-laws", "--shell", "process", "--no-certify", "-o", "c", cwd=tmp_path, code=0)
     name = sh.load("three-laws").laws[0].name
     build_in(tmp_path, "gcc", *STRICT, "-o", "flight", *(f"c/{name}{end}.c" for end in ("", "_process")), "-lm")
-    done = starhold("run", "three-laws", "--law-process", "./flight", "-o", "out", cwd=tmp_path, code=0)
+    done = starhold(
+        "run", "three-laws", "--law-process", "./flight", "--pictures", "page", "-o", "out", cwd=tmp_path, code=0
+    )
     assert "The commands came from ./flight: nothing is proved of it." in done.stdout
-    assert "commands from ./flight" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "commands from ./flight" in page
+    assert f"What is flown again in this page is commanded by the file&#x27;s law {name}, not by ./flight." in page
     assert not (tmp_path / "out" / "certificate.json").exists()
     whole = sh.simulate("three-laws")
     with xr.open_dataset(tmp_path / "out" / "run.nc", engine="h5netcdf") as run:
@@ -93,10 +109,22 @@ def test_a_law_leaves_and_flies_in_a_process(tmp_path):
             assert np.array_equal(run[quantity], whole[quantity]), quantity
         assert run.attrs["law_process"] == "./flight"
         assert "law_program" not in run.attrs
-    assert sh.simulate("three-laws", process=str(tmp_path / "flight")).equals(whole)
+    brief = sh.load("three-laws").with_({"simulation.duration": 20.0})
+    assert sh.simulate(brief, process=str(tmp_path / "flight")).equals(sh.simulate(brief))
     done = starhold("run", "three-laws", "--law-process", "./none", "-o", "no", cwd=tmp_path, code=2)
     assert done.stderr.startswith("starhold: run: --law-process: found ./none; allowed: a program that runs")
     starhold("run", "three-laws", "--law-process", "./flight", "--check-step", cwd=tmp_path, code=2)
+    # Killed in the middle of a frame: ten thousand bytes are a hello, some commands, and a part of one.
+    (tmp_path / "cut.sh").write_text("./flight | { dd bs=1 count=10000 status=none; kill -9 $$; }\n")
+    done = starhold("run", "three-laws", "--law-process", "sh cut.sh", "-o", "cut", cwd=tmp_path, code=2)
+    step = int(re.search(r"sh cut\.sh, at step (\d+), a process that ended with -9", done.stderr)[1])
+    assert step == (10000 - 20) // 44
+    with xr.open_dataset(tmp_path / "cut" / "run.nc", engine="h5netcdf") as run:
+        assert np.array_equal(run["command"], whole["command"][:step])
+    assert not (tmp_path / "cut" / "summary.json").exists()
+    # A plant that is killed there.
+    done = subprocess.run([tmp_path / "flight"], input=b"SHLK\x01", capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (1, f"{name}_process: the plant is gone\n".encode())
 
 
 def test_the_header_is_written_for_flight_software_of_any_make(tmp_path):

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from tests.cli.short import SHORT
+from tests.tiers import leading
 
 COUNTED = """
 import json, sys
@@ -67,7 +68,7 @@ LATER = {"starhold.report.page", "starhold.report.painter", "starhold.report.fig
 
 @pytest.mark.parametrize(
     ("words", "loops", "recorded"),
-    [(("run", "short.toml", "--law", "lyapunov"), 1, 3), (("compare", "short.toml"), 3, 6)],
+    leading([(("run", "short.toml", "--law", "lyapunov"), 1, 3), (("compare", "short.toml"), 3, 6)]),
 )
 def test_the_table_waits_for_nothing_that_it_does_not_need(words, loops, recorded, tmp_path):
     (tmp_path / "short.toml").write_text(SHORT)
@@ -88,7 +89,7 @@ def test_the_table_waits_for_nothing_that_it_does_not_need(words, loops, recorde
     assert not {"matplotlib", "plotly", "sympy", "xarray", "pandas"} & packages(end["modules"])
 
 
-@pytest.mark.parametrize(("asked", "drawn"), [("none", []), ("page", ["report.html"])])
+@pytest.mark.parametrize(("asked", "drawn"), leading([("none", []), ("page", ["report.html"])]))
 def test_nothing_is_drawn_unasked(asked, drawn, tmp_path):
     (tmp_path / "short.toml").write_text(SHORT)
     (tmp_path / "out").mkdir()

@@ -35,6 +35,8 @@ LAWS = {
     "mission": ("cubesat-mission", "mission"),
 }
 """Names in C: built-in scenario and law."""
+CLOCKED = ("sun", "yaw-steering")
+"""Targets that depend on the time."""
 
 
 class Flown(NamedTuple):
@@ -108,6 +110,8 @@ def loop_of(name: str) -> Any:
         loop = loop.with_parts(tracker, gyro, fit("estimator", "complementary-filter", 0.1, 0.01))
         second = fit("sensor", "star-tracker", 2e-4, 3e-4, called="second")
         return replace(loop, parts=(*loop.parts, second)) if name == "two trackers" else loop
+    if name in CLOCKED:
+        return choices()["orbital target"].without("target").with_parts(fit("target", name))
     if name not in LAWS:
         return choices()[name]
     scenario = load(LAWS[name][0])
@@ -147,6 +151,14 @@ def build_in(folder: Any, *command: Any) -> None:
     """Run a compiler in a folder."""
     done = subprocess.run([*map(str, command)], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, (command, done.stderr[:2000])
+
+
+def built(folder: Any, code: Code, *flags: str, compiler: str = "gcc") -> str:
+    """A law as a program that commands, compiled."""
+    need(compiler)
+    put(folder, code, "process")
+    build_in(folder, compiler, *STRICT, *flags, "-o", "flight", f"{code.name}.c", f"{code.name}_process.c", "-lm")
+    return str(Path(folder, "flight"))
 
 
 def read(code: Code, inputs: Any) -> Any:

@@ -28,8 +28,10 @@ MADE = [
     "target from a table",
     "hysteresis, axis",
     "orbital target",
+    "every function, the time",
     "pid, example 0, noise",
     "super-twisting, example 0, noise",
+    "modes that watch",
 ]
 """Loops with a memory, or with an input of their own."""
 

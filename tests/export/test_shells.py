@@ -1,7 +1,10 @@
 """Shells over the same C: a module of Basilisk flies the same loop there, an FMU gives the same commands."""
 
 import importlib.util
+import io
 import math
+import re
+import zipfile
 
 import numpy as np
 import pytest
@@ -106,3 +109,16 @@ def test_fmu_gives_the_same_bits(name, tmp_path):
         assert np.array_equal(found, case.command, equal_nan=True)
     own.terminate()
     own.freeInstance()
+
+
+def test_shells_of_a_law_that_reads_the_time():
+    code = code_of("every function, the time")
+    header, source = (shell_files(code, ["process"])[name] for name in ("starhold_link.h", f"{code.name}_process.c"))
+    place = re.search(r"STARHOLD_AT_MEASUREMENT_TIME = (\d+)", header)[1]
+    assert re.search(rf"places\[\d+\] = \{{[^}}]*\b{place}\b", source)
+    with zipfile.ZipFile(io.BytesIO(shell_files(code, ["fmu"])[f"{code.name}.fmu"])) as archive:
+        names = re.findall(r'<Float64 name="([^"]+)"', archive.read("modelDescription.xml").decode())
+    assert len(names) == len(set(names))
+    assert {"time", "time_since_start"} < set(names)
+    with pytest.raises(InputError, match="found the input time; allowed: inputs that messages tell of"):
+        shell_files(code, ["basilisk"])

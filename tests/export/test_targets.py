@@ -8,6 +8,7 @@ import pytest
 
 from starhold.export.folder import make_files
 from tests.export.flown import build_in, code_of, need
+from tests.tiers import leading
 
 LINUX = {
     "ARMv7": ("arm-linux-gnueabihf-gcc", "qemu-arm"),
@@ -58,7 +59,7 @@ def put(name: str, folder: Path) -> tuple[str, ...]:
     return tuple(file for file in files if file.endswith(".c"))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", leading(NAMES))
 @pytest.mark.parametrize("target", LINUX)
 def test_linux(target, name, tmp_path):
     compiler, emulator = LINUX[target]
@@ -71,7 +72,7 @@ def test_linux(target, name, tmp_path):
         assert "of 192 steps give the bits" in done.stdout
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", leading(NAMES))
 def test_leon3(name, tmp_path):
     """SPARC V8 without a library: main's value alone tells; a vector with one bit changed must fail."""
     compiler = "sparc64-linux-gnu-gcc"

@@ -15,7 +15,7 @@ from starhold.kernel.numbers import WORK, Account
 from starhold.kernel.sentences import ASSUMPTIONS
 from tests.kernel.certificates import LAWS, contents, found, text
 from tests.kernel.oracle import Oracle, number
-from tests.tiers import leading
+from tests.tiers import fewer, leading
 
 
 @pytest.fixture(scope="session")
@@ -56,7 +56,7 @@ def test_strict_functions_and_limits_of_the_norm_are_found():
     norm = [c for c in contents("by hand", "norm")["claims"] if c["theorem"] != "points"]
     (limited,) = (c for c in norm if "limit.norm" in c["numbers"])
     assert 0.98 * 0.006 < number(limited["numbers"]["level"]) < 0.0063
-    for law in ("strict", "norm", "near", "jumping", "clipped"):
+    for law in ("strict", "norm", "near", "jumping", "clipped")[: fewer(5, 2)]:
         content = contents("by hand", law)
         assert len(check(text(content))) == len(content["claims"])
         assert all(Oracle(content, claim).holds() for claim in content["claims"])

@@ -13,6 +13,7 @@ from starhold.parts.craft import Craft
 from starhold.trace.straight_line import straight_line
 from tests.kernel.certificates import failing
 from tests.kernel.oracle import Oracle
+from tests.tiers import fewer
 
 PLANT = Craft(FULL, FULL, 1.0, 1.0)
 C, K = 0.4, 0.1
@@ -191,7 +192,7 @@ def test_a_law_that_clips_falls_in_every_case():
     for beyond, failed in ((0.0, set()), (0.5, set()), (-2.0, {"V is non-increasing"})):
         claim, programs = case(clipped(beyond))
         assert failing(claim, programs) == failed
-        oracle = [Oracle({"programs": programs}, claim, seed).holds() for seed in range(3)]
+        oracle = [Oracle({"programs": programs}, claim, seed).holds() for seed in range(3 if failed else fewer(3))]
         assert all(oracle) if not failed else not all(oracle)
     with pytest.raises(RefusedError, match="the law's torque jumps"):
         failing(*case(halved))

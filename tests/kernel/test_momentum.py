@@ -14,12 +14,15 @@ from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
 from starhold.scenario.building import build
 from tests.kernel.flights import Around, Surroundings, along
 from tests.kernel.oracle import Oracle, run
+from tests.tiers import leading
 
 LANES = 2000
+FLOWN = [
+    (*loop, share) for share in (1e-3, 1e-5, 0.03) for loop in (("cubesat-nadir", "lyapunov"), ("wheels-orbital", "wheel"))
+]
 
 
-@pytest.mark.parametrize(("scenario", "law"), [("cubesat-nadir", "lyapunov"), ("wheels-orbital", "wheel")])
-@pytest.mark.parametrize("share", [1e-5, 1e-3, 0.03])
+@pytest.mark.parametrize(("scenario", "law", "share"), leading(FLOWN, 2))
 def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, law, share):
     Account.left = 10**12
     given = sh.load(scenario)
@@ -76,3 +79,27 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
             beside = sum(float(one) * np.linalg.norm(floats(M), 2) for M, one in others)
             assert np.linalg.norm(left[3:] - floats(B)[3:] @ v, axis=0).max() <= beside
     assert grown > 0.1
+
+
+def test_a_target_whose_motion_is_misread_moves_the_torque_by_no_more_than_its_bound():
+    """What the target is read to turn more, the error is read to turn less, as the body's own rate is read as it is."""
+    Account.left = 10**12
+    given = sh.load("cubesat-nadir")
+    loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
+    wrong = pushes(loop.loop, loop.known.envelope(False))._replace(attitude=0.0, rate=0.0)
+    wrong = wrong._replace(target_rate=1e-4, target_acceleration=3e-4)
+    own = Pushed(loop, wrong)
+    _, V, held, _ = own.leans[0]
+    oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.told), 7)
+    region = held.region(held.s / 1000)
+    bound, rng, far = float(held.misread(region)[0]), oracle.rng, 0.0
+    states = np.linalg.cholesky(floats(region.X)) @ along(rng.normal(size=(6, 300)))
+    for x in states.T:
+        q, w = np.array([np.sqrt(1.0 - x[3:] @ x[3:]), *x[3:]]), x[:3]
+        e, r, a, H = oracle.environment()
+        turn, more = along(rng.normal(size=(3, 2))).T * [[wrong.target_rate], [wrong.target_acceleration]]
+        inputs = oracle.inputs(q, w, e, r, a, H)[0]
+        misread = inputs | oracle.inputs(q, w - turn, e, r + turn, a + more, H)[0]
+        true, seen = (np.array(run(oracle.programs["law"], one)) for one in (inputs, misread))
+        far = max(far, float(np.linalg.norm(seen - true)))
+    assert 0.3 * bound < far <= bound

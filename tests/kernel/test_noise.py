@@ -144,7 +144,9 @@ def test_a_flight_keeps_the_radii_once_the_filter_has_settled(nadir):
 def test_an_orbit_has_so_many_samples(nadir):
     radius = np.linalg.norm(nadir.start.position)
     orbit = 2.0 * math.pi * math.sqrt(radius**3 / nadir.craft.gravity)
-    assert samples_of(nadir) == math.ceil(orbit / nadir.period)
+    assert samples_of(nadir.without("oblateness")) == math.ceil(orbit / nadir.period)
+    # Oblateness may make an orbit longer.
+    assert 1.0 < samples_of(nadir) * nadir.period / orbit < 1.02
     assert samples_of(nadir.without("two-body")) == 3600.0 / nadir.period + 1
 
 

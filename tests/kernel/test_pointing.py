@@ -33,7 +33,7 @@ def numbers(content):
     return {name: number(x) for name, x in content["claims"][0]["numbers"].items()}
 
 
-@pytest.mark.parametrize("name", leading(PROVED, 3))
+@pytest.mark.parametrize("name", leading(PROVED, 2))
 def test_the_loop_is_proved_to_point(name):
     content = contents("flying", name)
     begun = time.process_time()
@@ -77,7 +77,7 @@ def after_a_period(fleet, q, w, unit, per_rate=0.0):
 
 
 @pytest.mark.parametrize(
-    ("name", "power"), leading([("moving", 1), ("skew", 3), ("moving", 0.5), ("moving", 3), ("skew", 0.5), ("skew", 1)], 2)
+    ("name", "power"), leading([("moving", 1), ("skew", 3), ("moving", 0.5), ("moving", 3), ("skew", 0.5), ("skew", 1)])
 )
 def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     oracle = Oracle(contents("flying", name), contents("flying", name)["claims"][0])
@@ -210,19 +210,31 @@ FALSE = {
 }
 
 
-@pytest.mark.parametrize("hypothesis", FALSE)
-def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis):
-    name = "calm" if hypothesis == "entry" else "cubesat"
-    content = contents("flying", name)
+def falsified(hypothesis):
+    """A certificate with a claim that is false by this hypothesis alone."""
+    content = contents("flying", "calm" if hypothesis == "entry" else "cubesat")
     (claim,) = content["claims"]
     exact = {key: number(x) for key, x in claim["numbers"].items()}
     FALSE[hypothesis](exact, claim["evidence"])
     claim["numbers"] = {key: str(Fraction(x)) for key, x in exact.items()}
-    assert failing(claim, content["programs"]) == {hypothesis}
-    assert not all(Oracle(content, claim, seed).holds() for seed in range(3))
+    return content
 
 
-@pytest.mark.parametrize("name", leading(["cubesat", "calm"]))
+@pytest.mark.parametrize("hypothesis", FALSE)
+def test_only_this_hypothesis_fails(hypothesis):
+    content = falsified(hypothesis)
+    assert failing(content["claims"][0], content["programs"]) == {hypothesis}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hypothesis", FALSE)
+def test_the_claim_is_false(hypothesis):
+    content = falsified(hypothesis)
+    assert not all(Oracle(content, content["claims"][0], seed).holds() for seed in range(3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cubesat", "calm"])
 def test_the_claims_that_were_changed_hold(name):
     content = contents("flying", name)
     assert Oracle(content, content["claims"][0]).holds()

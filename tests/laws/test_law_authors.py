@@ -33,7 +33,7 @@ def folder(tmp_path):
 
 
 def test_its_laws_show_every_keyword_of_a_gain(folder):
-    assert set(FILES) == {"my_law.py", "filtered_pid.py", "hold_point.py"}
+    assert set(FILES) == {"my_law.py", "filtered_pid.py", "hold_point.py", "finite_time.py", "soft_start.py"}
     gains = [item.gain for name in FILES for item in gains_of(find_law(str(folder / name)).gains)]
     for keyword in dataclass_fields(Gain):
         # Rows of a file, and what a whole flight shares, are for other parts, such as `torque-table`.
@@ -52,9 +52,11 @@ def test_its_laws_fly_from_scenarios_beside_them(folder):
     laws = tomllib.loads(table)["law"]
     laws.append({"file": "filtered_pid.py", "form": "bandwidth", "bandwidth": 0.05, "name": "designed"})
     laws.append({"file": "filtered_pid.py", "k_rate": 0.3, "k_attitude": 0.02, "k_integral": 1e-4, "gyroscopic": "kept"})
+    laws.append({"file": "finite_time.py", "k_rate": "0.1 N m s^0.5", "k_attitude": 0.01})
+    laws.append({"file": "soft_start.py", "k_rate": 0.02, "rate": 0.08, "k_attitude": 0.02, "time": 60.0})
     scenario = sh.scenario(BODY | {"law": laws}, folder=folder)
     flights = sh.compare(scenario)
-    assert [flight.name for flight in flights] == ["my-law", "designed", "filtered-pid"]
+    assert [flight.name for flight in flights] == ["my-law", "designed", "filtered-pid", "finite-time", "soft-start"]
     assert all(flight.metrics["settling_time"] is not None for flight in flights)
     assert flights[0].certificates[0].claim("convergence").outcome == "proved"
     (design,) = sh.design(scenario)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import starhold as sh
-from starhold.link.plant import Ending, Missing, Plant, Rules, summary
+from starhold.link.plant import Ending, Missing, Plant, Rules, status, summary
 from starhold.link.protocol import Decoder, Fault, Kind, Message, binary, line
 from starhold.simulation.stepper import Stepper
 from tests.export.flown import loop_of
+from tests.link.clients import mutated
 from tests.tiers import WHOLE
 
 PUSH = (1e-3, 0.0, 0.0)
@@ -151,6 +152,26 @@ def test_a_late_plant_says_how_late_and_keeps_the_schedule():
     assert desk.plant.due == pytest.approx(2 * period)
 
 
+def test_late_wakings_do_not_add_up():
+    """Ten minutes at 10 Hz: each period begins late by some chance, and the last no later than that after its time."""
+    rng, desk, periods = np.random.default_rng(5), Desk(steps=6000, rate=1.0), 6000
+    period, plant = desk.plant.flight.loop.period, desk.plant
+    late, given = rng.exponential(0.005, periods), rng.random(periods) < 0.9
+    for k in range(periods):
+        if given[k]:
+            desk.now = k * period + 0.06
+            desk.tell(Kind.COMMAND, k, PUSH)
+        assert plant.due == pytest.approx((k + 1) * period, rel=1e-12)
+        desk.now = plant.due + late[k]
+        plant.tick()
+    assert plant.flight.steps == periods
+    assert plant.lateness == pytest.approx(late, abs=1e-9)
+    assert plant.behind == max(plant.lateness)
+    assert (plant.commanded, plant.missed) == (given.sum(), periods - given.sum())
+    assert desk.now - periods * period == pytest.approx(late[-1])
+    assert status(plant).startswith("Step 6000/6000: latency ")
+
+
 def test_answers_have_the_form_of_the_question():
     desk = Desk(text=True)
     assert desk.sent[1].numbers == pytest.approx(desk.tell(Kind.HELLO)[1].numbers)
@@ -162,34 +183,6 @@ def test_answers_have_the_form_of_the_question():
     assert replies[-1].startswith(b"SHLK")
     desk.plant.datagram(line(Message(Kind.HELLO)).strip())
     assert replies[-1].startswith(b"{")
-
-
-def mutated(rng, step):
-    """Bytes that hold no valid command for a step: random ones, and messages that were cut, changed, or are for another."""
-    good = Message(Kind.COMMAND, step, tuple(rng.normal(size=3)))
-    write = (binary, line)[rng.integers(2)]
-    kind = rng.integers(6)
-    if kind == 0:
-        return rng.bytes(int(rng.integers(1, 200)))
-    if kind == 1:
-        numbers = list(good.numbers)
-        numbers[rng.integers(3)] = rng.choice([np.nan, np.inf, -np.inf])
-        return write(good._replace(numbers=numbers))
-    if kind == 2:
-        return write(good._replace(step=int(rng.choice([step + 1, step + 2, 2**32 - 1]))))
-    if kind == 3:
-        return write(good._replace(numbers=good.numbers[: rng.integers(3)]))
-    text = bytearray(write(good))
-    if kind == 4:
-        return bytes(text[: rng.integers(1, len(text) - 1)])
-    if write is line:
-        words = [b"[" * 3000, b"9" * 5000, b'"step": 1e99', b'"step": true', b"null", b'{"kind": 3}', b'"\\ud800"', b"\xff{"]
-        at = int(rng.integers(1, len(text) - 2))
-        text[at:at] = words[rng.integers(len(words))] + b"{"
-        return bytes(text)
-    at = int(rng.integers(len(text)))
-    text[at] ^= int(rng.integers(1, 256))
-    return bytes(text)
 
 
 @pytest.mark.parametrize("datagram", [False, True])

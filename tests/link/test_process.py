@@ -1,7 +1,6 @@
 """A law in a child process flies the bits of the simulation, and one that misbehaves ends the flight in a line."""
 
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -10,22 +9,15 @@ from starhold.link import process
 from starhold.link.process import fly_by_process
 from starhold.loop.kernels import numbers_of
 from starhold.simulation.lane import fly
-from tests.export.flown import STRICT, build_in, code_of, loop_of, need, put, same
+from tests.export.flown import built, code_of, loop_of, same
 from tests.tiers import fewer, leading
 
 STEPS = 400
-LOOPS = ["lyapunov", "estimator", "wheel", "target from a table", "estimator on [sensor]", "l2", "mission", "b_dot", "mpc"]
+LOOPS = ["lyapunov", "estimator", "sun", "yaw-steering", "wheel", "target from a table", "estimator on [sensor]", "l2",
+         "mission", "b_dot", "mpc"]  # fmt: skip
 
 
-def built(folder, code, *flags):
-    """A law as a program, compiled."""
-    need("gcc")
-    put(folder, code, "process")
-    build_in(folder, "gcc", *STRICT, *flags, "-o", "flight", f"{code.name}.c", f"{code.name}_process.c", "-lm")
-    return str(Path(folder, "flight"))
-
-
-@pytest.mark.parametrize("name", leading(LOOPS, 6))
+@pytest.mark.parametrize("name", leading(LOOPS, 8))
 def test_exported_laws_fly_the_bits_of_the_simulation(name, tmp_path):
     steps = fewer(STEPS, 2) if name != "mpc" else 12
     samples, carry = fly_by_process(built(tmp_path, code_of(name), "-O2"), loop_of(name), steps)
@@ -55,7 +47,10 @@ def program(folder, text):
     [
         ("sys.exit(3)", "at step 0, a process that ended with 3; allowed: a command for every step"),
         ("tell(Kind.COMMAND, 0, (0.0, 0.0, float('nan'))); time.sleep(60)", "at step 0, a message that is not finite"),
-        ("tell(Kind.COMMAND, 0, (0.0, 0.0, 0.0)); tell(Kind.COMMAND, 5, (0.0,) * 3); time.sleep(60)", "out of order"),
+        (
+            "tell(Kind.COMMAND, 0, (0.0, 0.0, 0.0)); tell(Kind.COMMAND, 5, (0.0,) * 3); time.sleep(60)",
+            "at step 1, a message that is out of order",
+        ),
         ("os.write(1, b'hello'); time.sleep(60)", "at step 0, a message that is malformed"),
         ("tell(Kind.STOP); time.sleep(60)", "a process that stops the flight"),
         ("os.close(1); time.sleep(1)", "a process that ended with 0"),

@@ -1,16 +1,21 @@
-"""A plant on the loopback address: lockstep has the bits of a simulation, real time keeps to the clock, and nothing that is
-not valid moves it."""
+"""A plant on the loopback address or a serial line: lockstep has the bits of a simulation, real time keeps to the clock, and
+nothing that is not valid moves it."""
 
 import json
+import socket
+import subprocess
 import time
 
 import numpy as np
 import pytest
 
 import starhold as sh
+from starhold.link import server
 from starhold.link.plant import Ending, summary
 from starhold.link.protocol import Fault, Kind, Message, binary
-from tests.link.clients import Client, served
+from starhold.report.timing import write_timing
+from tests.export.flown import built, code_of
+from tests.link.clients import OVER, Client, Dealer, connected, mutated, served
 from tests.tiers import fewer
 
 STEPS = 60
@@ -29,11 +34,12 @@ def assert_same(run, other):
         assert np.array_equal(run[name], other[name], equal_nan=True), name
 
 
-@pytest.mark.parametrize(("udp", "text"), [(False, False), (False, True), (True, False), (True, True)])
-def test_lockstep_has_the_bits_of_a_simulation(udp, text):
+@pytest.mark.parametrize("text", [False, True])
+@pytest.mark.parametrize("over", OVER)
+def test_lockstep_has_the_bits_of_a_simulation(over, text):
     scenario = short("three-laws-noise")
     whole = sh.simulate(scenario)
-    with served(scenario, udp=udp) as (address, results):
+    with served(scenario, over=over) as (address, results):
         client = Client(address, text)
         hello, readings = client.greet()
         about = json.loads(hello.text)
@@ -55,10 +61,30 @@ def test_lockstep_has_the_bits_of_a_simulation(udp, text):
     assert result.lines[0].startswith(f"Ended at step {STEPS} of {STEPS} (")
 
 
-def test_real_time_keeps_to_the_clock_and_counts_what_is_missing():
+@pytest.mark.parametrize("over", ["tcp", "serial"])
+def test_exported_c_flies_an_orbit_with_the_bits_of_a_simulation(over, tmp_path):
+    """With an estimator and modes: the law as a program whose standard input and output are the line."""
+    scenario = short("cubesat-mission", fewer(11_400, 60))
+    flight = built(tmp_path, code_of("mission"), "-O2")
+    with served(scenario, over=over) as (address, results):
+        link = connected(address)
+        end = link.end if over == "serial" else link.fileno()
+        if over == "tcp":
+            link.settimeout(None)
+        assert subprocess.run([flight], stdin=end, stdout=end, check=False).returncode == 0
+        link.close()
+    result = results.get()
+    assert result.ending is Ending.FLOWN
+    assert not result.plant.faults
+    assert_same(sh.simulate(scenario), result.recording.dataset())
+
+
+def test_real_time_keeps_to_the_clock_and_counts_what_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setattr(server, "SECOND", 0.2)
+    looks = []
     scenario = short("three-laws", 20)
     period = scenario.table.simulation.control_period / 2.0
-    with served(scenario, rate=2.0, missing="zero") as (address, results):
+    with served(scenario, rate=2.0, missing="zero", watch=looks.append) as (address, results):
         client, begun = Client(address), time.monotonic()
         client.greet()
         # A command for the first period and one that is much too late; none for the others.
@@ -70,7 +96,14 @@ def test_real_time_keeps_to_the_clock_and_counts_what_is_missing():
         assert client.until(Kind.STOP).text == Ending.FLOWN
         spent = time.monotonic() - begun
         client.close()
-    plant = results.get().plant
+    result = results.get()
+    plant = result.plant
+    # Each fourth period, or later.
+    assert 2 <= len(looks) <= 6
+    assert write_timing(result.timing, tmp_path).read_bytes().startswith(b"\x89PNG")
+    kept = json.loads((tmp_path / "timing.json").read_text())
+    assert (kept["period"], kept["periods"], kept["missed"]) == (period, 21, plant.missed)
+    assert (kept["latencies"], kept["lateness"]) == (plant.latencies, plant.lateness)
     assert spent >= 20.5 * period
     assert plant.missed + plant.commanded == 21
     assert plant.commanded <= 1
@@ -80,9 +113,10 @@ def test_real_time_keeps_to_the_clock_and_counts_what_is_missing():
     assert f"Real time at rate 2: {plant.missed} missed periods (zero)" in "\n".join(summary(plant))
 
 
-def test_a_killed_peer_ends_the_flight_and_its_recording_is_kept(tmp_path):
+@pytest.mark.parametrize("over", ["tcp", "zmq", "serial"])
+def test_a_killed_peer_ends_the_flight_and_its_recording_is_kept(over):
     scenario = short("three-laws", 50)
-    with served(scenario) as (address, results):
+    with served(scenario, over=over) as (address, results):
         client = Client(address)
         client.greet()
         for step in range(7):
@@ -92,8 +126,27 @@ def test_a_killed_peer_ends_the_flight_and_its_recording_is_kept(tmp_path):
         client.close()
     result = results.get()
     assert result.ending is Ending.GONE
-    assert result.plant.faults == {Fault.MALFORMED: 1}
+    # What a serial line has not delivered is lost with it.
+    assert result.plant.faults == {Fault.MALFORMED: 1} or (over == "serial" and not result.plant.faults)
     assert len(result.recording["time"]) == 7
+
+
+def test_a_request_has_one_reply():
+    with served(short("three-laws", 20), over="zmq") as (address, results):
+        with socket.create_connection(("127.0.0.1", int(address.rsplit(":", 1)[1]))) as noise:
+            # No peer of ZeroMQ.
+            noise.sendall(np.random.default_rng(2).bytes(1000))
+        client = Client(address, link=Dealer(address.split()[1], "REQ"))
+        readings = client.greet()[1]
+        client.send(Kind.COMMAND, 7, (0.0, 0.0, 0.0))
+        assert client.receive().text == Fault.ORDER
+        for step in range(21):
+            assert readings.step == step
+            client.send(Kind.COMMAND, step, (1e-3, 0.0, 0.0))
+            readings = client.receive()
+        assert (readings.kind, readings.text) == (Kind.STOP, Ending.FLOWN)
+        client.close()
+    assert results.get().plant.faults[Fault.ORDER] == 1
 
 
 def test_a_second_peer_is_left_alone():
@@ -114,8 +167,9 @@ def test_a_second_peer_is_left_alone():
     assert result.plant.faults[Fault.STRANGER] == 1
 
 
-def test_only_the_first_address_commands_by_datagrams():
-    with served(short("three-laws", 3), udp=True) as (address, results):
+@pytest.mark.parametrize("over", ["udp", "zmq"])
+def test_only_the_first_address_commands_by_datagrams(over):
+    with served(short("three-laws", 3), over=over) as (address, results):
         client, other = Client(address), Client(address, text=True)
         client.greet()
         other.send(Kind.STOP)
@@ -131,17 +185,22 @@ def test_only_the_first_address_commands_by_datagrams():
     assert plant.faults == {Fault.STRANGER: 2, Fault.MALFORMED: 1}
 
 
-@pytest.mark.parametrize("udp", [False, True])
-def test_noise_on_the_line_neither_moves_nor_stops_the_plant(udp):
-    rng, count = np.random.default_rng(7), fewer(10_000, 30)
-    with served(short("three-laws"), udp=udp) as (address, results):
+@pytest.mark.parametrize("over", OVER)
+def test_noise_on_the_line_neither_moves_nor_stops_the_plant(over):
+    rng, count = np.random.default_rng(7), fewer(10_000, 100)
+    with served(short("three-laws"), over=over) as (address, results):
         client = Client(address)
         client.greet()
         for k in range(count):
-            client.socket.sendall(rng.bytes(int(rng.integers(1, 100))))
+            client.socket.sendall(mutated(rng, 0))
             if k % 20 == 19:
+                for _ in range(2 if over in ("tcp", "serial") else 0):
+                    # A stream may take them for the rest of what was cut.
+                    client.send(Kind.HELLO)
                 # The plant goes on: it answers, at the step where it was.
                 assert client.greet()[1].step == 0
+        for _ in range(2):
+            client.send(Kind.HELLO)
         client.send(Kind.COMMAND, 0, (0.0, 0.0, 0.0))
         while client.until(Kind.READINGS).step != 1:
             pass

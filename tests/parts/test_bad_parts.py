@@ -1,12 +1,13 @@
 """What is wrong with the parts of a scenario is told in one line, with exit code 2."""
 
 import tracemalloc
+from pathlib import Path
 
 import pytest
 
 from starhold import files
 from starhold.laws.catalogue import catalogue
-from starhold.parts.catalogue import read_module
+from starhold.parts.catalogue import find, read_module
 from starhold.parts.contract import Parameter
 from starhold.scenario.writing import law_table
 from tests.parts.files import BODY, EFFECTOR, PARTS, PD, POINT, TARGET, part
@@ -290,3 +291,11 @@ def test_a_link_that_hides_a_file_of_python_is_not_run(tmp_path):
     (tmp_path / "table.csv").symlink_to("own.py")
     with pytest.raises(ValueError, match=r"ends in \.py"):
         read_module(tmp_path / "table.csv")
+
+
+def test_an_equation_with_other_arguments_than_its_role_has(tmp_path):
+    source = Path(find("environment", "constant-torque").module.__file__).read_text()
+    assert "def bound(params: Params, envelope: Envelope)" in source
+    (tmp_path / "mine.py").write_text(source.replace("params: Params, envelope: Envelope", "params: Params"))
+    stderr = told(tmp_path, BODY + part(MINE + "torque = [0.0, 0.0, 1e-6]\n") + PD)
+    assert "mine.py: bound(params) must be bound(params, envelope)" in stderr

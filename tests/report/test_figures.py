@@ -62,7 +62,6 @@ def test_odd_names_are_shown_as_they_stand(tmp_path: Path) -> None:
 @pytest.mark.parametrize("extra", leading([flown.lost, flown.still]))
 def test_lost_and_resting_runs_are_drawn(tmp_path: Path, extra: object) -> None:
     assert callable(extra)
-    assert len(draw([*flown.flights(), extra()], tmp_path, flown.scenario())) == len(NAMES)
     assert len(draw([extra()], tmp_path, flown.scenario())) == len(NAMES)
 
 

@@ -23,6 +23,7 @@ from starhold.studies.questions import UNASKED
 from starhold.studies.reflight import COMPUTED, FAULTS, reflight
 from tests.browser import Browser
 from tests.report import flown
+from tests.simulation.loops import FUNCTIONS
 from tests.tiers import leading
 from tests.trace.machines import need
 
@@ -254,6 +255,7 @@ LOOPS = {
     "wheels": ("wheels-orbital", "12 s"),
     "landing": ("landing", "20 s", "fit"),
     "noise": ("three-laws-noise", "12 s", "lyapunov"),
+    "every function, the time": (FUNCTIONS, "50 s"),
     "matrix inertia": ("geostationary", "100 s", "pd", "matrix-pd"),
 }
 

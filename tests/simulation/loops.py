@@ -1,6 +1,7 @@
 """Closed loops of every make: built-in scenarios, and one for each choice that a loop has."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,10 @@ from starhold.parts.targets.history import tabulate
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from tests.making import ORBITAL, aimed, built, noise, on_wheels, point_loop
+from tests.missions import WATCHFUL
 
+FUNCTIONS = str(Path(__file__).parent / "every_function.toml")
+"""A scenario whose law uses every elementary function and the time, and whose inertia changes."""
 NOISE = noise(1e-4, 1e-3, 1e-4)
 FAULT = """
 [[fault]]
@@ -58,12 +62,15 @@ def choices() -> dict[str, Any]:
         f"{cover}, {kind}": replace(plain, sign_policy=cover, limit=kind)
         for cover, kind in zip(SIGN_POLICIES, KINDS, strict=True)
     }
+    timed = load(FUNCTIONS)
+    found["every function, the time"] = build(timed, timed.laws[0])
     found["orbital target"] = plain.without("target").with_parts(ORBITAL)
     times = np.arange(12) * 10.0
     table = tabulate(times, np.array(random_quaternions(12)), np.arange(1101) * plain.period)
     found["target from a table"] = plain.without("target").with_parts(aimed(table), *NOISE)
     found["lag"] = replace(plain.with_parts(fit("actuator", "lag", 0.3)), substeps=2)
     found["rate limit"] = replace(plain.with_parts(fit("actuator", "rate-limit", 0.02)), substeps=2, seed=-5)
+    found["modes that watch"] = built(parse(WATCHFUL, "here"))
     found["free space"] = plain.without("environment")
     wheeled = built(parse(builtin_text("wheels-orbital") + FAULT, "here"))
     for allocation in ("least-squares", "least-peak"):

@@ -39,7 +39,7 @@ def steps_of(name: str) -> int:
 
 def choices_of(loop: Any) -> set[Any]:
     """What a loop is made of: its law, its parts with what is constant in a kernel, and what it is told to do."""
-    steps = ("in steps", loop.substeps > 1), ("changes", bool(loop.events))
+    steps = ("in steps", loop.substeps > 1), ("changes", bool(loop.events)), ("watches", loop.law.flag("WATCHES"))
     made = [(f.part.name, getattr(f.params, "allocation", None)) for f in loop.parts]
     return {loop.law.name, loop.sign_policy, loop.limit, loop.body.name, *steps, *made}
 
@@ -99,8 +99,8 @@ def test_one_lane(name):
 
 
 EIGHT = [pytest.param(*flown.values, 8, marks=flown.marks) for flown in FLOWN]
-LANES = [*EIGHT, *leading([(name, 16) for name in LOOPS if not is_costly(name)], 2)]
-"""Every loop on eight lanes; on sixteen two, and by `make test-all` all."""
+LANES = [*EIGHT, *leading([(name, 16) for name in LOOPS if not is_costly(name)])]
+"""Every loop on eight lanes; on sixteen one, and by `make test-all` all."""
 
 
 @pytest.mark.parametrize(("name", "width"), LANES)

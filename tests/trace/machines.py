@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from starhold.algebra.operations import INDEX, WORD
 from starhold.algebra.structured import Buffer
-from starhold.algebra.words import with_bits, word_or
 from starhold.trace.c99 import C99
 from starhold.trace.javascript import JavaScript
 from starhold.trace.machine import aligned, load, word
@@ -69,11 +68,6 @@ class Subject(NamedTuple):
         given = [inputs[name] & MASK if kind == WORD else inputs[name] for name, kind in self.inputs.items()]
         self.equation(*map(Buffer, cells), *given, lane)
         return {m.name: np.array(c) for m, c in zip(self.memories, cells, strict=True)}
-
-
-def small_number(word_: Any) -> Any:
-    """A word below 2^52 as a number, by its place in a double's bits."""
-    return with_bits(word_or(word_, 0x4330000000000000)) - 4503599627370496.0
 
 
 def column(program: Program, memories: Arrays, lane: int) -> dict[str, NDArray[np.float64]]:

@@ -39,6 +39,7 @@ from starhold.algebra.structured import Buffer, at, function, repeat, unless, un
 from starhold.algebra.words import (
     bits_of,
     lowest_bit,
+    number_in,
     number_of,
     rotate_left,
     shift_right,
@@ -50,7 +51,7 @@ from starhold.algebra.words import (
     word_xor,
 )
 from starhold.trace.program import Memory
-from tests.trace.machines import Subject, small_number
+from tests.trace.machines import Subject
 
 SPECIAL = (0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, 2.2250738585072014e-308, 1e308, -1e308, math.inf, -math.inf, math.nan)
 CONSTANTS = (*SPECIAL, 0.1, -2.5, 3.0, 1e-3)
@@ -125,7 +126,7 @@ def _place(scope: _Scope, code: _Code) -> Any:
 
 
 def _numbers_of(word: Any) -> tuple[Any, Any]:
-    return small_number(shift_right(word, 32)), small_number(word_and(word, 0xFFFFFFFF))
+    return number_in(shift_right(word, 32)), number_in(word_and(word, 0xFFFFFFFF))
 
 
 def run(block: tuple[Any, ...], scope: _Scope) -> None:
@@ -186,7 +187,7 @@ def _number(scope: _Scope, code: _Code, _: Any) -> None:
     else:
         word = code.of(scope.words)
         index = code.of(scope.indices) * (code.below(4) - 1)
-        made = (lambda: with_bits(word), lambda: small_number(shift_right(word, 20)), lambda: number_of(index))
+        made = (lambda: with_bits(word), lambda: number_in(shift_right(word, 20)), lambda: number_of(index))
         scope.numbers.append(made[choice]())
 
 
@@ -346,7 +347,7 @@ def turns(script: Script) -> Subject:
             words = word_add(seed, lane), word_add(seed, word_of(b))
             x, y, a, b_, truth, word = repeat(count, turn, table[3], 1.0, mine[1], table[4], less(mine[2], 0.0), words[0])
             mine.put(0, (x, y, a, b_))
-            mine.put(1, (where(truth, 1.0, 0.0), *_numbers_of(word), small_number(shift_right(words[1], 20))))
+            mine.put(1, (where(truth, 1.0, 0.0), *_numbers_of(word), number_in(shift_right(words[1], 20))))
 
         repeat(blocks, block)
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from starhold.algebra.operations import INDEX, WORD
 from starhold.algebra.scalar import less, sqrt, where
 from starhold.algebra.structured import Buffer, function, repeat, until
-from starhold.algebra.words import number_of, word_add, word_and
+from starhold.algebra.words import number_in, number_of, word_add, word_and
 from starhold.trace.llvm import Llvm
 from starhold.trace.machine import word
 from starhold.trace.program import Memory
 from starhold.trace.ptx import Threads, assembly, ptx
-from tests.trace.machines import Job, Subject, column, same, small_number
+from tests.trace.machines import Job, Subject, column, same
 from tests.trace.scripts import Script, scripts, subject, values
 
 FUSED = re.compile(r"\b(?:v?f(?:n?m(?:add|sub|la|ls)|ma)\w*|f64x2\.\w*madd|fmaf?|__fma)\b", re.I)
@@ -43,7 +43,7 @@ def law(cells: Buffer, table: Buffer, count: Any, seed: Any, lane: Any) -> None:
     x = fall(cells.part(0, count), table[0], table[1])
     y = fall(cells.part(1, count), x, number_of(count))
     (z,) = until(lambda z: less(z * z - y, 1e-9), lambda z: (0.5 * (z + y / z),), 1.0, at_most=40)
-    cells[4] = where(less(z, 0.0), -z, sqrt(z)) + small_number(word_and(word_add(seed, lane), 0xFFFF))
+    cells[4] = where(less(z, 0.0), -z, sqrt(z)) + number_in(word_and(word_add(seed, lane), 0xFFFF))
 
 
 MEMORIES = Memory("cells", True, True, 5), Memory("table", False, False, 2)

@@ -19,7 +19,7 @@ from starhold.trace.bounds import KINDS, Work
 from starhold.trace.program import Memory
 from tests.algebra.balls import Ball
 from tests.algebra.readers import middle, radius
-from tests.trace.machines import MACHINES, Subject, agree, need, small_number
+from tests.trace.machines import MACHINES, Subject, agree, need
 from tests.trace.scripts import SPECIAL
 
 NUMBERS = (*SPECIAL, 0.1, -2.5)
@@ -51,7 +51,7 @@ def put(out: Buffer, place: Any, kind: str, made: Any) -> None:
     """Write what an operation gives."""
     if kind == WORD:
         high, low = words.shift_right(made, 32), words.word_and(made, 0xFFFFFFFF)
-        out.put(place, (small_number(high), small_number(low)))
+        out.put(place, (words.number_in(high), words.number_in(low)))
     elif kind == TRUTH:
         out[place] = scalar.where(made, 1.0, 0.0)
     else:

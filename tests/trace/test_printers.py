@@ -12,13 +12,13 @@ import pytest
 from starhold.algebra.operations import INDEX, WORD
 from starhold.algebra.scalar import absolute, both, divide, either, less, less_equal, negative, opposite, select, sqrt, where
 from starhold.algebra.structured import Buffer, at, function, repeat, unless, until, when
-from starhold.algebra.words import bits_of, number_of, rotate_left, shift_right, word_add, word_of, word_xor
+from starhold.algebra.words import bits_of, number_in, number_of, rotate_left, shift_right, word_add, word_of, word_xor
 from starhold.trace.c99 import C99
 from starhold.trace.javascript import JavaScript
 from starhold.trace.llvm import Llvm
 from starhold.trace.program import Memory
 from starhold.trace.recording import Recorder
-from tests.trace.machines import MACHINES, STRICT, Job, Subject, agree, need, on_c, on_lanes, on_node, same, small_number
+from tests.trace.machines import MACHINES, STRICT, Job, Subject, agree, need, on_c, on_lanes, on_node, same
 from tests.trace.scripts import SPECIAL
 
 CELLS = Memory("cells", True, True, 24)
@@ -37,7 +37,7 @@ def threefry(cells: Buffer, seed: Any, lane: Any) -> None:
         if i % 4 == 3:
             j = i // 4 + 1
             a, b = word_add(a, keys[j % 3]), word_add(word_add(b, keys[(j + 1) % 3]), j)
-    cells.put(0, ((small_number(shift_right(a, 12)) + 0.5) * 2.0**-52, (small_number(shift_right(b, 12)) + 0.5) * 2.0**-52))
+    cells.put(0, ((number_in(shift_right(a, 12)) + 0.5) * 2.0**-52, (number_in(shift_right(b, 12)) + 0.5) * 2.0**-52))
 
 
 def cholesky(cells: Buffer, count: Any, lane: Any) -> None:
@@ -115,7 +115,7 @@ def functions(cells: Buffer, table: Buffer, count: Any, seed: Any, lane: Any) ->
     first = squared(cells.part(0, count), Sum(0.0, True, word_add(seed, lane)), table[0])
     second = squared(cells.part(count, 3), first, table[1])
     cells.put(4, (first.total, second.total, where(second.small, 1.0, 0.0)))
-    cells[20] = small_number(shift_right(second.bits, 40))
+    cells[20] = number_in(shift_right(second.bits, 40))
     cells[21] = mean(cells.part(count + 1, 2), count, 0.25)
 
     def turn(k, total):
@@ -153,7 +153,7 @@ def kept(a: float, b: float, c: float, p: bool, q: bool, w: Any) -> tuple[float,
         return x + a, less(x, b), either(p, q)
 
     x, p, q = until(lambda x, p, q: opposite(p), turn, c, p, q, at_most=4)
-    (y,) = when(q, lambda y: (y + small_number(shift_right(w, 60)),), a)
+    (y,) = when(q, lambda y: (y + number_in(shift_right(w, 60)),), a)
     return x, y, p, q
 
 

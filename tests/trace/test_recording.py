@@ -275,7 +275,11 @@ def _writing(cells, x):
 
 
 REFUSED: list[tuple[Callable[..., Any], str, str]] = [
-    (lambda c, t, n, w: math.sqrt(t[0]), "a function that is none of the scalar operations", "starhold.algebra.scalar"),
+    (
+        lambda c, t, n, w: math.sqrt(t[0]),
+        "a function that is none of the scalar operations",
+        "sin, cos, atan2, exp, log, power",
+    ),
     (lambda c, t, n, w: float(t[0]), "a function that is none of the scalar operations", "starhold.algebra.scalar"),
     (lambda c, t, n, w: math.floor(t[0]), "an operator that is none of the scalar operations", "starhold.algebra.scalar"),
     (lambda c, t, n, w: t[0] if t[0] else t[1], "an `if`", "where"),
@@ -285,7 +289,7 @@ REFUSED: list[tuple[Callable[..., Any], str, str]] = [
     (lambda c, t, n, w: t[0] == 0.0, "a comparison of numbers by < > == or !=", "less or less_equal"),
     (lambda c, t, n, w: abs(t[0]), "abs of a number", "absolute of starhold.algebra.scalar"),
     (lambda c, t, n, w: round(t[0]), "an operator that is none of the scalar operations", "starhold.algebra.scalar"),
-    (lambda c, t, n, w: t[0] ** 2, "a power", "products, sqrt"),
+    (lambda c, t, n, w: t[0] ** 2, "a power", "power and cbrt of starhold.algebra.elementary"),
     (lambda c, t, n, w: 2.0 ** t[0], "a power", "products, sqrt"),
     (lambda c, t, n, w: t[0] % 2.0, "an operator that is none of the scalar operations", "+ - * /"),
     (lambda c, t, n, w: w ^ 1, "an operator that is none of the scalar operations", "+ - * /"),

@@ -10,7 +10,7 @@ from starhold.algebra.scalar import Scalar, absolute, less, side, where
 
 _SHIFT = 1.5 * 2.0**52
 """Adding this to a number rounds it: doubles of this size are whole."""
-_COSINE = tuple(float(Fraction((-1) ** n, factorial(2 * n))) for n in range(9))
+COSINE = tuple(float(Fraction((-1) ** n, factorial(2 * n))) for n in range(9))
 _SINE = tuple(float(Fraction((-1) ** n, factorial(2 * n + 1))) for n in range(8))
 """Coefficients of the series, cut where the remainder is below 2^-54 up to an eighth of a turn."""
 
@@ -28,15 +28,20 @@ def cosine_sine(turns: Scalar) -> tuple[Scalar, Scalar]:
     whole = nearest(quarters)
     angle = (0.25 * tau) * (quarters - whole)
     square = angle * angle
-    cosine, sine = _series(_COSINE, square), angle * _series(_SINE, square)
-    # From -2 to 2 quarters: two of them turn both signs, one exchanges cosine and sine.
+    return quartered(whole, series(COSINE, square), angle * series(_SINE, square))
+
+
+def quartered(whole: Scalar, cosine: Scalar, sine: Scalar) -> tuple[Scalar, Scalar]:
+    """Return cosine and sine of an angle and so many quarters of a turn, from -2 to 2, from those of the angle."""
+    # Two quarters turn both signs, one exchanges cosine and sine.
     size, sense = absolute(whole), side(whole)
     odd, half = less(absolute(size - 1.0), 0.5), less(1.5, size)
     turned = where(half, -1.0, 1.0)
     return where(odd, -sense * sine, turned * cosine), where(odd, sense * cosine, turned * sine)
 
 
-def _series(c: tuple[float, ...], x: Scalar) -> Scalar:
+def series(c: tuple[float, ...], x: Scalar) -> Scalar:
+    """Return c[0] + c[1] x + c[2] x^2 + ..."""
     total = c[-1]
     for term in c[-2::-1]:
         total = total * x + term

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from contextvars import ContextVar
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +78,11 @@ class Dual:
             root = math.sqrt(self.value) if self.value >= 0.0 else math.nan
             # The length of a vector has no slope where the vector is zero.
             return Dual(root, self.slopes * (0.5 / root if root > 0.0 else math.nan))
+        if "slopes" in entry.meanings:
+            numbers = [_parts(value)[0] for value in values]
+            pairs = zip(entry.meanings["slopes"], values, strict=True)
+            slopes = sum(by(*numbers) * value.slopes for by, value in pairs if isinstance(value, Dual))
+            return Dual(entry.plain(*numbers), cast(Any, slopes))
         if entry.name in ("less", "less_equal"):
             (a, da), (b, db) = map(_parts, values)
             if a == b and np.any(da - db):

@@ -12,7 +12,9 @@ from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar, cast
+
+from starhold.errors import InputError
 
 NUMBER, TRUTH, WORD, INDEX, UNIFORM, STATIC = "number", "truth", "word", "index", "uniform", "static"
 """Kinds of values: numbers (IEEE doubles), truths, 64-bit unsigned words, and the two that all lanes share: indices (counts
@@ -66,6 +68,32 @@ def operation(takes: str, gives: str, **meanings: Any) -> Callable[[_Function], 
     return register
 
 
+_Form: TypeAlias = Callable[[Any], Any] | Callable[[Any, Any], Any]
+
+
+def whole(symbolic: _Form, *slopes: _Form) -> Callable[[_Function], _Function]:
+    """Make an equation of numbers a function that readers which prove know as one. symbolic: its form in SymPy; slopes: its
+    derivatives by each argument, functions of floats. Floats and traces read the equation itself."""
+
+    def register(equation: _Function) -> _Function:
+        name = equation.__name__
+
+        def refuse(*_: Any) -> Any:
+            raise library("starhold.algebra.polynomial").unreadable(f"a call of {name}: a polynomial has no {name}")
+
+        meanings = {"symbolic": symbolic, "polynomial": refuse, "slopes": slopes}
+        entry = Operation(name, (NUMBER,) * len(slopes), NUMBER, equation, meanings)
+
+        @wraps(equation)
+        def read(*values: Any) -> Any:
+            walks = {_reader(value) for value in values} <= {None, "record"}
+            return equation(*values) if walks else _read(entry, values)
+
+        return cast(_Function, read)
+
+    return register
+
+
 def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
     """Apply the operation as the reader of the values does."""
     readers = [reader for reader in map(_reader, values) if reader is not None]
@@ -82,7 +110,9 @@ def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
 
 
 def _reader(value: Any) -> str | None:
-    """Return the reader of a number; None for plain ones."""
+    """Return the reader of a number; None for plain ones. InputError for what nothing gives."""
+    if value is ABSENT:
+        refuse_absent()
     if isinstance(value, (float, int)) or type(value).__name__ == "bool_":
         return None
     cls = cast(Any, type(value))
@@ -91,6 +121,28 @@ def _reader(value: Any) -> str | None:
     if declared is None and root not in _LIBRARIES:
         raise TypeError(f"no reader for numbers of type {cls.__name__}")
     return declared if declared is not None else _LIBRARIES[root]
+
+
+class Absent(tuple[()]):
+    """A quantity that nothing gives has no numbers, and refuses to be used."""
+
+    __slots__ = ()
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        refuse_absent()
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _refuse  # pyright: ignore
+    __neg__ = __pos__ = __pow__ = __rpow__ = __abs__ = __float__ = __lt__ = __le__ = __gt__ = __ge__ = _refuse  # pyright: ignore
+
+
+ABSENT = Absent()
+
+
+def refuse_absent() -> NoReturn:
+    """Raise an InputError that points at the line where an equation uses a quantity that nothing gives."""
+    place, text = written_at()
+    allowed = 'quantities that the loop has; a law gets measurement.time where its file says READS = ("time",)'
+    raise InputError(place, "", f"a quantity that nothing gives, in `{text}`", allowed)
 
 
 def written_at() -> tuple[str, str]:

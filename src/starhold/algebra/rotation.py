@@ -1,5 +1,5 @@
-"""Rotation vectors and quaternions are converted by arithmetic alone, for laws and kernels, which have no sines or arc
-functions."""
+"""Quaternions are converted into rotation vectors and modified Rodrigues parameters, and back, by arithmetic alone, for laws
+and kernels."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fractions import Fraction
 from math import comb
 
 from starhold.algebra.quaternion import Quaternion, vector_part
-from starhold.algebra.scalar import absolute, minimum, side, sqrt
+from starhold.algebra.scalar import Scalar, absolute, minimum, side, sqrt
 from starhold.algebra.vector import Vector, dot, scale
 
 _TERMS = 20
@@ -29,6 +29,12 @@ def rotation_vector(q: Quaternion) -> Vector:
     for term in _SERIES[-2::-1]:
         series = series * square + term
     return scale(side(q[0]) * 8.0 * shrink * series, v)
+
+
+def modified_rodrigues(q: Quaternion, factor: Scalar = 1.0) -> Vector:
+    """Return the modified Rodrigues parameters of the turn below 180 degrees, tan(angle/4) axis, times a factor."""
+    near = side(q[0])
+    return scale(factor * near / (1.0 + near * q[0]), vector_part(q))
 
 
 def short_turn(half: Vector) -> Quaternion:

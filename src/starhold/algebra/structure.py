@@ -60,6 +60,14 @@ def rebuild(like: Any, parts: Sequence[Any]) -> Any:
     return type(like)(*parts) if hasattr(like, "_fields") else tuple(parts)
 
 
+def put(value: Any, path: Sequence[str | int], new: Any) -> Any:
+    """Return a structure with another part at a path of fields and places."""
+    if not path:
+        return new
+    place = value._fields.index(path[0]) if isinstance(path[0], str) else path[0]
+    return rebuild(value, [put(item, path[1:], new) if k == place else item for k, item in enumerate(value)])
+
+
 def chosen(truth: Truth, one: _State, other: _State) -> _State:
     """Return one state where the truth holds, else the other, number by number; buffers are those of the other."""
 

@@ -133,6 +133,11 @@ def whole_word(number: Any) -> Any:
     return word_and(bits_of(number + 4503599627370496.0), 0x000FFFFFFFFFFFFF)
 
 
+def number_in(word: Any) -> Any:
+    """Return a word below 2^52 as a number."""
+    return with_bits(word_or(word, 0x4330000000000000)) - 4503599627370496.0
+
+
 @operation("", "word", llvm="add {word} {lanes}, {zero}", c="UINT64_C(0)", javascript=("0", "0"))
 def lane() -> int:
     """Return the number of the lane, from 0; recorded by `Recorder.lane`."""

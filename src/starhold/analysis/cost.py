@@ -35,8 +35,9 @@ class Replay:
 
 def compile_calls(loop: ClosedLoop) -> tuple[Kernel, ClosedLoop]:
     """Return the code that repeats the calls of a loop's law, and the loop with what is part of a call."""
-    # The noise of the simulation is no part of one.
-    loop = loop.without("random-torque") if loop.used("estimator") else loop.without("random-torque", "sensor")
+    # The noise of the simulation is no part of one, but for that of readings which the call is given.
+    needed = loop.used("estimator") or getattr(loop.law.module, "WATCHES", False)
+    loop = loop.without("random-torque") if needed else loop.without("random-torque", "sensor")
     return make_kernel(replay, loop.composition(), 1, loop.carry(), Numbers.of(loop.phases(1)[0])), loop
 
 

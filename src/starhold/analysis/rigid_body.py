@@ -15,7 +15,9 @@ from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
 from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
+from starhold.analysis import mode_notes
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
+from starhold.analysis.mode_notes import Modal, Wanted
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.simulation.lane import Recording
 
@@ -73,13 +75,14 @@ class Cone(NamedTuple):
 
 class Bounds(NamedTuple):
     """The numbers of the notes: squares of the sine of half the attitude tolerance and of the rate tolerance ((rad/s)^2);
-    the instant at which the last quarter begins, and the last; cones."""
+    the instant at which the last quarter begins, and the last; cones; what is asked about modes."""
 
     angle: float
     rate: float
     tail: float
     last: float
     cones: tuple[Cone, ...]
+    modal: Wanted
 
 
 class Turning(NamedTuple):
@@ -95,7 +98,8 @@ class Noted(NamedTuple):
     """Notes on a lane: the last instants outside the tolerances; peaks of torque (component), of rate (square) and of wheel
     momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; there the
     first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what
-    extras need; and of a window the largest squares of half the angle's sine, of the rate error and of the torque."""
+    extras need; of a window the largest squares of half the angle's sine, of the rate error and of the torque; and notes on
+    modes."""
 
     attitude_outside: float
     rate_outside: float
@@ -115,6 +119,7 @@ class Noted(NamedTuple):
     window_angle: float
     window_rate: float
     window_torque: float
+    modal: Modal | tuple[()]
 
 
 def make_meter(
@@ -128,19 +133,39 @@ def make_meter(
     every: int = 1,
     still: bool = False,
     wheels: bool = False,
+    begins: Mapping[str, int] = MappingProxyType({}),
+    fault: tuple[float, ...] = (),
 ) -> Meter:
     """The meter of flights of so many steps of a period (s), or of samples at such intervals.
 
     limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
     that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
-    rest; wheels: the body has some."""
+    rest; wheels: the body has some; begins: modes whose first begin is noted, counted from 1, by the names of their metrics;
+    fault: the instant of the first fault, as `Wanted` has it."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
-    begun: Any = (-1.0, -1.0, *(0.0,) * 6, ZERO, ZERO, ZERO, (4.0,) * len(cones), turning, levels, levels, 0.0, 0.0, 0.0)
+    wanted = Wanted(tuple(map(float, begins.values())), fault)
+    modal = mode_notes.begun(wanted)
+    begun: Any = (
+        -1.0,
+        -1.0,
+        *(0.0,) * 6,
+        ZERO,
+        ZERO,
+        ZERO,
+        (4.0,) * len(cones),
+        turning,
+        levels,
+        levels,
+        0.0,
+        0.0,
+        0.0,
+        modal,
+    )
     first, tail = Noted(*begun), tail_start(steps)
     angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2
-    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()))
+    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()), wanted)
     rows: Any = places(first)
     windows = {
         "attitude_error": Window(rows.window_angle, KINDS["angle"], "angle to the target", "rad"),
@@ -148,9 +173,11 @@ def make_meter(
         "torque": Window(rows.window_torque, np.sqrt, "norm of the torque applied", "N m"),
     }
     early, late = (_note(limit, still, stage, turns, iterations) for stage in (False, True))
-    table = _table(rows, period, every, wheels) | {
-        name: Metric("rad", "apart", (row,)) for name, row in zip(cones, rows.cones, strict=True)
-    }
+    table = (
+        _table(rows, period, every, wheels)
+        | mode_notes.table(tuple(begins), rows.modal, wanted, period)
+        | {name: Metric("rad", "apart", (row,)) for name, row in zip(cones, rows.cones, strict=True)}
+    )
     for name, row, unit in zip(PEAKS, (rows.window_angle, rows.window_rate), ("rad", "rad/s"), strict=True):
         table |= {name: Metric(unit, PEAKS[name], (row,), since="start")} if name in extras else {}
     return Meter(first, bounds, (early, late), table, windows, steps, period, (tail,))
@@ -260,6 +287,7 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             maximum(seen.window_angle, angle_square),
             maximum(seen.window_rate, rate_square),
             maximum(seen.window_torque, torque_square),
+            mode_notes.noted(seen.modal, quantities, now, bounds.modal),
         )
 
     return note

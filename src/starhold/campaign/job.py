@@ -28,7 +28,7 @@ from starhold.simulation.batched import begin_metered
 from starhold.simulation.lane import Progress
 from starhold.simulation.lanes import ThreadPool
 from starhold.studies.body import study_of
-from starhold.studies.requirements import Requirement, cones_of, extras_of, read_requirements, tables_of
+from starhold.studies.requirements import Requirement, cones_of, extras_of, orbit_of, read_requirements, tables_of
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Job:
 
     def requirements(self, law: str) -> tuple[Requirement, ...]:
         """The requirements that runs of a law must keep."""
-        return read_requirements(self.required, self.meter(law).units, self.source.where)
+        return read_requirements(self.required, self.meter(law).units, self.source.where, orbit_of(self.scenario))
 
     def __call__(self, law: str, first: int, count: int, pool: ThreadPool) -> Callable[[], Chunk]:
         """Begin to fly runs first .. first+count-1 of a law; the function returned waits for their results."""

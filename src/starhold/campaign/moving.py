@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import leaves, mapped, rebuild
+from starhold.algebra.structure import leaves, mapped, put
 from starhold.campaign.dispersions import Dispersion
 from starhold.loop.kernels import numbers_of
 from starhold.scenario.reading import LawEntry, Scenario
@@ -59,7 +59,7 @@ class Moving:
         for key, path in self._paths.items():
             if path[0] == "part":
                 fitted = self.scenario.parts[path[1]]
-                parts[fitted.called] = _put(parts.get(fitted.called, fitted.params), path[2:], every[key])
+                parts[fitted.called] = put(parts.get(fitted.called, fitted.params), path[2:], _rows(every[key]))
         self._names = tuple(true), tuple(supposed), tuple(parts)
         return tuple(true.values()), tuple(supposed.values()), tuple(parts.values())
 
@@ -100,7 +100,7 @@ class Moving:
         every = self.by_key(columns)
         for key, path in self._paths.items():
             if path[0] == "law" and self.scenario.laws[path[1]] is self.law:
-                spec = _put(spec, path[2:], every[key])
+                spec = put(spec, path[2:], _rows(every[key]))
         lanes = len(next(iter(columns.values())))
         rows: list[list[float]] = []
         for lane in range(lanes):
@@ -117,9 +117,6 @@ def _at(lane: int, leaf: Any) -> Any:
     return float(leaf[lane]) if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
 
 
-def _put(value: Any, path: tuple[str | int, ...], new: Array) -> Any:
-    """A structure with an array (lanes,) in place of each number at a path."""
-    if not path:
-        return tuple(_put(None, (), row) for row in new) if new.ndim > 1 else new
-    place = value._fields.index(path[0]) if isinstance(path[0], str) else path[0]
-    return rebuild(value, [_put(item, path[1:], new) if k == place else item for k, item in enumerate(value)])
+def _rows(new: Array) -> Any:
+    """An array (components..., lanes) as nested tuples of arrays (lanes,)."""
+    return tuple(_rows(row) for row in new) if new.ndim > 1 else new

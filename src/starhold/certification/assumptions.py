@@ -9,7 +9,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from starhold.algebra.vector import ZERO
-from starhold.certification.certificate import WITHOUT, Claim
+from starhold.certification.certificate import ORBIT, WITHOUT, Claim
+from starhold.certification.orbit_band import strays
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
@@ -37,6 +38,9 @@ def assumption(identifier: str) -> Assumption:
             return [(True, f"{HAS}{part}")]
 
         return Assumption(f"without the {part}", there)
+    if identifier.startswith(ORBIT):
+        share = 100.0 * float(identifier.removeprefix(ORBIT))
+        return Assumption(f"distance, speed and momentum of the orbit within {share:.3g} % of two-body motion", _strayed)
     return ASSUMPTIONS[identifier]
 
 
@@ -88,6 +92,10 @@ def _friction(span: Any) -> Unmet:
         (has_friction(wheels), "the wheels have friction"),
         (bool(wheels.unbalanced), "the rotors are out of balance"),
     ]
+
+
+def _strayed(span: Any) -> Unmet:
+    return [(strays(span.loop, span["position"], span["velocity"]), "forces move the orbit further than is assumed")]
 
 
 def _uncancelled(span: Any) -> Unmet:

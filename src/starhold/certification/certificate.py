@@ -90,8 +90,9 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-WITHOUT = "without:"
-"""Begins the identifier of the assumption that a part is not there, role and name."""
+WITHOUT, ORBIT = "without:", "orbit-within:"
+"""Begin the identifiers of the assumptions that a part is not there, role and name, and that forces move the orbit by no
+more than a share."""
 BESIDE = ("sampling", "control-limit", "saturated-axis")
 """Kinds of claims about a control loop that say nothing of where its motion ends, and go with one that does."""
 

@@ -19,6 +19,7 @@ from starhold.certification.proofs import HELD_AND_PUSHED, pointed, proved_claim
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.contract import CLOCK
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
 
@@ -78,6 +79,8 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
 
 def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
     loop, claims = subject.loop, list[Claim]()
+    if CLOCK in loop.law.reads:
+        return [undecided("convergence", EVERYWHERE, subject, "the law reads the time, of which no claim speaks")]
     sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
     if loop.remembers and loop.law.lyapunov is not None:
         claims.append(undecided("convergence", EVERYWHERE, subject, "the law keeps a memory from call to call"))

@@ -12,7 +12,8 @@ import numpy as np
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import Vector, apply, norm, scale
-from starhold.certification.certificate import WITHOUT, Claim
+from starhold.certification.certificate import ORBIT, WITHOUT, Claim
+from starhold.certification.orbit_band import band_of, movers
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, NO_ERRORS, Envelope, Errors, Noise, Push, Recursion
 from starhold.parts.craft import tensor
@@ -37,7 +38,8 @@ MORE = 1.0 + 1e-12
 
 class Pushes(NamedTuple):
     """Bounds of what acts on a loop and is told to no law: the torque from outside (N m, and N m s times the body's rate),
-    errors of the attitude (rad) and the rate (rad/s) that the law is told, and of the command (as the torque)."""
+    errors of the attitude (rad) and the rate (rad/s) that the law is told, of the command (as the torque), and of the
+    target's rate (rad/s) and acceleration (rad/s2)."""
 
     outside: float
     outside_per_rate: float = 0.0
@@ -45,12 +47,14 @@ class Pushes(NamedTuple):
     rate: float = 0.0
     command: float = 0.0
     command_per_rate: float = 0.0
+    target_rate: float = 0.0
+    target_acceleration: float = 0.0
 
     @property
     def numbers(self) -> dict[str, float]:
         """The numbers of a claim that they are."""
         names = ("outside", "outside.per.rate", "error.attitude", "error.rate", "error", "error.per.rate")
-        return dict(zip(names, self, strict=True))
+        return dict(zip((*names, "error.target.rate", "error.target.acceleration"), self, strict=True))
 
 
 class Driven(NamedTuple):
@@ -61,13 +65,15 @@ class Driven(NamedTuple):
 
 
 def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
-    """Tell what the motions of a loop do not leave while its momentum (N m s) is no more than told, and no part that is left
-    out by name moves the orbit. A little more, for floats tell how low the orbit comes. noisy: but for a share of times."""
-    begun, gravity = (loop.start.position, loop.start.velocity), loop.craft.gravity
+    """Tell what the motions of a loop do not leave while its momentum (N m s) is no more than told, its orbit stays in its
+    band, and no part that is left out by name moves it. A little more, for floats tell how low the orbit comes. noisy: but
+    for a share of times."""
+    begun, gravity, share = (loop.start.position, loop.start.velocity), loop.craft.gravity, band_of(loop).share
     low, fast = (find(*begun, gravity) for find in (lowest, highest_speed)) if loop.has("two-body") else map(norm, begun)
     moment = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[-1])
     field = sum(_field_error(fitted, loop.period, noisy) for fitted in loop.used("sensor"))
-    return Envelope(low * (1.0 - 1e-9), fast * (1.0 + 1e-9), momentum, moment * MORE, field)
+    low, fast = low * (1.0 - share) * (1.0 - 1e-9), fast * (1.0 + share) * (1.0 + 1e-9)
+    return Envelope(low, fast, momentum, moment * MORE, field)
 
 
 def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
@@ -80,7 +86,8 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     told = [NO_ERRORS, *(found for f in loop.parts if f not in estimated and (found := _bounded(f)) is not None)]
     attitude, rate, _ = (sum(own) for own in zip(*told, strict=True))
     (torque, per_rate), (command, command_per_rate) = ([sum(x) for x in zip(*own, strict=True)] for own in (torques, errors))
-    return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate)))
+    turn = band_of(loop)[2:] if loop.target.part.name == "orbital" else (0.0, 0.0)
+    return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *turn)))
 
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
@@ -114,8 +121,8 @@ def samples_of(loop: ClosedLoop) -> int:
     """Control steps of an orbit, or of an hour where there is none."""
     start = loop.start
     orbit = period_of(start.position, start.velocity, loop.craft.gravity) if loop.has("two-body") else SPAN
-    # A little more, for floats tell the period.
-    return ceil((orbit if isfinite(orbit) else SPAN) / loop.period * (1.0 + 1e-9))
+    # A little more, for floats tell the period; it goes with the power 3/2 of the distance.
+    return ceil((orbit if isfinite(orbit) else SPAN) / loop.period * (1.0 + 1e-9) * (1.0 + 3.0 * band_of(loop).share))
 
 
 def assumed_away(loop: ClosedLoop) -> list[str]:
@@ -134,7 +141,8 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
         absent = [f for f in loop.parts if not (_is_read(f) or f in noisy or _says(loop, f, envelope, f in estimated))]
-        return tuple(f"{WITHOUT}{_called(f)}" for f in absent)
+        share = band_of(loop).share
+        return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []))
 
     return tuple(replace(claim, assumptions=(*claim.assumptions, *more(claim))) for claim in claims)
 
@@ -149,6 +157,8 @@ def _is_read(fitted: Fitted) -> bool:
 
 def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool) -> bool:
     """Whether all that a part does to a loop has a bound. estimated: an estimator takes its errors out."""
+    if fitted in movers(loop) and band_of(loop).share and not fitted.part.hook("torque"):
+        return True
     if _is_idle(loop, fitted, envelope) or any(push is not None for push in _pushes(fitted, envelope)):
         return True
     return not estimated and _bounded(fitted) is not None and not _is_random(_noise(fitted, loop.period))

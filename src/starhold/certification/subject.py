@@ -11,6 +11,7 @@ from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
 from starhold.certification.openness import READ, assumed_away, envelope_of
+from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
@@ -218,7 +219,7 @@ def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
     """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m)."""
     nearest, _, _, gravity = perigee(loop)
     # A part more, for the inertia with the rotors is what is flown up to rounding.
-    strength = upper(3 * gravity / nearest**3) * exact(1.0 + 1e-12)
+    strength = upper(3 * gravity / (nearest * (1 - exact(band_of(loop).share))) ** 3) * exact(1.0 + 1e-12)
     full = _with_rotors(loop)
     whole = Craft(as_tuple(full), as_tuple(full), Polynomial.constant(0), Polynomial.constant(0))  # pyright: ignore
     torque: Any = gravity_gradient(direction("p"), cast(Any, Polynomial.constant(1)), whole)
@@ -264,4 +265,7 @@ def _target_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
         return fmpq(0), fmpq(0)
     nearest, momentum, eccentricity, gravity = perigee(loop)
     # The orbital frame turns by h/r2, and this changes by -2 h r'/r3 with |r'| at most mu e/h.
-    return upper(momentum / nearest**2), upper(2 * gravity * eccentricity / nearest**3)
+    share, change, rate, acceleration = map(exact, band_of(loop))
+    nearest, more = nearest * (1 - share), 1 + share
+    turn = upper(momentum * more / nearest**2) + rate
+    return turn, upper(2 * (gravity * eccentricity + momentum * change) * more / nearest**3) + acceleration

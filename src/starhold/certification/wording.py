@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
-from starhold.certification.certificate import FILE, Certificate, Claim, Obligation
+from starhold.certification.certificate import FILE, ORBIT, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.laws.catalogue import file_of, known_law
 
@@ -109,6 +109,12 @@ def listed(words: Sequence[str]) -> str:
 
 
 def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:
+    shares = [float(name.removeprefix(ORBIT)) for name in claim.assumptions if name.startswith(ORBIT)]
+    kept = "".join(f"on an orbit within {100.0 * share:.3g} % of a two-body one, " for share in shares)
+    return kept + _ideal(claim, subject)
+
+
+def _ideal(claim: Claim, subject: Mapping[str, Any]) -> str:
     if LINEAR in claim.assumptions:
         return ""
     if WHEELS in claim.assumptions:

@@ -107,6 +107,7 @@ def _fly(
     scenario = load(file, allow_unstable)
     from starhold.cli.console import console
     from starhold.cli.show import flying, print_outcome, print_results
+    from starhold.link.process import LostLawError
     from starhold.report.results import open_folder, write_results, write_run
     from starhold.studies import compare as studies
     from starhold.studies.timing import Stopwatch
@@ -131,7 +132,14 @@ def _fly(
             for entry, loop in zip(entries, loops, strict=True):
                 for flight in flights[-1:]:
                     keep(flight)
-                flights.append(studies.fly_law(scenario, entry, loop, notice, process))
+                try:
+                    flights.append(studies.fly_law(scenario, entry, loop, notice, process))
+                except LostLawError as error:
+                    # Nothing that was flown is lost.
+                    if error.recording is not None:
+                        write_run(error.recording, folder / "run.nc")
+                        console.print(f"Recording so far: {folder / 'run.nc'}", soft_wrap=True, markup=False)
+                    raise
         try:
             if check_step:
                 flights = [

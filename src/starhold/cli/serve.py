@@ -18,21 +18,32 @@ def serve(
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="the port on which it listens; 0: any that is free")] = 5750,
     udp: Annotated[bool, typer.Option("--udp", help="listen on UDP; TCP if not given")] = False,
+    zmq: Annotated[bool, typer.Option("--zmq", help="listen on ZeroMQ, as a ROUTER (extra `zmq`)")] = False,
+    serial: Annotated[
+        str | None, typer.Option(metavar="DEVICE", help="listen on a serial line, such as /dev/ttyUSB0 (extra `serial`)")
+    ] = None,
+    baud: Annotated[int, typer.Option(help="of the serial line, 8N1")] = 115200,
     rate: Annotated[
         float | None, typer.Option(help="real time: how many times faster than the clock; lockstep if not given")
     ] = None,
     missing: Annotated[
         str, typer.Option(metavar="hold|zero|stop", help="what flies a period of real time without a command")
     ] = "hold",
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="folder for run.nc, created")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="folder for run.nc, and how well real time was kept; created"),
+    ] = None,
     force: Force = False,
     allow_unstable: Unstable = False,
 ) -> None:
     """Serve the plant of a scenario: flight software connects, reads and commands, in lockstep or in real time."""
+    from rich.live import Live
+
     from starhold.api import serve as serve_plant
     from starhold.cli.console import console
-    from starhold.link.plant import Ending
+    from starhold.link.plant import Ending, status
     from starhold.report.results import open_folder, write_run
+    from starhold.report.timing import write_timing
     from starhold.scenario.reading import load
 
     scenario = load(file, allow_unstable)
@@ -45,12 +56,28 @@ def serve(
         # Whoever waits for this line reads a pipe.
         console.file.flush()
 
-    served = serve_plant(scenario, law, host=host, port=port, udp=udp, rate=rate, missing=missing, announce=announce)
+    with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False, redirect_stderr=False) as live:
+        served = serve_plant(
+            scenario,
+            law,
+            host=host,
+            port=port,
+            udp=udp,
+            zmq=zmq,
+            serial=serial,
+            baud=baud,
+            rate=rate,
+            missing=missing,
+            announce=announce,
+            watch=(lambda plant: live.update(status(plant), refresh=True)) if console.is_terminal else None,
+        )
     for line in served.lines:
         console.print(line, soft_wrap=True, markup=False)
     if output is not None:
         write_run(served.recording, output / "run.nc")
         console.print(f"Recording: {output / 'run.nc'}", soft_wrap=True, markup=False)
+        if served.timing is not None:
+            console.print(f"Latencies: {write_timing(served.timing, output)}", soft_wrap=True, markup=False)
     codes = {Ending.DIVERGED: DIVERGED, Ending.GONE: FAILED_CHECK, Ending.MISSED: FAILED_CHECK}
     codes[Ending.INTERRUPTED] = 128 + served.signal
     if code := codes.get(served.ending, 0):

@@ -118,7 +118,10 @@ def print_table(flights: Sequence[Flight]) -> None:
     for flight in flights:
         if flight.modes:
             first, *later = flight.modes
-            stretches = "".join(f", {one.mode} from {metric_set.moment(one.time, 6)}" for one in later)
+            stretches = "".join(
+                f", {one.mode} from {metric_set.moment(one.time, 6)}{f' ({one.utc} UTC)' if one.utc else ''}"
+                for one in later
+            )
             console.print(escape(f"Modes of {flight.name}: {first.mode}{stretches}."))
 
 

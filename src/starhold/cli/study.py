@@ -115,6 +115,7 @@ def command_of(name: str) -> Any:
 
     kinds = _parameters(declared)
     defaults: dict[str, Any] = {key: option.default for key, option in declared.options.items()}
+    defaults |= dict.fromkeys(declared.arguments, inspect.Parameter.empty)
     defaults |= {"file": inspect.Parameter.empty} if declared.listed is None else {}
     defaults |= {"proof": False, "force": False, "allow_unstable": False, "rocq": False, "pictures": Drawn.ALL}
     parameters = [
@@ -132,9 +133,14 @@ def _parameters(declared: Command) -> dict[str, Any]:
     if declared.file is not None:
         kind = str if declared.listed is None else str | None
         kinds["file"] = Annotated[kind, typer.Argument(metavar="FILE", help=declared.file)]
+    for key in declared.arguments:
+        argument = declared.options[key]
+        kinds[key] = Annotated[str, typer.Argument(metavar=argument.argument, help=argument.help)]
     if declared.read is None:
         kinds["law"] = Annotated[str | None, typer.Option(help=declared.law)]
     for key, option in declared.options.items():
+        if option.argument:
+            continue
         flags = ("-o", "--output") if key == "output" else (f"--{key.replace('_', '-')}",)
         metavar = f"FILE.{option.file}" if option.file else "TIME" if option.key and not option.whole else None
         kind = Path if option.file else int if option.whole else str

@@ -56,7 +56,7 @@ def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) ->
     """Write the attitudes of a run, a Dataset, a run.nc or its folder, as a message. epoch: UTC at its start, None for its
     own; about: further arguments of `write_aem`. InputError for a run without attitudes, a word that does not fit, and a
     file that cannot be written."""
-    run = _opened(run) if isinstance(run, str | Path) else run
+    run = open_run(run) if isinstance(run, str | Path) else run
     if "attitude" not in run:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
     times, attitudes = run["time"].to_numpy(), run["attitude"].to_numpy()
@@ -69,7 +69,8 @@ def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) ->
         raise InputError("export aem", "", str(error), "what a CCSDS message may hold") from None
 
 
-def _opened(place: str | Path) -> Any:
+def open_run(place: str | Path) -> Any:
+    """Read a run.nc, or that of a folder. InputError where there is none."""
     import xarray as xr
 
     path = Path(place) / "run.nc" if Path(place).is_dir() else Path(place)

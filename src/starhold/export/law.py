@@ -13,7 +13,7 @@ from starhold.errors import InputError
 from starhold.export.recording import Copies
 from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories, is_recorded
 from starhold.loop.step import make_equations
-from starhold.parts.contract import NoMemory
+from starhold.parts.contract import CLOCK, NoMemory
 from starhold.parts.part import Part
 from starhold.parts.roles import Goal
 from starhold.trace.recording import Recorder
@@ -68,6 +68,8 @@ class FlightLaw:
             setup, wheels = parameters.setup, getattr(inputs, "wheels", None)
             if hasattr(inputs, "target"):
                 setup = setup._replace(target=inputs.target)
+            elif "steps" in kept:
+                setup = setup._replace(target=(setup.target, kept["steps"]))
             readings = tuple(
                 _Reading(**{name: getattr(inputs, member) for name, member in one.items()}) for one in self.given
             )
@@ -89,6 +91,7 @@ class FlightLaw:
                 "law": after.memory,
                 "estimator": after.memories.estimator,
                 "followed": after.memories.followed,
+                "steps": kept.get("steps", 0.0) + 1.0,
             }
             return command(after.command), type(state)(*(then[name] for name in state._fields))
 
@@ -125,6 +128,9 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
             readings.update({inputs[name]: first[name] for name in taken})
             units = quantities(part.module.Reading) if is_recorded(part) else {}
             shown.update({inputs.get(name, name): one for name, one in units.items()})
+        if CLOCK in parts.law.reads and CLOCK not in firsts:
+            firsts[CLOCK], readings[CLOCK] = CLOCK, 0.0
+            shown[CLOCK] = quantities(module.Measurement)[CLOCK]._replace(text="since the start")
         fields.update(readings)
         notes.update({name: one for name, one in shown.items() if notes.get(name) is None or name not in UNITS})
         given = (firsts, *again) if readings else ()
@@ -135,6 +141,9 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         fields["target"] = _Target(*target.module.goal(numbers, loop.start, 0, None))
         notes["target"] = Quantity("", "the attitude to be reached, from inertial axes, at this instant")
         target, numbers = Part(target.name, _GOAL), ()  # pyright: ignore[reportArgumentType]
+    timed = target is not None and "target" not in fields and _tells_time(loop)
+    if target is not None and timed:
+        target = Part(target.name, Counted(target.module))  # pyright: ignore[reportArgumentType]
     if acting:
         fields["wheels"] = carry.effectors[acting[0]]
         notes["wheels"] = Quantity("", "as their tachometers tell")
@@ -154,6 +163,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
     )
     kept = {"sign": carry.h if _keeps_sign(composition, module) else (), "law": carry.memory}
     kept |= {"estimator": carry.memories.estimator, "followed": carry.memories.followed}
+    kept |= {"steps": 0.0} if timed else {}
     start = _named("FlightState", [(name, value) for name, value in kept.items() if any(True for _ in leaves(value))])
     inputs = _noted("FlightInput", fields, notes)
     quantity = quantities(module.Sample).get("command", Quantity("", ""))._replace(dimension="")
@@ -167,6 +177,8 @@ def _seen(parts: Composition, copies: Copies) -> Composition:
     def seen(value: Any) -> Any:
         if isinstance(value, tuple):
             return tuple(seen(part) for part in value)  # pyright: ignore
+        if isinstance(value, Part) and isinstance(value.module, Counted):
+            return replace(value, module=Counted(copies.seen(value.module.module)))
         return replace(value, module=copies.seen(value.module)) if isinstance(value, Part) else value
 
     return Composition(*(seen(value) for value in parts))
@@ -197,6 +209,38 @@ _GOAL = SimpleNamespace(ROLE="target", goal=lambda params, state, step, before: 
 _READINGS = SimpleNamespace(
     ROLE="sensor", RECORDED=False, measure=lambda state, memory, params, dice, step: (memory, memory)
 )
+
+
+@dataclass(frozen=True)
+class Counted:
+    """This has in place of the module of a target one whose numbers have the count of control steps, which the law keeps,
+    beside them, for it flies without the clock of a simulation."""
+
+    module: Any
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.module, name)
+
+    def goal(self, params: tuple[Any, Any], state: Any, step: Any, before: Any, *mode: Any) -> Goal:
+        """The goal of the module at the step of the count."""
+        return self.module.goal(params[0], state, params[1], before, *mode)
+
+
+class _Clock:
+    """A control step that notes whether it is looked at."""
+
+    reader, seen = "itself", False
+
+    def read(self, operation: Any, values: Any) -> float:
+        self.seen = True
+        return 0.0
+
+
+def _tells_time(loop: ClosedLoop) -> bool:
+    """Tell whether the goal of a loop's target depends on the time, as those at the Sun and at stations do."""
+    clock, mode = _Clock(), (0.0,) if loop.target.part.flag("BY_MODE") else ()
+    loop.target.part.module.goal(loop.setup().target, loop.start, clock, (1.0, 0.0, 0.0, 0.0), *mode)
+    return clock.seen
 
 
 def _keeps_sign(parts: Composition, body: Any) -> bool:

@@ -15,6 +15,7 @@ from starhold.export.source import texts
 from starhold.export.vectors import kept_inputs
 from starhold.link.header import HEADER, header
 from starhold.link.layout import Layout
+from starhold.parts.contract import CLOCK
 from starhold.version import __version__
 
 SOURCES = {
@@ -80,7 +81,9 @@ def _fmu(code: Code) -> dict[str, bytes]:
     The standard wants every function of its interface in a binary; those that a sampled law has no use for refuse."""
     inputs, outputs = variables(code)
     taken, given = 'causality="input" start="0.0"', 'causality="output" variability="discrete"'
-    roles = [*((name, taken) for name in inputs), *((name, given) for name in outputs)]
+    # The standard has a variable of the name `time`, that of the simulation.
+    called = ["time_since_start" if name == CLOCK else name for name in inputs]
+    roles = [*((name, taken) for name in called), *((name, given) for name in outputs)]
     listed = [f'    <Float64 name="{name}" valueReference="{k}" {role}/>' for k, (name, role) in enumerate(roles, 1)]
     text = texts(code, "", code.flight.loop.law.name)
     ends = [(kind, k) for kind in ("Output", "InitialUnknown") for k in range(1 + len(inputs), 1 + len(roles))]
@@ -111,7 +114,7 @@ def _process(code: Code) -> dict[str, str]:
     for name, value in code.flight.inputs._asdict().items():
         # The last sensor that tells of something is believed, as in the simulation.
         known = [f"sensors.{one.called}.{name}" for one in reversed(loop.used("sensor"))]
-        known += {"target": ["target"], "wheels": acting[:1]}.get(name, [f"state.{name}"])
+        known += {"target": ["target"], "wheels": acting[:1], CLOCK: [f"measurement.{CLOCK}"]}.get(name, [f"state.{name}"])
         begin = next(one.first for wanted in known for one in layout.fields if f"{one.name}.".startswith(f"{wanted}."))
         places += range(1 + begin, 1 + begin + len(numbers(value)))
     rows = [f"    {places[kept]}" for kept in kept_inputs(code)] or ["    0"]

@@ -16,7 +16,7 @@ from starhold.export.code import Code
 from starhold.export.types import Member, Type, comment
 from starhold.laws.program import law_digest
 from starhold.parts.contract import fields
-from starhold.trace.c99 import GUARD
+from starhold.trace.c99 import GUARD, helpers
 from starhold.trace.source import TIE
 from starhold.version import __version__
 
@@ -114,10 +114,11 @@ def _header(code: Code, types: list[Type], public: dict[str, str], scenario: str
         + (": the side of the quaternion is that of its initial attitude." if "sign" in code.flight.start._fields else ".")
     )
     lines += [f"void {name}_init({name}_state_t *state);", ""]
+    more = " and memcpy" if helpers("\n".join(code.printed.lines)) else ""
     lines += comment(
         f"One control step: {card.summary}. Takes what was measured at this instant, gives what to command until the next, "
-        "and changes the state. It calls nothing but sqrt and keeps nothing outside the state. It does not check what it is "
-        "given: a NaN that the law uses comes out as one."
+        f"and changes the state. It calls nothing but sqrt{more} and keeps nothing outside the state. It does not check "
+        "what it is given: a NaN that the law uses comes out as one."
     )
     lines += [f"void {name}_step({name}_state_t *state, const {name}_input_t *input, {name}_command_t *command);", ""]
     lines += ["#ifdef __cplusplus", "}", "#endif", "", f"#endif /* {guard} */", ""]
@@ -192,8 +193,10 @@ def _source(code: Code, public: dict[str, str]) -> str:
     lines = [*comment(banner), "", f'#include "{name}.h"', ""]
     constants = list(_constants(code))
     body = "\n".join([*constants, *printed.lines])
-    needed = {"math": r"\bsqrt\(|\bINFINITY\b|\bNAN\b", "stdbool": r"\bbool\b", "stdint": r"\bint32_t\b"}
+    needed = {"math": r"\bsqrt\(|\bINFINITY\b|\bNAN\b", "stdbool": r"\bbool\b", "stdint": r"\bint32_t\b|\bUINT64_C\b"}
     includes = [f"#include <{file}.h>" for file, words in needed.items() if re.search(words, body)]
+    taking = helpers(body)
+    includes += ["#include <string.h>"] * bool(taking)
     includes += ["#include <stdint.h>"] if code.buffers and "#include <stdint.h>" not in includes else []
     lines += [*includes, *([""] if includes else []), GUARD, ""]
     aliases = [f"typedef {title} {kind};" for kind, title in public.items() if not kind.startswith("flight_")]
@@ -201,6 +204,8 @@ def _source(code: Code, public: dict[str, str]) -> str:
     for kind in _spoken_of(code, f"{body} {_interface(code)}"):
         if kind.name not in public:
             lines += [*_declaration(kind, {}), ""]
+    for text in taking:
+        lines += [*text.splitlines(), ""]
     lines += [*constants, ""] if constants else []
     for memory, parts in code.parts.items():
         lines += [*comment(f"Where the parts of {memory} begin."), "enum {"]

@@ -87,7 +87,7 @@ class Types:
         if len(kinds) < 2:
             return kinds[0] if kinds else None
         first, count = kinds[0], len(value)  # pyright: ignore
-        if any(kind != first for kind in kinds):
+        if len(kinds) < count or any(kind != first for kind in kinds):
             return self.several("several_t", [(f"part{k}", self.of(part), k) for k, part in enumerate(value)])  # pyright: ignore
         # Of what is not annotated four numbers are a quaternion.
         if (first, count) in _PLAIN and (count != 4 or not annotation or re.search("Quaternion|Any", annotation)):

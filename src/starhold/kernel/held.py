@@ -92,6 +92,7 @@ class Held:
             [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")
         )
         self.turned, self.rated = (x + y for x, y in zip(self.noise, errors, strict=True))
+        self.led, self.hurried = (numbers.get(f"error.target.{name}") or Fraction(0) for name in ("rate", "acceleration"))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
         names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}
@@ -172,11 +173,12 @@ class Held:
     def misread(self, region: Region) -> tuple[Fraction, Fraction]:
         """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
         far from there and what errors that noise drives add linearly on target."""
-        if not self.turned + self.rated:
+        if not self.turned + self.rated + self.led + self.hurried:
             return Fraction(0), Fraction(0)
         e, r, a, _ = (self.size(letter) for letter in "erah")
         J = [[poly(x).number for x in row] for row in self.loop.J]
-        wrong = {"q": self.turned / 2, "w": self.rated + self.turned * r, "r": self.turned * r, "a": self.turned * a}
+        turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
+        wrong = {"q": self.turned / 2, "w": self.rated + turn["r"]} | turn
         wrong |= {"h": stretch(J) * self.rated, "e": 2 * e}
         sizes = {name: x + wrong[name[-1] if name in (SPEED, ANGLE) else name[0]] for name, x in region.sizes.items()}
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}

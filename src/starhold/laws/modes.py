@@ -6,42 +6,42 @@ so the state in which a mode begins fulfils its switch's condition. A mode's law
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.quaternion import half_angle_sine
-from starhold.algebra.scalar import Scalar, Truth, absolute, both, either, less, less_equal, maximum, opposite, where
+from starhold.algebra.scalar import Scalar, Truth, absolute, both, either, less, maximum, opposite, where
 from starhold.algebra.structure import buffers, chosen
 from starhold.algebra.structured import Buffer, repeat, when
-from starhold.algebra.vector import ZERO, norm
+from starhold.algebra.vector import ZERO
 from starhold.laws.catalogue import Law
+from starhold.laws.conditions import (
+    NEVER,
+    SETTINGS,
+    Facts,
+    Sight,
+    Watch,
+    advanced,
+    level_of,
+    needs_sky,
+    quantity_of,
+    settings_of,
+    sky_at,
+    station_at,
+    watches,
+)
 from starhold.laws.interface import Card, Field, Gain, Measurement
+from starhold.laws.monitors import Guard, Monitor, watched
+from starhold.parts.epoch import EPOCH
 
 NAME = "modes"
 """The type of such a law in a scenario."""
-UNITS = {"rate": "rad/s", "body_rate": "rad/s", "angle": "rad", "wheel_momentum": "N m s"}
-TEXTS = {
-    "rate": "the rate relative to the target",
-    "body_rate": "the absolute rate",
-    "angle": "the angle to the target",
-    "wheel_momentum": "the norm of the wheels' momentum",
-}
-TESTS = tuple(f"{name}_{side}" for name in UNITS for side in ("below", "above"))
-"""Quantities that a condition may test, beside time: a measured norm below or above a level."""
-ENDS = ("rate_below", "body_rate_below", "angle_below")
-"""The tests that bound where a mode ends."""
 AFTER = Gain("s", at_least=0.0, text="least time in the mode")
 DWELL = Gain("s", at_least=0.0, text="time for which all of it must have held without a break")
-
-
-def level_of(test: str) -> Gain:
-    """The declaration of a test's level."""
-    name, _, side = test.rpartition("_")
-    most = 3.141592653589793 if name == "angle" else None
-    return Gain(UNITS[name], above=0.0, at_most=most, text=f"where {TEXTS[name]} is {side} this")
+WHEELS_LOST = Gain("1", at_least=1.0, text="so many wheels lost, as diagnosed, begin the mode")
 
 
 class Switch(NamedTuple):
@@ -50,6 +50,11 @@ class Switch(NamedTuple):
     key: str
     to: int
     tests: tuple[str, ...]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys of its levels, and of the further numbers of its tests."""
+        return (*self.tests, *settings_of(self.tests))
 
 
 class Mode(NamedTuple):
@@ -75,6 +80,20 @@ class Memory(NamedTuple):
     instants: tuple[float, ...]
     memories: tuple[Any, ...]
     fresh: tuple[Any, ...]
+    watch: Any = ()
+    """A `Watch`, where a condition or a monitor looks beyond the law's measurement."""
+    losses: Any = ()
+    """`Losses`, where a mode begins on a loss."""
+
+
+class Losses(NamedTuple):
+    """Losses are remembered: what the monitors keep, how many more wheels there were to lose, how often a loss was noticed,
+    and the monitor that is tripped, counted from 1 (0: none)."""
+
+    guards: tuple[Guard, ...]
+    left: float
+    trips: float
+    tripped: float
 
 
 class Sample(NamedTuple):
@@ -84,11 +103,23 @@ class Sample(NamedTuple):
     time_in_mode: Annotated[float, Quantity("s", "since that mode began")]
 
 
+class LossSample(NamedTuple):
+    """The mode is recorded, with the losses that flight software noticed."""
+
+    mode: Annotated[float, Quantity("1", "mode that commands, counted from 1")]
+    time_in_mode: Annotated[float, Quantity("s", "since that mode began")]
+    trips: Annotated[float, Quantity("1", "losses noticed since the start")]
+    tripped: Annotated[float, Quantity("1", "monitor that is tripped, counted from 1; 0 for none")]
+
+
 @dataclass(frozen=True)
 class Modes:
     """A law of modes has this for a module, with all that a law file holds; equal for the same modes with any gains."""
 
     modes: tuple[Mode, ...]
+    on_loss: int | None = None
+    """The mode, counted from 0, that begins where wheels are lost or a monitor trips."""
+    monitors: tuple[Monitor, ...] = ()
 
     @property
     def CARD(self) -> Card:  # noqa: N802
@@ -105,8 +136,39 @@ class Modes:
 
     @property
     def READS(self) -> tuple[str, ...]:  # noqa: N802
-        """The readings that any mode's law needs."""
-        return tuple(dict.fromkeys(name for mode in self.modes for name in mode.law.reads))
+        """The readings that any mode's law, a condition or a monitor needs."""
+        needed = [name for mode in self.modes for name in mode.law.reads]
+        return tuple(dict.fromkeys((*needed, *self.SEVERAL)))
+
+    @property
+    def SEVERAL(self) -> tuple[str, ...]:  # noqa: N802
+        """The readings among them that several sensors may give, because only conditions and monitors need them."""
+        needed = {name for mode in self.modes for name in mode.law.reads}
+        looked = [tested.reads for test in self.tests if (tested := quantity_of(test)) and tested.reads]
+        looked += [one.watches for one in self.monitors if one.sensor is not None]
+        return tuple(dict.fromkeys(name for name in looked if name not in needed))
+
+    @property
+    def ESTIMATES(self) -> tuple[str, ...]:  # noqa: N802
+        """The names of the estimates that conditions and monitors need."""
+        looked = [tested.estimates for test in self.tests if (tested := quantity_of(test)) and tested.estimates]
+        looked += [one.watches for one in self.monitors if one.sensor is None or one.kind == "residual"]
+        return tuple(dict.fromkeys(looked))
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        """The tests of all conditions."""
+        return tuple(test for mode in self.modes for switch in mode.switches for test in switch.tests)
+
+    @property
+    def WATCHES(self) -> bool:  # noqa: N802
+        """Whether a condition or a monitor looks beyond the law's measurement."""
+        return self.on_loss is not None or watches(self.tests)
+
+    @property
+    def ABOUT(self) -> str:  # noqa: N802
+        """The body, by its name, that the craft must orbit for the conditions to have a meaning."""
+        return "Earth" if needs_sky(self.tests) else ""
 
     @property
     def Gains(self) -> Any:  # noqa: N802
@@ -118,7 +180,16 @@ class Modes:
         listed: list[Field] = []
         for place, mode in enumerate(self.modes, 1):
             listed += [replace(item, name=f"mode[{place}].{item.name}") for item in _mode_fields(mode)]
-        return listed
+        return listed + [replace(item, name=name.format(".")) for name, item in self.shared_fields()]
+
+    def shared_fields(self) -> list[tuple[str, Field]]:
+        """The numbers that no single mode has, each with its name, in which {} stands for what divides it."""
+        shared = [("epoch", Field("epoch", EPOCH, True))] if needs_sky(self.tests) else []
+        if self.on_loss is not None:
+            shared.append(("wheels_lost", Field("wheels_lost", WHEELS_LOST, False, 1.0)))
+        for place, monitor in enumerate(self.monitors, 1):
+            shared += [(f"monitor[{place}]{{}}{item.name}", item) for item in monitor.fields()]
+        return shared
 
     def parts(self, gains: Any) -> Iterator[tuple[Mode, Any, list[tuple[Switch, Any]]]]:
         """Each mode with the gains of its law, and its switches with their numbers."""
@@ -131,31 +202,65 @@ class Modes:
         """The memory at the start, in the first mode."""
         now, fresh = (tuple(mode.law.remember(its, craft, period) for mode, its, _ in self.parts(gains)) for _ in range(2))
         slots = max(len(mode.switches) for mode in self.modes)
-        return Memory(0.0, -1.0, (0.0,) * slots, now, fresh)
+        watch = losses = ()
+        if self.WATCHES:
+            switches = [one for _, _, of_mode in self.parts(gains) for one in of_mode]
+            given = [dict(zip(switch.keys, levels, strict=True)) for switch, (_, _, *levels) in switches]
+            stations = tuple(station_at(numbers) for numbers in given if "latitude" in numbers)
+            watch = Watch(-1.0, sky_at(gains.epoch) if needs_sky(self.tests) else (), stations, NEVER)
+        if self.on_loss is not None:
+            losses = Losses(tuple(monitor.at_start for monitor in self.monitors), gains.wheels_lost, 0.0, 0.0)
+        return Memory(0.0, -1.0, (0.0,) * slots, now, fresh, watch, losses)
 
-    def decide(self, measurement: Measurement, gains: Any, memory: Memory) -> Memory:
-        """The memory with the mode that commands at this control instant."""
+    def decide(self, measurement: Measurement, gains: Any, memory: Memory, sight: Sight | None = None) -> Memory:
+        """The memory with the mode that commands at this control instant. sight: what flight software sees, which laws take
+        that have `WATCHES`."""
         age = memory.age + 1.0
-        now = _Quantities(measurement)
+        watch = advanced(memory.watch, sight) if sight is not None else memory.watch
+        now = Facts(measurement, watch, sight)
         instants, following = [n + 1.0 for n in memory.instants], memory.mode
         due: list[tuple[Truth, int]] = []
+        stations = iter(watch.stations if watch else ())
         for place, (_, _, switches) in enumerate(self.parts(gains)):
             here = _is(memory.mode, place)
             for slot, (switch, (after, dwell, *levels)) in enumerate(switches):
                 holds = now.later(age, after)
-                for test, level in zip(switch.tests, levels, strict=True):
-                    holds = both(holds, now.holds(test, level))
+                numbers = dict(zip(switch.keys, levels, strict=True))
+                if "latitude" in numbers:
+                    numbers["station"] = next(stations)
+                for test in switch.tests:
+                    holds = both(holds, now.holds(test, numbers[test], numbers))
                 instants[slot] = where(both(here, opposite(holds)), 0.0, instants[slot])
                 due.append((both(here, now.later(instants[slot] - 1.0, dwell)), switch.to))
         for truth, to in due:
             following = where(truth, float(to), following)
+        losses = memory.losses
+        if self.on_loss is not None:
+            lost, losses = self._noticed(gains, losses, now)
+            following = where(lost, float(self.on_loss), following)
         switched = less(0.5, absolute(following - memory.mode))
         memories = tuple(
             _renewed(both(switched, _is(following, place)), kept, fresh)
             for place, (kept, fresh) in enumerate(zip(memory.memories, memory.fresh, strict=True))
         )
         instants = tuple(where(switched, 0.0, n) for n in instants)
-        return Memory(following, where(switched, 0.0, age), instants, memories, memory.fresh)
+        return Memory(following, where(switched, 0.0, age), instants, memories, memory.fresh, watch, losses)
+
+    def _noticed(self, gains: Any, losses: Losses, now: Facts) -> tuple[Truth, Losses]:
+        """Whether a mode is to begin because of a loss: as long as a monitor is tripped, and as the last wheel is lost of
+        those that may be."""
+        guards, tripped = list[Guard](), 0.0
+        numbers = iter(gains[len(gains) - 2 * len(self.monitors) :])
+        for place, (monitor, guard) in enumerate(zip(self.monitors, losses.guards, strict=True), 1):
+            truth, guard = watched(monitor, guard, now, next(numbers), next(numbers))
+            # The first of them is told.
+            tripped = where(both(truth, less(tripped, 0.5)), float(place), tripped)
+            guards.append(guard)
+        wheels = both(less(gains.wheels_lost, 0.5), less(gains.wheels_lost, losses.left - 0.5))
+        now_tripped = less(0.5, tripped)
+        noticed = either(wheels, both(now_tripped, less(losses.tripped, 0.5)))
+        trips = where(noticed, losses.trips + 1.0, losses.trips)
+        return either(wheels, now_tripped), Losses(tuple(guards), gains.wheels_lost, trips, tripped)
 
     def command(self, measurement: Measurement, gains: Any, craft: Any, memory: Memory) -> tuple[Any, Memory]:
         """The command of the present mode."""
@@ -182,9 +287,10 @@ class Modes:
                 resting = here if resting is None else either(resting, here)
         return resting
 
-    def record(self, memory: Memory, period: Scalar) -> Sample:
+    def record(self, memory: Memory, period: Scalar) -> Sample | LossSample:
         """The recorded quantities."""
-        return Sample(memory.mode + 1.0, maximum(memory.age, 0.0) * period)
+        mode = Sample(memory.mode + 1.0, maximum(memory.age, 0.0) * period)
+        return mode if self.on_loss is None else LossSample(*mode, memory.losses.trips, memory.losses.tripped)
 
     def check(self, gains: Any, craft: Any) -> None:
         """ValueError where a mode's gains make a loop that cannot be stable."""
@@ -196,9 +302,9 @@ class Modes:
         return []
 
 
-def make_law(modes: tuple[Mode, ...]) -> Law:
+def make_law(modes: Modes) -> Law:
     """The law of these modes."""
-    module: Any = Modes(modes)
+    module: Any = modes
     return Law(NAME, module)
 
 
@@ -207,41 +313,6 @@ def mode_laws(law: Law, gains: Any) -> list[tuple[str, Law, Any]]:
     if not isinstance(law.module, Modes):
         return []
     return [(mode.name, mode.law, its) for mode, its, _ in law.module.parts(gains)]
-
-
-class _Quantities:
-    """Quantities in the conditions are computed once, when first needed."""
-
-    def __init__(self, measurement: Measurement) -> None:
-        self.measurement = measurement
-        self._known: dict[str, Scalar] = {}
-
-    def later(self, periods: Scalar, time: Scalar) -> Truth:
-        """Whether this many control periods reach a time (s), to the nearest control instant."""
-        period = self.measurement.period
-        return less_equal(time - 0.5 * period, periods * period)
-
-    def holds(self, test: str, level: Scalar) -> Truth:
-        """Whether a test holds."""
-        name, _, side = test.rpartition("_")
-        level = _sine_of_half(level) if name == "angle" else level
-        return less(self._value(name), level) if side == "below" else less(level, self._value(name))
-
-    def _value(self, name: str) -> Scalar:
-        if name not in self._known:
-            angle = name == "angle"
-            measured = getattr(self.measurement, "attitude" if angle else name)
-            self._known[name] = half_angle_sine(measured) if angle else norm(measured)
-        return self._known[name]
-
-
-def _sine_of_half(angle: Scalar) -> Scalar:
-    """The sine of half an angle of up to pi, by its series; 1e-16 off at most."""
-    x = 0.25 * angle * angle
-    total = 1.0
-    for n in range(20, 0, -2):
-        total = 1.0 - total * x / float(n * (n + 1))
-    return 0.5 * angle * total
 
 
 def _is(mode: Scalar, place: int) -> Truth:
@@ -265,7 +336,8 @@ def _renewed(begins: Truth, kept: Any, fresh: Any) -> Any:
 def _numbers(switch: Switch) -> list[Field]:
     """The numbers of a switch under its keys."""
     waits = [Field("after", AFTER, False, 0.0), Field("dwell", DWELL, False, 0.0)]
-    return [*waits, *(Field(test, level_of(test), True) for test in switch.tests)]
+    settings = [SETTINGS[key] for key in settings_of(switch.tests)]
+    return [*waits, *(Field(test, level_of(test), True) for test in switch.tests), *settings]
 
 
 def _mode_fields(mode: Mode) -> list[Field]:
@@ -278,9 +350,8 @@ def _mode_fields(mode: Mode) -> list[Field]:
 
 @cache
 def _gains_of(modes: Modes) -> Any:
-    named = [
-        (f"{item.name}_of_{place}".replace(".", "_"), Annotated[Any, item.gain])
-        for place, mode in enumerate(modes.modes, 1)
-        for item in _mode_fields(mode)
-    ]
+    places = enumerate(modes.modes, 1)
+    pairs = [(f"{one.name}_of_{k}".replace(".", "_"), one.gain) for k, mode in places for one in _mode_fields(mode)]
+    pairs += [(re.sub(r"\W", "", name.format("_")), one.gain) for name, one in modes.shared_fields()]
+    named = [(name, Annotated[Any, gain]) for name, gain in pairs]
     return NamedTuple("Gains", named)  # pyright: ignore

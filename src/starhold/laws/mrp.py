@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import side
+from starhold.algebra.rotation import modified_rodrigues
 from starhold.algebra.vector import Vector, add, scale, subtract
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, tracking_torque
 from starhold.parts.craft import Craft
@@ -30,9 +29,7 @@ class Gains(NamedTuple):
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemory) -> tuple[Vector, NoMemory]:
     """Return the control torque (N m, body)."""
-    q = measurement.attitude
-    near = side(q[0])
-    stiffness = scale(gains.k_attitude * near / (1.0 + near * q[0]), vector_part(q))
+    stiffness = modified_rodrigues(measurement.attitude, gains.k_attitude)
     feedback = add(scale(gains.k_rate, measurement.rate), stiffness)
     return subtract(tracking_torque(measurement, craft), feedback), memory
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from starhold.algebra.polynomial import UnreadableError
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
@@ -15,15 +16,15 @@ from starhold.laws.point import PointMeasurement
 from starhold.trace.straight_line import straight_line
 
 ASKED: dict[str, Any] = {
-    "rigid-body": Measurement((1.0, *ZERO), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO, ZERO),
+    "rigid-body": Measurement((1.0, *ZERO), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO, ZERO, 0.0),
     "libration-point": PointMeasurement(ZERO, ZERO, 0.0, 0.0),
 }
 """By body a measurement of which every number is an input."""
 
 
 def law_program(law: Law, gains: Any, craft: Any, period: float) -> dict[str, Any]:
-    """Return a law's command as a program; gains and craft are inputs but for choices and whole numbers. InputError where it
-    has loops, buffers or words."""
+    """Return a law's command as a program; gains and craft are inputs but for choices and whole numbers. Errors as of
+    `straight_line`."""
     memory = law.remember(gains, craft, period)
 
     def command(measurement: Any, gains: Any, craft: Any) -> Any:
@@ -38,5 +39,5 @@ def law_digest(law: Law, gains: Any, craft: Any, period: float) -> str:
         return ""
     try:
         return digest(law_program(law, gains, craft, period))
-    except InputError:
+    except (InputError, UnreadableError):
         return ""

@@ -62,6 +62,8 @@ class Plant:
         self.layout = Layout(flight.loop)
         fields = [[one.name, one.size] for one in self.layout.fields]
         self._about = json.dumps(about | {"steps": rules.steps, "fields": fields})
+        # No period waits for a compiler.
+        flight.prepare()
         self._readings = flight.reset()
         self.send: Callable[[bytes], None] = lambda data: None
         self._is_text = False
@@ -73,8 +75,8 @@ class Plant:
         self.missed = 0
         """Periods of real time for which no command came in time."""
         self.commanded = 0
-        self.behind = 0.0
-        """How late the plant itself has begun a period at most (s)."""
+        self.lateness: list[float] = []
+        """How late the plant itself has begun each period of real time (s)."""
         self._sent: dict[int, float] = {}
         self._begin()
 
@@ -84,6 +86,11 @@ class Plant:
         if self.rules.rate is None or self._begun is None or self.ending is not None:
             return None
         return self._begun + (self.flight.steps + 1) * self.flight.loop.period / self.rules.rate
+
+    @property
+    def behind(self) -> float:
+        """How late the plant itself has begun a period at most (s)."""
+        return max(self.lateness, default=0.0)
 
     def received(self, data: bytes, decoder: Decoder) -> None:
         """Heed the messages in these bytes of a stream, which has a decoder of its own, as far as they are valid."""
@@ -97,16 +104,12 @@ class Plant:
         for fault in decoder.end():
             self._heed(fault, decoder)
 
-    def hang_up(self, decoder: Decoder) -> None:
-        """Note that the peer, whose stream had this decoder, is gone, in the middle of a message perhaps."""
-        self.faults.update(decoder.end())
-        self.end(Ending.GONE)
-
     def tick(self) -> None:
         """Fly the period that is over, with the command that came for it or by the rule for none."""
         if self.due is None:
             return
-        self.behind = max(self.behind, self.clock() - self.due)
+        # A timer may be early by less than its resolution.
+        self.lateness.append(max(0.0, self.clock() - self.due))
         command, self._next = self._next, None
         if command is None:
             self.missed += 1
@@ -212,6 +215,14 @@ class Plant:
 
     def _tell(self, message: Message) -> None:
         self.send(line(message) if self._is_text else binary(message))
+
+
+def status(plant: Plant) -> str:
+    """Say in a line how a flight in real time goes: its step, the latest latencies, and what was missed."""
+    latest = plant.latencies[-KEPT:]
+    latency = f"{1e3 * np.median(latest):.3g} ms, at most {1e3 * max(latest):.3g} ms" if latest else "none yet"
+    late = f"plant late by {1e3 * plant.behind:.3g} ms"
+    return f"Step {plant.flight.steps}/{plant.rules.steps}: latency {latency}; missed {plant.missed}; {late}"
 
 
 def summary(plant: Plant) -> list[str]:

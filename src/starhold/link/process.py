@@ -15,7 +15,7 @@ from starhold.errors import InputError
 from starhold.link.plant import Ending, Plant, Rules
 from starhold.link.protocol import Decoder
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.simulation.lane import Progress
+from starhold.simulation.lane import Progress, Recording
 from starhold.simulation.stepper import Stepper
 
 PATIENCE = 60.0
@@ -26,13 +26,25 @@ EVERY = 100
 """Control steps between two reports of progress."""
 
 
+class LostLawError(InputError):
+    """A law's process failed. flight: what was flown until then; recording: the same under its names, where there is one."""
+
+    def __init__(self, flight: Stepper, found: str, allowed: str) -> None:
+        super().__init__("run", "--law-process", found, allowed)
+        self.flight = flight
+        self.recording: Recording | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return InputError, (self.where, self.key, self.given, self.allowed)
+
+
 def fly_by_process(
     command: str, loop: ClosedLoop, steps: int, record_every: int = 1, progress: Progress | None = None
 ) -> tuple[NDArray[Any], Any]:
     """The samples and the last carry of a loop, as `fly` gives them, whose commands come from a process.
 
-    command: the program and its arguments; no shell reads it. Lockstep; InputError where it cannot be started, ends before
-    the flight does, hangs, or sends what is not valid."""
+    command: the program and its arguments; no shell reads it. Lockstep; InputError where it cannot be started, LostLawError
+    where it ends before the flight does, hangs, or sends what is not valid."""
     flight = Stepper(loop)
     plant = Plant(flight, {}, Rules(steps))
     try:
@@ -58,11 +70,14 @@ def _converse(plant: Plant, child: subprocess.Popen[bytes], command: str, progre
     waiting, decoder = bytearray(), Decoder()
     plant.send = waiting.extend
     shown = 0
+
+    def lost(what: str, allowed: str = "a command for every step") -> LostLawError:
+        return LostLawError(plant.flight, f"{command}, at step {plant.flight.steps}, {what}", allowed)
+
     while plant.ending is None or waiting:
         readable, writable, _ = select.select([source], [sink] if waiting else [], [], PATIENCE)
-        at = f"{command}, at step {plant.flight.steps}"
         if not readable and not writable:
-            raise InputError("run", "--law-process", f"{at}, nothing for {PATIENCE:g} s", "a command for every step")
+            raise lost(f"nothing for {PATIENCE:g} s")
         try:
             if writable:
                 del waiting[: os.write(sink, waiting[: select.PIPE_BUF])]
@@ -77,16 +92,13 @@ def _converse(plant: Plant, child: subprocess.Popen[bytes], command: str, progre
         if data == b"":
             with contextlib.suppress(subprocess.TimeoutExpired):
                 child.wait(GRACE)
-            found = f"{at}, a process that ended with {child.returncode}"
-            raise InputError("run", "--law-process", found, "a command for every step")
+            raise lost(f"a process that ended with {child.returncode}")
         plant.received(data or b"", decoder)
         if plant.faults:
             fault = next(iter(plant.faults))
-            raise InputError(
-                "run", "--law-process", f"{at}, a message that is {fault}", "the protocol of docs/in-the-loop.md"
-            )
+            raise lost(f"a message that is {fault}", "the protocol of docs/in-the-loop.md")
         if plant.ending is Ending.STOPPED:
-            raise InputError("run", "--law-process", f"{at}, a process that stops the flight", "a command for every step")
+            raise lost("a process that stops the flight")
         if progress is not None and (plant.flight.steps - shown >= EVERY or plant.ending is not None):
             shown = plant.flight.steps
             progress(shown, plant.rules.steps)

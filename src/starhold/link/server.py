@@ -1,4 +1,4 @@
-"""A plant that listens on TCP or UDP."""
+"""A plant that listens until its flight ends: what is common to all transports, and TCP and UDP."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import asyncio
 import contextlib
 import signal
 import threading
-from collections.abc import Callable, Generator
-from typing import Any, cast
+from collections.abc import Callable, Coroutine, Generator
+from typing import Any, TypeAlias, cast
 
 from starhold.errors import InputError
 from starhold.link.plant import Ending, Plant
@@ -16,42 +16,65 @@ from starhold.link.protocol import Decoder
 HOST, PORT = "127.0.0.1", 5750
 UNREAD = 2**22
 """Bytes that wait for a peer; one that leaves more unread is gone."""
+SECOND = 1.0
+"""The least time between two looks at a flight in real time (s)."""
+
+Listen: TypeAlias = Callable[["Line"], Coroutine[Any, Any, tuple[str, Callable[[], None]]]]
+"""A transport: it begins to listen for a line, and tells its address and what closes it."""
 
 
 def serve(
-    plant: Plant, host: str = HOST, port: int = PORT, udp: bool = False, announce: Callable[[str], None] | None = None
+    plant: Plant,
+    listen: Listen,
+    announce: Callable[[str], None] | None = None,
+    watch: Callable[[Plant], None] | None = None,
 ) -> int:
     """Listen until the plant's flight ends, and return the number of the signal that ended it, 0 for none.
 
-    announce: called with the address, once it listens. The first peer that says hello commands; messages of others are
-    counted. InputError where the address cannot be used."""
-    return asyncio.run(_serve(plant, host, port, udp, announce))
+    announce: called with the address, once it listens; watch: called with the plant in real time, at most once a second. The
+    first peer that says hello commands; messages of others are counted. InputError where the address cannot be used."""
+    return asyncio.run(_serve(plant, listen, announce, watch))
 
 
-async def _serve(plant: Plant, host: str, port: int, udp: bool, announce: Callable[[str], None] | None) -> int:
-    loop, line = asyncio.get_running_loop(), _Line(plant)
+async def _serve(
+    plant: Plant, listen: Listen, announce: Callable[[str], None] | None, watch: Callable[[Plant], None] | None
+) -> int:
+    line = Line(plant, watch)
     with _interrupts(line.interrupt):
-        server: Any = None
-        try:
-            if udp:
-                server, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(line), (host, port))
-                at = server.get_extra_info("sockname")
-            else:
-                server = await loop.create_server(lambda: _Stream(line), host, port)
-                at = server.sockets[0].getsockname()
-        except OSError as error:
-            found = f"{host}:{port}, {error.strerror or error}"
-            raise InputError(
-                "serve", "--host, --port", found, "an address of this machine, and a port that is free"
-            ) from None
+        address, close = await listen(line)
         try:
             if announce is not None:
-                announce(f"{'udp' if udp else 'tcp'}://{at[0]}:{at[1]}")
+                announce(address)
             await line.over
         finally:
             line.close()
-            server.close()
+            close()
     return line.signal
+
+
+@contextlib.contextmanager
+def refused(keys: str, given: str, allowed: str = "an address of this machine, and a port that is free") -> Generator[None]:
+    """Refuse as the user's input what cannot be listened on."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError("serve", keys, f"{given}, {error.strerror or error}", allowed) from None
+
+
+async def tcp(line: Line, host: str, port: int) -> tuple[str, Callable[[], None]]:
+    """Listen on TCP, where each connection is a stream of messages."""
+    with refused("--host, --port", f"{host}:{port}"):
+        server = await asyncio.get_running_loop().create_server(lambda: Stream(line), host, port)
+    at = server.sockets[0].getsockname()
+    return f"tcp://{at[0]}:{at[1]}", server.close
+
+
+async def udp(line: Line, host: str, port: int) -> tuple[str, Callable[[], None]]:
+    """Listen on UDP, where each datagram holds whole messages."""
+    with refused("--host, --port", f"{host}:{port}"):
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(lambda: _Datagrams(line), (host, port))
+    at = transport.get_extra_info("sockname")
+    return f"udp://{at[0]}:{at[1]}", transport.close
 
 
 @contextlib.contextmanager
@@ -74,11 +97,11 @@ def _interrupts(end: Callable[[int], None]) -> Generator[None]:
             signal.signal(number, handler)
 
 
-class _Line:
+class Line:
     """The plant, the one peer that commands it, and the clock."""
 
-    def __init__(self, plant: Plant) -> None:
-        self.plant = plant
+    def __init__(self, plant: Plant, watch: Callable[[Plant], None] | None = None) -> None:
+        self.plant, self._watch, self._watched = plant, watch, plant.clock()
         self.over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.peer: Any = None
         """The connection or address that said hello first, and so commands."""
@@ -104,6 +127,16 @@ class _Line:
         self.plant.end(Ending.INTERRUPTED)
         self.after()
 
+    def gone(self) -> None:
+        """End the flight, for the peer that commands is gone."""
+        self.plant.end(Ending.GONE)
+        self.after()
+
+    def failed(self, task: asyncio.Task[None]) -> None:
+        """Let an error in a task of a transport be that of the server."""
+        if not task.cancelled() and (error := task.exception()) is not None and not self.over.done():
+            self.over.set_exception(error)
+
     def close(self) -> None:
         """Leave all peers."""
         if self._timer is not None:
@@ -127,16 +160,19 @@ class _Line:
         self._timer = None
         self.plant.tick()
         self.after()
+        if self._watch is not None and self.plant.clock() >= self._watched + SECOND:
+            self._watched = self.plant.clock()
+            self._watch(self.plant)
 
 
-class _Stream(asyncio.Protocol):
-    """One connection."""
+class Stream(asyncio.Protocol):
+    """A connection, or a line without any; writer: where it is written to, if not where it is read from."""
 
-    def __init__(self, line: _Line) -> None:
-        self._line, self._decoder = line, Decoder()
+    def __init__(self, line: Line, writer: asyncio.WriteTransport | None = None) -> None:
+        self._line, self._decoder, self._writer = line, Decoder(), writer
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.Transport, transport)
+        self._transport = transport
         self._line.transports.add(transport)
 
     def data_received(self, data: bytes) -> None:
@@ -148,20 +184,21 @@ class _Stream(asyncio.Protocol):
         self._gone()
 
     def _send(self, data: bytes) -> None:
-        self._transport.write(data)
-        if self._transport.get_write_buffer_size() > UNREAD:
+        writer = self._writer or cast(asyncio.WriteTransport, self._transport)
+        writer.write(data)
+        if writer.get_write_buffer_size() > UNREAD:
             self._gone()
 
     def _gone(self) -> None:
         if self._line.peer is self:
-            self._line.plant.hang_up(self._decoder)
-            self._line.after()
+            self._line.plant.faults.update(self._decoder.end())
+            self._line.gone()
 
 
 class _Datagrams(asyncio.DatagramProtocol):
     """Datagrams, of which each holds whole messages."""
 
-    def __init__(self, line: _Line) -> None:
+    def __init__(self, line: Line) -> None:
         self._line = line
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:

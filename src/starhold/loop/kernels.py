@@ -17,6 +17,7 @@ from starhold.algebra.structure import buffers, flatten, leaves, mapped, rebuild
 from starhold.algebra.structured import Buffer
 from starhold.loop.closed_loop import ClosedLoop, Composition, Phase
 from starhold.loop.step import Step, make_equations
+from starhold.parts.random import Dice, Silent
 from starhold.trace.machine import load, word
 from starhold.trace.program import Program
 from starhold.trace.recording import Recorder
@@ -50,9 +51,9 @@ class Observer(NamedTuple):
 
 
 @cache
-def make_step(parts: Composition) -> Step:
-    """The equations of a control step made of these parts."""
-    return make_equations(parts)
+def make_step(parts: Composition, silent: bool = False) -> Step:
+    """The equations of a control step made of these parts; silent: without any noise."""
+    return make_equations(parts, Silent if silent else Dice)
 
 
 def form(value: Any) -> Any:

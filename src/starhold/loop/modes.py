@@ -54,6 +54,13 @@ class ModeTargets:
         """Their parameters as equations take them."""
         return tuple(Fitted(part, numbers).prepared(period) for part, numbers in zip(self.parts, params, strict=True))
 
+    def check(self, params: tuple[Any, ...], craft: Any) -> None:
+        """ValueError where one of them does not fit a craft."""
+        for part, numbers in zip(self.parts, params, strict=True):
+            examine = part.hook("check")
+            if examine is not None:
+                examine(numbers, craft)
+
     def goal(self, params: tuple[Any, ...], state: Any, step: Any, before: Any, mode: Any) -> Goal:
         """The goal of the present mode."""
         goals = [part.module.goal(numbers, state, step, before) for part, numbers in zip(self.parts, params, strict=True)]

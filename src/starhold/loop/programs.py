@@ -3,16 +3,18 @@ over the calls of a law."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
-from starhold.algebra.scalar import less
+from starhold.algebra.scalar import is_finite, less, where
 from starhold.algebra.structure import flatten, mapped, move
 from starhold.algebra.structured import Buffer, at, repeat
 from starhold.algebra.words import number_of, whole_word, word_add, word_of
 from starhold.loop.closed_loop import Composition
 from starhold.loop.kernels import Arguments, Kernel, Numbers, Observer, form, make_step, numbers_of
 from starhold.loop.step import Step
+from starhold.parts.part import Part
+from starhold.parts.random import Silent
 from starhold.trace.program import Loop, Program, Store
 from starhold.trace.recording import Cells, Recorder
 from starhold.trace.sharing import differing, split
@@ -125,6 +127,53 @@ def many(
     return recorder.program("fly", "Flies many closed loops.")
 
 
+class Given(NamedTuple):
+    """A row gives this from outside at a control instant: the readings of each sensor and, where they are finite, numbers of
+    the body's state, of the effectors' states and of the command that acts."""
+
+    readings: Any
+    state: Any
+    effectors: Any
+    command: Any
+
+
+def replaying(step: Step, carry: Any, numbers: Numbers, substeps: int, like: Given) -> Program:
+    """`count` control steps of one lane from `first` on, recorded: what the estimator and the law make of readings from
+    outside. `given` has a row shaped as `like` for each, `record` gets the step's sample with the law's own command. Numbers
+    of the state that are not given are those that are estimated or read, else those of the motion."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, record = (recorder.memory(name, lanes=True, writable=True) for name in ("carry", "record"))
+        given = recorder.memory("given", lanes=True)
+        first, count = recorder.input("first", "index"), recorder.input("count", "index")
+        key = (recorder.input("seed", "word"), recorder.input("run", "word"))
+        gains, nominal, craft, setup = Arguments(*numbers).bound(recorder, 0)
+
+        def turn(k: Any, carry: Any) -> Any:
+            row: Given = _state(like, given, k * len(flatten(like)))
+            known = carry._replace(state=_finite(row.state, carry.state), effectors=_finite(row.effectors, carry.effectors))
+            decided = step.update(known, first + k, key, gains, nominal, setup, seen=row.readings)
+            _put_row(record, k, step.sample(decided, first + k, setup))
+            command = _finite(row.command, decided.command)
+            acting = step.update(known, first + k, key, gains, nominal, setup, command, row.readings)
+            sources = (decided.memories.estimate, *row.readings)
+            believed = {
+                name: next((getattr(one, name) for one in sources if hasattr(one, name)), getattr(acting.state, name))
+                for name in acting.state._fields
+            }
+            moving = acting._replace(state=_finite(row.state, acting.state._replace(**believed)))
+            return (step.check(_propagated(step, moving, craft, setup, substeps), first + k + 1, setup),)
+
+        _put(cells, 0, repeat(count, turn, _state(carry, cells, 0))[0])
+    return recorder.program("replay", "Replays readings from outside.")
+
+
+def _finite(given: Any, other: Any) -> Any:
+    """Take the numbers that are given, where they are finite, else others of the same structure."""
+    source = iter(flatten(given))
+    return mapped(other, lambda leaf: where(is_finite(number := next(source)), number, leaf))
+
+
 def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: bool) -> Program:
     """One control step, or none if `count` is 0, of each lane of `blocks` blocks of lanes, recorded. The law decides or, if
     `outside`, the command lies in `given`. What the law is told at the end lies in `sensed`, the step's sample in `record`.
@@ -154,6 +203,40 @@ def stepping(step: Step, carry: Any, numbers: Numbers, substeps: int, outside: b
 
         repeat(blocks, block)
     return recorder.program("fly", "Flies a step of closed loops.")
+
+
+def predicting(
+    step: Step, sensors: Sequence[Part], made: Callable[..., tuple[Any, Numbers]], free: int, substeps: int, outside: bool
+) -> tuple[Program, Program, Arguments]:
+    """The flight that so many free numbers predict, recorded: the program that makes its carry of them, which `made`
+    gives with the kernel's numbers, and one of `count` control steps from `first` on. All readings lie in `record` and, if
+    `outside`, all commands in `given`; then the law's memory stays. step: see `silent` of `make_step`."""
+    recorder = Recorder()
+    with recorder.recording():
+        cells, numbers = recorder.memory("carry", lanes=True, writable=True), recorder.memory("free", lanes=True)
+        for place, number in enumerate(numbers_of(made([numbers[k] for k in range(free)])[0])):
+            cells[place] = number
+    begin, recorder = recorder.program("begin"), Recorder()
+    with recorder.recording():
+        cells, numbers = recorder.memory("carry", lanes=True, writable=True), recorder.memory("free", lanes=True)
+        record, given = recorder.memory("record", lanes=True, writable=True), recorder.memory("given")
+        first, count = recorder.input("first", "index"), recorder.input("count", "index")
+        like, values = made([numbers[k] for k in range(free)])
+        arguments = Arguments(*values)
+        gains, nominal, craft, setup = arguments.bound(recorder, 0)
+
+        def turn(k: Any, carry: Any) -> Any:
+            now, state, memories = first + k, carry.state, carry.memories.sensors
+            fitted = zip(sensors, memories, setup.sensors, strict=True)
+            _put_row(record, now, tuple(s.module.measure(state, m, p, Silent(), now)[0] for s, m, p in fitted))
+            command = tuple(given[now * 3 + i] for i in range(3)) if outside else None
+            updated = step.update(carry, now, (0, 0), gains, nominal, setup, command)
+            return (_propagated(step, updated, craft, setup, substeps),)
+
+        begun = _state(like, cells, 0)
+        end = repeat(count, turn, begun)[0]
+        _put(cells, 0, end._replace(memory=begun.memory) if outside else end)
+    return begin, recorder.program("predict"), arguments
 
 
 def _put_row(cells: Cells, row: Any, values: Any) -> None:

@@ -13,9 +13,11 @@ from starhold.algebra.scalar import both, less, opposite, side, where
 from starhold.algebra.structure import chosen, runge_kutta
 from starhold.algebra.vector import ZERO, add
 from starhold.algebra.words import number_of, word_of
+from starhold.laws.conditions import Sight
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import Carry, Composition, can_be_inactive, is_recorded
 from starhold.parts.actuators.limits import LIMITS
+from starhold.parts.contract import CLOCK
 from starhold.parts.part import Part
 from starhold.parts.random import RANGE, Dice
 from starhold.parts.roles import Loads, Scene
@@ -23,8 +25,9 @@ from starhold.parts.roles import Loads, Scene
 
 class Step(NamedTuple):
     """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied,
-    `sense` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` is
-    the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
+    `sense` what the law is given at a control instant, of readings from outside if there are any; `update` decides by it or
+    takes a command from outside; `slope` is the rates of (state, effectors, outputs of actuators that another one follows),
+    which `propagate` integrates."""
 
     measure: Callable[..., Any]
     sense: Callable[..., Sensed]
@@ -55,8 +58,8 @@ def total(vectors: Any) -> Any:
     return result
 
 
-def make_equations(parts: Composition) -> Step:
-    """Compose the equations of a control step of these parts."""
+def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step:
+    """Compose the equations of a control step of these parts; dice: what makes their random numbers, as `Dice` does."""
     body, target = parts.body.module, parts.target
     limit = LIMITS[parts.limit]
     policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
@@ -64,7 +67,10 @@ def make_equations(parts: Composition) -> Step:
     still = target is None or target.flag("STILL")
     follows = target is not None and target.flag("FOLLOWS")
     by_mode = target is not None and target.flag("BY_MODE")
-    command_of = parts.law.module.command if by_mode else parts.law.command
+    # Such a law of modes looks at more than its measurement to decide which one commands.
+    watches = named.modes is not None and named.modes.WATCHES
+    timed = any(CLOCK in part.reads for part in (parts.law, *parts.effectors))
+    command_of = parts.law.module.command if by_mode or watches else parts.law.command
 
     def goal_of(carry, state, step, setup):
         if target is None:
@@ -72,7 +78,7 @@ def make_equations(parts: Composition) -> Step:
         mode = (carry.memory.mode,) if by_mode else ()
         return target.module.goal(setup.target, state, step, carry.memories.followed, *mode)
 
-    def observed(carry, step, key, craft, setup):
+    def observed(carry, step, key, craft, setup, seen=None):
         """Return a function that gives the law's measurement towards a goal and the memories of sensors and estimator, the
         goal, and the readings of the sensors."""
         state, memories = carry.state, carry.memories
@@ -80,13 +86,16 @@ def make_equations(parts: Composition) -> Step:
         readings, kept, every = SimpleNamespace(), [], []
         shown = []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
-            reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
+            reading, memory = sensor.module.measure(state, memory, params, dice(key, word_of(step), first), step)
+            reading = reading if seen is None else seen[len(every)]
             # Of several readings of a name all that do not ask for more are given the first.
             vars(readings).update(reading._asdict() | vars(readings))
             kept.append(memory)
             every.append(reading)
             if is_recorded(sensor):
                 shown.append(reading)
+        if timed and not hasattr(readings, CLOCK):
+            vars(readings)[CLOCK] = number_of(step) * setup.period
         estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
         if parts.estimator is not None:
             several = SimpleNamespace(**values, every=tuple(every))
@@ -117,28 +126,30 @@ def make_equations(parts: Composition) -> Step:
                 followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=estimator, estimate=estimate
             )
 
-        return show, goal, tuple(every)
+        return show, goal, Sight(known, tuple(every), estimate)
 
     def measure(carry, step, key, craft, setup):
         show, goal, _ = observed(carry, step, key, craft, setup)
         return show(goal)[0]
 
-    def sense(carry, step, key, gains, craft, setup):
-        show, goal, readings = observed(carry, step, key, craft, setup)
+    def sense(carry, step, key, gains, craft, setup, seen=None):
+        show, goal, sight = observed(carry, step, key, craft, setup, seen)
         measurement, memories = show(goal)
         h = carry.h
+        if by_mode or watches:
+            watched = (sight,) if watches else ()
+            carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory, *watched))
         if by_mode:
             # The measurement of the law of a mode that begins is relative to the mode's own target.
-            carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory))
             measurement, memories = show(goal_of(carry, carry.state, step, setup))
             h = where(less(carry.memory.age, 0.5), side(measurement.attitude[0]), h)
         if policy is not None:
             attitude, h = policy(measurement.attitude, h, setup.width)
             measurement = measurement._replace(attitude=attitude)
-        return Sensed(measurement, readings, memories.estimate, carry, memories, h)
+        return Sensed(measurement, sight.readings, memories.estimate, carry, memories, h)
 
-    def update(carry, step, key, gains, craft, setup, given=None):
-        measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup)
+    def update(carry, step, key, gains, craft, setup, given=None, seen=None):
+        measurement, _, _, carry, memories, h = sense(carry, step, key, gains, craft, setup, seen)
         command, memory = command_of(measurement, gains, craft, carry.memory)
         command = limit(command if given is None else given, setup.limit)
         passed = command
@@ -151,7 +162,7 @@ def make_equations(parts: Composition) -> Step:
         )
         state = carry.state if named.dynamic else carry.state._replace(**{body.COMMAND: passed})
         environments = [
-            e.module.update(m, carry.state, p, Dice(key, word_of(step), first), step) if e.hook("update") else m
+            e.module.update(m, carry.state, p, dice(key, word_of(step), first), step) if e.hook("update") else m
             for e, m, p, first in zip(
                 parts.environments, memories.environments, setup.environments, named.environments, strict=True
             )

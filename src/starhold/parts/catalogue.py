@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import inspect
 import linecache
 import os
 import pkgutil
@@ -21,7 +22,8 @@ from typing import Any, TypeVar
 
 from starhold.errors import is_interrupt
 from starhold.files import read_bytes
-from starhold.parts.contract import Card
+from starhold.parts import roles
+from starhold.parts.contract import CLOCK, Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import ROLES
 
@@ -47,6 +49,12 @@ DEMANDED: dict[str, tuple[str, ...]] = {
 """The attributes that a part of each role must define, beside `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
 """Equations that parts of a role have at least one of."""
+BOUNDS: dict[str, tuple[str, ...]] = {
+    "bound": ("params", "envelope"),
+    "noise": ("params", "period"),
+    "recursion": ("params", "noise", "period", "rate"),
+}
+"""Functions of a part of any role that bound what it does, and their arguments."""
 
 AnyPart = TypeVar("AnyPart", bound=Part)
 
@@ -88,7 +96,7 @@ def telling(readings: Iterable[str]) -> list[Fitted]:
     """Installed sensors that give these readings, one for each or for several, with parameters of their examples.
     LookupError where there is none."""
     chosen: dict[str, Fitted] = {}
-    for reading in readings:
+    for reading in (one for one in readings if one != CLOCK):
         sensors = (one for one in parts("sensor").values() if not one.table and reading in one.module.Reading._fields)
         sensor = next(sensors, None)
         if sensor is None:
@@ -151,12 +159,32 @@ def as_part(module: ModuleType, path: Path | None = None) -> Part:
     either = EITHER.get(role, ())
     if either and not any(hasattr(module, name) for name in either):
         raise ValueError(f"{module.__file__}: this {role} needs {' or '.join(either)}")
+    _check_equations(part)
     if hasattr(module, "Params") and not part.table:
         try:
             part.fields()
         except (AttributeError, NameError, TypeError) as error:
             raise ValueError(f"{module.__file__}: {error}") from None
     return part
+
+
+def _check_equations(part: Part) -> None:
+    """ValueError for an equation, or a bound, that does not take the arguments of its role."""
+    acts = part.role in ("actuator", "effector")
+    wanted = BOUNDS | {"error": ("params", "envelope") if acts else ("params",)}
+    protocol: Any = getattr(roles, part.role.capitalize())
+    declarations: dict[str, Any] = {**vars(protocol)}
+    for name, declared in declarations.items():
+        if inspect.isfunction(declared) and not (name == "goal" and part.flag("BY_MODE")):
+            wanted[name] = tuple(word for word in inspect.signature(declared).parameters if word != "self")
+    for name, words in wanted.items():
+        equation: Any = part.hook(name)
+        if inspect.isfunction(equation):
+            try:
+                inspect.signature(equation).bind(*words)
+            except TypeError:
+                given = ", ".join(inspect.signature(equation).parameters)
+                raise ValueError(f"{part.module.__file__}: {name}({given}) must be {name}({', '.join(words)})") from None
 
 
 def make(kind: type[AnyPart], module: ModuleType, path: Path | None, demanded: tuple[str, ...]) -> AnyPart:

@@ -18,6 +18,9 @@ import numpy as np
 from starhold.algebra.vector import Matrix, Vector
 from starhold.parts.craft import compact
 
+CLOCK = "time"
+"""The reading that every loop gives to a law that declares it: seconds since the start. No sensor is needed for it."""
+
 
 class NoMemory(NamedTuple):
     """The memory of a part that keeps nothing."""

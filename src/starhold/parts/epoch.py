@@ -66,6 +66,11 @@ def iso_text(epoch: Date) -> str:
     return _instant(epoch).isoformat()
 
 
+def date_after(epoch: Date, time: float) -> str:
+    """The date in ISO 8601, UTC, so many seconds after an epoch, to the millisecond."""
+    return (_instant(epoch) + timedelta(seconds=time)).isoformat(timespec="milliseconds")
+
+
 def precession(days: float) -> Quaternion:
     """The turn from the mean equator and equinox of J2000 to those so many days later (IAU 2006; Capitaine, Wallace and
     Chapront, Expressions for IAU 2000 precession quantities, 2003)."""
@@ -77,6 +82,24 @@ def precession(days: float) -> Quaternion:
     a, b, c = (radians(angle / 7200.0) for angle in (zeta, theta, z))
     about_y: Quaternion = (cos(b), 0.0, sin(b), 0.0)
     return multiply(multiply((cos(a), 0.0, 0.0, -sin(a)), about_y), (cos(c), 0.0, 0.0, -sin(c)))
+
+
+def true_to_mean(days: float) -> Quaternion:
+    """The turn from the true equator and mean equinox (TEME) so many days after J2000 to the mean equator and equinox of
+    that date, to 0.2": the four largest terms of the nutation (Meeus, Astronomical Algorithms, chapter 22)."""
+    t = days / 36525.0
+    node, sun, moon = (
+        radians(at + rate * t) for at, rate in ((125.04452, -1934.136261), (280.4665, 36000.7698), (218.3165, 481267.8813))
+    )
+    along = -17.20 * sin(node) - 1.32 * sin(2.0 * sun) - 0.23 * sin(2.0 * moon) + 0.21 * sin(2.0 * node)
+    slope = 9.20 * cos(node) + 0.57 * cos(2.0 * sun) + 0.10 * cos(2.0 * moon) - 0.09 * cos(2.0 * node)
+    mean = radians((84381.448 - 46.8150 * t) / 3600.0)
+    # Half of each angle, in rad. The equinoxes lie apart by the nutation along the equator.
+    psi, epsilon = (radians(angle / 7200.0) for angle in (along, slope))
+    half, equinox = 0.5 * mean + epsilon, psi * cos(mean)
+    turns = ((cos(equinox), 0.0, 0.0, -sin(equinox)), (cos(half), sin(half), 0.0, 0.0), (cos(psi), 0.0, 0.0, sin(psi)))
+    first: Quaternion = turns[0]
+    return multiply(multiply(multiply(first, turns[1]), turns[2]), (cos(0.5 * mean), -sin(0.5 * mean), 0.0, 0.0))
 
 
 def _instant(epoch: Date) -> datetime:

@@ -6,6 +6,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from starhold.algebra.vector import Vector
 
 
@@ -79,13 +82,36 @@ def from_elements(elements: Elements, gravity: float) -> tuple[Vector, Vector]:
     return placed(distance, along, across), placed(speed, *onward)
 
 
+def carried(position: Vector, velocity: Vector, gravity: float, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Positions (n, 3; m) at times (n,) (s) after this state of a closed two-body orbit, by Kepler's equation."""
+    r, v = np.array(position), np.array(velocity)
+    distance, energy, radial, _ = _invariants(position, velocity, gravity)
+    a = -0.5 * gravity / energy
+    rate = math.sqrt(gravity / a**3)
+    # e cos E and e sin E at the start; x: by how much E grows.
+    c, s = 1.0 - distance / a, radial / math.sqrt(gravity * a)
+    x = rate * times
+    for _ in range(50):
+        x = x - (x - c * np.sin(x) + s * (1.0 - np.cos(x)) - rate * times) / (1.0 - c * np.cos(x) + s * np.sin(x))
+    f, g = 1.0 - a / distance * (1.0 - np.cos(x)), times - (x - np.sin(x)) / rate
+    return f[:, None] * r + g[:, None] * v
+
+
 def lowest(position: Vector, velocity: Vector, gravity: float) -> float:
     """The least distance (m) of the whole orbit from the centre."""
-    distance, _, radial, h2 = _invariants(position, velocity, gravity)
-    parameter = h2 / gravity
-    # e cos(anomaly) and e sin(anomaly): of near circles the energy would lose the eccentricity.
-    eccentricity = math.hypot(parameter / distance - 1.0, math.sqrt(parameter / gravity) * radial / distance)
+    distance, parameter, eccentricity = _conic(position, velocity, gravity)
     return min(distance, parameter / (1.0 + eccentricity))
+
+
+def highest(position: Vector, velocity: Vector, gravity: float) -> float:
+    """The largest distance (m) of the whole orbit from the centre; infinity for one that does not come back."""
+    distance, parameter, eccentricity = _conic(position, velocity, gravity)
+    return max(distance, parameter / (1.0 - eccentricity)) if eccentricity < 1.0 else math.inf
+
+
+def angular_momentum(position: Vector, velocity: Vector) -> float:
+    """The norm of the angular momentum per mass (m2/s)."""
+    return math.sqrt(_invariants(position, velocity, 0.0)[3])
 
 
 def period_of(position: Vector, velocity: Vector, gravity: float) -> float:
@@ -124,6 +150,14 @@ def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) 
     if begun > end:
         return math.inf
     return ((eccentricity * math.sinh(end) - end) - (sine - begun)) / rate
+
+
+def _conic(position: Vector, velocity: Vector, gravity: float) -> tuple[float, float, float]:
+    """Distance (m), parameter (m) and eccentricity."""
+    distance, _, radial, h2 = _invariants(position, velocity, gravity)
+    parameter = h2 / gravity
+    # e cos(anomaly) and e sin(anomaly): of near circles the energy would lose the eccentricity.
+    return distance, parameter, math.hypot(parameter / distance - 1.0, math.sqrt(parameter / gravity) * radial / distance)
 
 
 def _invariants(position: Vector, velocity: Vector, gravity: float) -> tuple[float, float, float, float]:

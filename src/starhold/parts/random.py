@@ -164,7 +164,7 @@ class Dice:
 class Silent(Dice):
     """Random numbers that are all 0, for readings without noise."""
 
-    def __init__(self) -> None:
+    def __init__(self, *_: Any) -> None:
         super().__init__((0, 0), 0, 0)
 
     def vector(self, place: int, deviation: Scalar) -> Vector:

@@ -106,6 +106,10 @@ class Environment(Protocol):
         """The acceleration of the body, in the axes of its position."""
         ...
 
+    def perturbation(self, params: Any, craft: Any, distance: float, /) -> tuple[float, float]:
+        """The largest `acceleration` (m/s2) and its largest gradient (1/s2) at this distance (m) or a larger one."""
+        ...
+
     def remember(self, params: Any, /) -> Any:
         """The memory at the start."""
         ...

@@ -202,6 +202,13 @@ def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
     return {"measures": shown, "order": list(metric_set.order), "rows": rows}
 
 
+def _flown_again(flight: Flight) -> str:
+    """Tell whose commands fly in the page, where those of the recorded flight came from a process."""
+    process = flight.recording.attrs.get("law_process")
+    said = f"What is flown again in this page is commanded by the file's law {flight.name}, not by {process}."
+    return note(said) if process else ""
+
+
 def _limit(flight: Flight) -> dict[str, Any]:
     attrs = flight.recording.attrs
     limit = float(attrs["torque_limit"])
@@ -230,6 +237,7 @@ def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
         lost_alarm(flights),
         required,
         ranking(flights),
+        "" if isinstance(living, str) else _flown_again(flights[0]),
         parts.measured,
         beside(plot_box(lead, 2, transient_switch(parts.transient)), parts.views),
         proofs(flights),

@@ -39,7 +39,8 @@ STUDIED = tuple(
     if command.suffix
     for kind in command.kinds
 )
-MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *STUDIED)
+TIMING = ("timing.json", "timing.png")
+MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *TIMING, *STUDIED)
 """A folder with one of these holds results."""
 
 
@@ -172,10 +173,11 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
             written[what] = folder / f"{name}.{kind}"
             with atomic_write(written[what]) as hidden:
                 hidden.write_text(text, encoding="utf-8", newline="\n")
-    if result.xml is not None:
-        written["For CI"] = folder / f"{name}.xml"
-        with atomic_write(written["For CI"]) as hidden:
-            hidden.write_text(result.xml, encoding="utf-8")
+    for what, kind, text in (("For CI", "xml", result.xml), ("Scenario", "toml", result.toml)):
+        if text is not None:
+            written[what] = folder / f"{name}.{kind}"
+            with atomic_write(written[what]) as hidden:
+                hidden.write_text(text, encoding="utf-8")
     if result.figure is not None:
         written["Picture"] = write_part(result, "png", folder / f"{name}.png")
     return written

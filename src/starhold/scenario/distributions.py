@@ -160,7 +160,8 @@ class Choice(Relative):
 
 
 class CorrelatedNormal(Relative):
-    """Gauss's distribution of several numbers together: of the keys that commas divide, or of one vector."""
+    """Gauss's distribution of several numbers together: of the keys that commas divide, or of one vector or matrix; of a
+    symmetric one those on and above the diagonal, row by row."""
 
     SEVERAL = True
     distribution: Literal["correlated-normal"]
@@ -188,11 +189,9 @@ class CorrelatedNormal(Relative):
     def read(self, keys: Sequence[KeyReading]) -> Self:
         """The distribution with its numbers; of the vector of one key, or of keys of a number each."""
         first = keys[0]
-        wanted = 1 if len(keys) == 1 else 0
-        if any(len(key.place.shape) != wanted for key in keys):
-            raise first.place.refuse(
-                "distribution", show(self.distribution), "numbers of several keys, or the vector of one"
-            )
+        if any(bool(key.place.shape) != (len(keys) == 1) for key in keys):
+            allowed = "numbers of several keys, or the vector or matrix of one"
+            raise first.place.refuse("distribution", show(self.distribution), allowed)
         mean = tuple(x for key in keys for x in key.centre("mean")) if self.mean is None else self._each(keys, "mean")
         name = "covariance" if self.correlation is None else "correlation"
         reading = self.model_copy(update={"mean": mean})

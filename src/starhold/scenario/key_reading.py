@@ -49,7 +49,7 @@ class KeyReading:
             raise place.refuse("relative", "true", "false, for the key holds a word or a whole number")
         if relative and (value is None or not np.isfinite(value).all() or not np.any(value)):
             raise place.refuse("relative", "true", f"false, for there are no shares of {_shown(value)}")
-        index = components(place.shape, symmetric=_is_symmetric(place))
+        index = components(place.shape, symmetric=is_symmetric(place))
         return KeyReading(scenario, place, table, tuple(index), relative)
 
     @property
@@ -128,7 +128,8 @@ def word(value: Any) -> Any:
     return str(value).lower() if isinstance(value, bool) else value
 
 
-def _is_symmetric(place: Place) -> bool:
+def is_symmetric(place: Place) -> bool:
+    """Whether a key holds a symmetric matrix."""
     if len(place.shape) != 2 or place.value is None:
         return False
     array = np.array(place.value)

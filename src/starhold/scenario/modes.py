@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 
-from pydantic import Field, WithJsonSchema, create_model, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, create_model, model_validator
 
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
-from starhold.laws.modes import AFTER, DWELL, NAME, TESTS, Mode, Switch, level_of, make_law
+from starhold.laws.conditions import SETTINGS, TESTED, TESTS, TIMES, level_of, needs_sky, settings_of
+from starhold.laws.interface import Gain
+from starhold.laws.modes import AFTER, DWELL, NAME, WHEELS_LOST, Mode, Modes, Switch, make_law
+from starhold.parts.epoch import DAY, Date, date_of, days_of, iso_text
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies.interface import Body
 from starhold.scenario.checking import make_gains, nearest, pick_law, refuse_unstable, refusing, show, validate
-from starhold.scenario.quantity import quantity
+from starhold.scenario.monitors import MonitorTable, read_monitor
+from starhold.scenario.quantity import Annotations, quantity, reader
 from starhold.scenario.schema import LawTable, law_model
 from starhold.scenario.tables import Name, Table, at_key, refuse_own, values_of
+from starhold.scenario.units import shown
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -55,6 +62,25 @@ def read_gains(
     return Read(law, form, validated, spec, gains)
 
 
+class Clock(NamedTuple):
+    """The epoch of a flight, if it has one, and when it ends (s)."""
+
+    epoch: Date | None
+    end: float
+
+
+def _read_time(gain: Gain) -> Annotations:
+    """The annotations of a time since the start, or a date."""
+    read = reader(gain)
+
+    def moment(value: Any) -> Any:
+        with suppress(ValueError):
+            return date_of(value) if isinstance(value, str) else read(value)
+        return read(value)
+
+    return BeforeValidator(moment), quantity(gain)[1], gain
+
+
 class _Condition(Table):
     """Another mode begins when all tests have held for a time."""
 
@@ -66,6 +92,20 @@ class _Condition(Table):
     def _asks(self) -> _Condition:
         if self.after == 0.0 and not self.tests:
             raise at_key("", f"after, or one of {', '.join(TESTS)}", "no condition")
+        for name in TESTED:
+            below, above = getattr(self, f"{name}_below"), getattr(self, f"{name}_above")
+            if below is not None and above is not None and above >= below:
+                raise at_key(f"{name}_above", f"less than {name}_below, {below:g} {shown(TESTED[name].unit)}", above)
+        needed = settings_of(self.tests)
+        for key, item in SETTINGS.items():
+            value = getattr(self, key)
+            if key in needed and value is None and item.required:
+                raise at_key(key, f"this key, which {' and '.join(_about(key, self.tests))} needs", None)
+            if key not in needed and value is not None:
+                raise at_key(key, f"this key only with {' or '.join(_about(key, TESTS))}", value)
+        axis: Any = getattr(self, "axis", None)
+        if axis is not None and not any(axis):
+            raise at_key("axis", "a vector that is not zero", list(axis))
         return self
 
     @property
@@ -73,8 +113,43 @@ class _Condition(Table):
         """The names of its tests."""
         return tuple(test for test in TESTS if getattr(self, test) is not None)
 
+    def levels(self, clock: Clock, where: str, key: str) -> list[Any]:
+        """The levels of its tests and their further numbers. InputError for a date where the flight has none, or before it
+        begins, and for times of which one excludes the other."""
+        times = {test: _since(getattr(self, test), clock, where, f"{key}.{test}") for test in TIMES if test in self.tests}
+        if len(times) == len(TIMES) and times["not_before"] > times["not_after"]:
+            given = f"a time {times['not_before'] - times['not_after']:g} s before not_before"
+            raise InputError(where, f"{key}.not_after", given, "a later one, for nothing is both")
+        settings = {name: getattr(self, name) for name in settings_of(self.tests)}
+        filled = {name: SETTINGS[name].default if value is None else value for name, value in settings.items()}
+        return [*(times.get(test, getattr(self, test)) for test in self.tests), *filled.values()]
 
-_LEVELS: dict[str, Any] = {test: (Annotated[float | None, *quantity(level_of(test))], None) for test in TESTS}
+
+def _about(key: str, tests: Iterable[str]) -> list[str]:
+    """The tests that have a use for a further number."""
+    return [test for test in tests if key in settings_of([test])]
+
+
+def _since(given: Any, clock: Clock, where: str, key: str) -> float:
+    """A time (s) since the start."""
+    time, named = given, f"{given:g} s" if isinstance(given, float) else iso_text(given)
+    if not isinstance(given, float):
+        if clock.epoch is None:
+            raise InputError(where, key, named, "a time since the start; or a date, with epoch in [orbit]")
+        time = round((days_of(given) - days_of(clock.epoch)) * DAY, 6)
+        if time < 0.0:
+            allowed = f"a date from the epoch on, {iso_text(clock.epoch)}"
+            raise InputError(where, key, f"{named}, {-time:g} s before the flight begins", allowed)
+        named = f"{named}, {time:g} s after the flight begins"
+    if time > clock.end and key.endswith("not_before"):
+        raise InputError(where, key, named, f"a time within the flight, which ends at {clock.end:g} s")
+    return time
+
+
+_LEVELS: dict[str, Any] = {
+    test: (Annotated[Any, *(_read_time if test in TIMES else quantity)(level_of(test))], None) for test in TESTS
+}
+_LEVELS |= {key: (Annotated[Any, *quantity(item.gain)], None) for key, item in SETTINGS.items()}
 if TYPE_CHECKING:
     Condition = _Condition
 else:
@@ -105,7 +180,12 @@ class ModeTable(LawTable):
 @cache
 def modes_model(base: type[LawTable]) -> type[LawTable]:
     """The table of a law of modes, but for its modes; base: the keys of a body's law tables."""
-    entries: dict[str, Any] = {"type": (Literal[NAME], NAME)}
+    entries: dict[str, Any] = {
+        "type": (Literal[NAME], NAME),
+        "on_loss": (Annotated[str | None, Field(description="the mode that begins where a loss is noticed")], None),
+        "wheels_lost": (Annotated[float | None, *quantity(replace(WHEELS_LOST, whole=True))], None),
+        "monitor": (Annotated[list[MonitorTable], Field(description="what else counts as a loss")], []),
+    }
     return create_model("Modes", __base__=base, __doc__="A law for each mode.", **entries)
 
 
@@ -119,7 +199,7 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
     or that none leads to."""
     where = scenario.where
     rest = {name: value for name, value in data.items() if name != "mode"}
-    table = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)
+    table: Any = validate(modes_model(scenario.hooks.law_table), rest, where, key, ["mode"], context)
     given = data.get("mode")
     if not isinstance(given, list) or len(cast(list[Any], given)) < 2:
         described = "nothing" if given is None else "one mode" if isinstance(given, list) and given else show(given)
@@ -130,9 +210,34 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
         if not isinstance(one, dict):
             raise InputError(where, place, show(one), "a [[law.mode]] table")
         reads.append(read_gains(one, scenario, context, place, ModeTable, whole=table))
-    modes, gains = _joined([read.table for read in reads], reads, where, key)
-    law = make_law(tuple(modes))
+    tables = [read.table for read in reads]
+    on_loss = _mode_on_loss(table, [one.name for one in tables], where, key)
+    epoch = getattr(getattr(scenario.table, "orbit", None), "epoch", None)
+    clock = Clock(epoch, scenario.table.simulation.duration)
+    modes, gains = _joined(tables, reads, on_loss, clock, where, key)
+    monitors = tuple(
+        read_monitor(one, scenario, where, f"{key}.monitor[{place}]") for place, one in enumerate(table.monitor, 1)
+    )
+    law = make_law(Modes(tuple(modes), on_loss, tuple(monitor for monitor, _ in monitors)))
+    if needs_sky(law.module.tests):
+        if epoch is None:
+            raise InputError(where, "orbit.epoch", "nothing", f"a date, which conditions of {key} need")
+        gains.append(epoch)
+    gains += [] if on_loss is None else [float(table.wheels_lost or 1.0)]
+    gains += [number for _, numbers in monitors for number in numbers]
     return Read(law, None, table, None, law.gains(*gains), _targets(reads, scenario, context, key))
+
+
+def _mode_on_loss(table: Any, names: list[str], where: str, key: str) -> int | None:
+    """The mode that begins on a loss, counted from 0; None for none."""
+    if table.on_loss is None:
+        unused = next((name for name in ("wheels_lost", "monitor") if getattr(table, name)), None)
+        if unused is not None:
+            raise InputError(where, f"{key}.on_loss", "nothing", f"the name of the mode that {unused} leads to")
+        return None
+    if table.on_loss not in names:
+        raise InputError(where, f"{key}.on_loss", show(table.on_loss), nearest(table.on_loss, names))
+    return names.index(table.on_loss)
 
 
 def _targets(reads: Sequence[Read], scenario: Scenario, context: Any, key: str) -> tuple[Fitted, ...]:
@@ -144,15 +249,18 @@ def _targets(reads: Sequence[Read], scenario: Scenario, context: Any, key: str) 
     return tuple(scenario.hooks.target(scenario, one, context, at) for one, at in zip(given, keys, strict=True))
 
 
-def _joined(tables: Sequence[Any], reads: Sequence[Read], where: str, key: str) -> tuple[list[Mode], list[Any]]:
+def _joined(
+    tables: Sequence[Any], reads: Sequence[Read], on_loss: int | None, clock: Clock, where: str, key: str
+) -> tuple[list[Mode], list[Any]]:
     """The modes with their switches, and the numbers of all of them."""
     names: list[str] = [table.name for table in tables]
-    modes, gains, reached = list[Mode](), list[Any](), {0}
+    modes, gains = list[Mode](), list[Any]()
+    last = max(place for place in range(len(names)) if place != on_loss)
     for place, (table, read) in enumerate(zip(tables, reads, strict=True)):
         here = f"{key}.mode[{place + 1}]"
         if names.index(table.name) < place:
             raise InputError(where, f"{here}.name", show(table.name), "a name that no other mode of the law has")
-        if table.until is None and place < len(names) - 1:
+        if table.until is None and place not in (last, on_loss):
             raise InputError(where, f"{here}.until", "nothing", "a condition, for only the last mode may fly to the end")
         gains += read.gains
         switches: list[Switch] = []
@@ -161,10 +269,13 @@ def _joined(tables: Sequence[Any], reads: Sequence[Read], where: str, key: str) 
             if condition is None:
                 continue
             to = _to(condition.to, names, place, beside, where, f"{here}.{way}")
-            reached.add(to)
             switches.append(Switch(way, to, condition.tests))
-            gains += [condition.after, condition.dwell, *(getattr(condition, test) for test in condition.tests)]
+            gains += [condition.after, condition.dwell, *condition.levels(clock, where, f"{here}.{way}")]
         modes.append(Mode(table.name, read.law, tuple(switches), table.effectors))
+    reached, ahead = {0}, {0} if on_loss is None else {0, on_loss}
+    while ahead:
+        reached |= ahead
+        ahead = {switch.to for place in reached for switch in modes[place].switches} - reached
     unreached = next((place for place in range(len(names)) if place not in reached), None)
     if unreached is not None:
         allowed = "a mode that a condition of another one leads to"

@@ -1,6 +1,7 @@
 """The [[part]] tables of a scenario are read: parts of any role that stand in a file of their own, here or in another
 package."""
 
+import csv
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -19,6 +20,7 @@ from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_be_inactive, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, error_line, from_file, parts, read_module, role_of
+from starhold.parts.contract import CLOCK
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -120,8 +122,7 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
         if item.gain.columns and isinstance(given, str):
             allowed = f"a CSV file of {', '.join(item.gain.columns)}, a line of names first or none"
             try:
-                text = read_text(folder / given)
-                lines = [line.split(",") for line in text.splitlines() if line.strip() and not line.startswith("#")]
+                lines = [cells for _, cells in csv_lines(folder / given)]
                 if lines and number_in(lines[0][0]) is None:
                     lines = lines[1:]
                 if any(len(line) != len(item.gain.columns) for line in lines):
@@ -132,6 +133,16 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
             except ValueError as error:
                 raise InputError(where, f"{key}.{item.name}", f"{given}: {error}", allowed) from None
     return filled
+
+
+def csv_lines(path: Path) -> list[tuple[int, list[str]]]:
+    """The lines of a CSV file that are neither empty nor comments: their numbers, and their cells without spaces around.
+    Raises OSError, or ValueError where it is no CSV file."""
+    try:
+        rows = [(k, [cell.strip() for cell in row]) for k, row in enumerate(csv.reader(read_text(path).splitlines()), 1)]
+    except csv.Error as error:
+        raise ValueError(str(error)) from None
+    return [(number, cells) for number, cells in rows if any(cells) and not cells[0].startswith("#")]
 
 
 def number_in(text: str) -> float | None:
@@ -164,8 +175,9 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
             raise InputError(where, _key(one), given, f"one about {about}, the body of its model")
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
-            if need not in readings:
+            if need not in {*readings, CLOCK}:
                 raise InputError(where, key, f"no {need}, which {one.name} needs", _measuring(need))
+    _check_estimates(loop, where)
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
     switched = next((f for f in _acting(loop) if f.part.hook("switch") is not None), None)
     if late is not None and switched is not None:
@@ -177,9 +189,24 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         )
 
 
+def _check_estimates(loop: ClosedLoop, where: str) -> None:
+    """InputError where a law needs what no estimator gives, or another body than the one that is orbited."""
+    there = [name for fitted in loop.used("estimator") for name in fitted.part.module.Estimate._fields]
+    for name in getattr(loop.law.module, "ESTIMATES", ()):
+        if name not in there:
+            giving = [one for one, part in parts("estimator").items() if name in part.module.Estimate._fields]
+            allowed = f"an estimator that gives {name}, such as {' or '.join(giving)}"
+            raise InputError(where, f"law {loop.law.name}", f"no {name}, which a condition or a monitor needs", allowed)
+    about = loop.law.about
+    if about and (not loop.has("two-body") or body_of(loop.craft.gravity) != about):
+        given = f"no orbit about {about}, which conditions on the Sun or a station need"
+        raise InputError(where, f"law {loop.law.name}", given, f"an [orbit] about {about}")
+
+
 def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
     """Return the names of what the sensors read. InputError where two read what is taken of one only."""
-    single = {*loop.law.reads, *(name for fitted in loop.parts for name in fitted.part.reads)}
+    single = {*loop.law.reads} - {*getattr(loop.law.module, "SEVERAL", ())}
+    single |= {name for fitted in loop.parts for name in fitted.part.reads}
     several: dict[str, str] = {}
     for estimator in loop.used("estimator"):
         several = getattr(estimator.part.module, "SEVERAL", {})

@@ -16,6 +16,7 @@ from starhold.scenario.bodies import body_of
 from starhold.scenario.bodies.interface import Body, Made
 from starhold.scenario.checking import LONGEST_TEXT, cut, free_name, numbered, read_toml, validate
 from starhold.scenario.checking import nearest as nearest
+from starhold.scenario.element_sets import with_orbit
 from starhold.scenario.making import changed, plain
 from starhold.scenario.modes import has_modes, read_gains, read_modes
 from starhold.scenario.parts import read_parts
@@ -183,7 +184,7 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
 def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
     """The scenario of the raw tables that a text holds."""
     body = body_of(data, where, folder)
-    data = with_files(data, folder, where)
+    data = with_orbit(with_files(data, folder, where), folder, where)
     # First of all, for it scales the numbers of the other tables.
     context = body.context(data, where)
     table = _tables(body, data, where, context)

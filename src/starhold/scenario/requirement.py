@@ -16,6 +16,8 @@ from starhold.scenario.quantity import quantity, raw
 from starhold.scenario.tables import LONGEST_NAME, Table, at_key, refuse, told_at
 
 CONE = "exclusion-cone"
+BEGINS = "mode_begins"
+"""The time at which the mode of a requirement first begins."""
 Method: TypeAlias = Literal["proof", "flight", "campaign", "budget", "margin", "inspection"]
 METHODS_OF: Mapping[str, tuple[Method, ...]] = MappingProxyType(
     {
@@ -97,7 +99,13 @@ class RequirementTable(Table):
         for key in ("share", "confidence"):
             if getattr(self, key) == 1.0:
                 raise at_key(key, "below 1, for no number of runs shows that there is no exception", 1.0)
+        if self.metric == BEGINS:
+            unfit = next((key for key in ("after", "window") if getattr(self, key) is not None), None)
+            if unfit is not None or self.in_mode is None:
+                allowed = "no such key" if unfit else "the name of the mode"
+                raise at_key(unfit or "in_mode", f'{allowed}, with metric = "{BEGINS}"', getattr(self, unfit or "in_mode"))
         for key, methods in METHODS_OF.items():
+            methods = (*methods, "campaign") if key == "in_mode" and self.metric == BEGINS else methods
             if key in self.model_fields_set and self.method is not None and self.method not in methods:
                 named = " or ".join(f'"{method}"' for method in methods)
                 raise at_key(key, f"only with method = {named}", getattr(self, key))
@@ -109,6 +117,13 @@ class RequirementTable(Table):
     def called(self) -> str:
         """Its id, by default the metric's name."""
         return self.id or str(self.metric)
+
+
+def column_of(table: RequirementTable) -> str:
+    """The name, among metrics that are measured, of the one that a requirement bounds."""
+    if table.metric == CONE:
+        return f"angle of {table.called}" if table.id else "cone_angle"
+    return f"begin of {table.in_mode}" if table.metric == BEGINS else str(table.metric)
 
 
 def without_requirements(given: Any, method: Method) -> Any:

@@ -10,11 +10,13 @@ from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import create_model
 from pydantic_core import PydanticCustomError
 
 from starhold.errors import InputError
 from starhold.laws.interface import Gain
-from starhold.laws.modes import mode_laws
+from starhold.laws.modes import Modes, mode_laws
+from starhold.laws.monitors import Monitor
 from starhold.parts.part import Fitted
 from starhold.scenario.checking import cut, nearest, read_toml, show
 from starhold.scenario.making import path_of
@@ -22,7 +24,7 @@ from starhold.scenario.modes import CONDITIONS, Condition, ModeTable
 from starhold.scenario.parts import part_model
 from starhold.scenario.quantity import declared, plain, reader
 from starhold.scenario.reading import LawEntry, Scenario
-from starhold.scenario.schema import law_model
+from starhold.scenario.schema import columns, law_model
 from starhold.scenario.tables import Table, refuse_own
 
 SHARED = ("name", "description", "requirement", "campaign", "simulation", "certify")
@@ -235,6 +237,8 @@ def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
     names = [item.name for item in entry.law.fields(entry.form)]
     if after[1] == "mode" and mode_laws(entry.law, entry.gains):
         return _of_mode(entry, dict(zip(names, entry.gains, strict=True)), after[2:], shared)
+    if after[1] == "monitor" and isinstance(entry.law.module, Modes):
+        return _of_monitor(entry.law.module.monitors, dict(zip(names, entry.gains, strict=True)), after[2:])
     numbers = dict(zip(names, entry.gains if entry.form is None else entry.spec, strict=True))
     model = law_model(entry.law, entry.form, scenario.hooks.law_table, shared)
     return model, lambda name: numbers[name] if name in numbers else getattr(entry.options, name, None), after[1:]
@@ -250,6 +254,15 @@ def _of_mode(entry: LawEntry, numbers: dict[str, Any], after: tuple[str | int, .
     if not way:
         raise _no("a whole table", "one of its keys")
     return model, lambda name: numbers.get(f"{begun}{name}"), way
+
+
+def _of_monitor(monitors: Sequence[Monitor], numbers: dict[str, Any], after: tuple[str | int, ...]) -> _Held:
+    """The table of a monitor that a path leads to."""
+    monitor: Monitor = _numbered(monitors, "monitor", after or ("",))
+    if len(after) < 2:
+        raise _no("a whole table", "one of its keys")
+    model = create_model("Monitor", __base__=Table, **columns(monitor.fields()))
+    return model, lambda name: numbers.get(f"monitor[{int(after[0]) + 1}].{name}"), after[1:]
 
 
 def _plainly(gain: Gain | None, value: Any) -> Any:

@@ -109,10 +109,15 @@ class Stepper:
 
     def _hold(self, batch: RunningBatch) -> None:
         """Take over the numbers that flights carry, and make room for what kernels take and tell."""
-        room = {"record": self._sample, "sensed": len(flatten(self._sensed_like)), "given": len(self._like.command)}
+        room = {"record": self._sample, "sensed": self.size, "given": len(self._like.command)}
         self._batch = batch
         self._memories = {name: batch.room(size) for name, size in room.items()} | {"carry": batch.x}
         self._calls: dict[tuple[int, bool], Any] = {}
+
+    @property
+    def size(self) -> int:
+        """How many numbers readings have."""
+        return len(flatten(self._sensed_like))
 
     @property
     def time(self) -> float:
@@ -159,6 +164,11 @@ class Stepper:
             self._rows.append(self._memories["record"].copy())
         self._closed, self._ending = command is None, None
         return readings
+
+    def prepare(self) -> None:
+        """Compile what steps with commands from outside need, so that none of them waits for it."""
+        for phase in self._phases:
+            self._made(phase, True)
 
     def close(self, command: ArrayLike | None = None) -> None:
         """Record this instant with the command that would be given now, and stay. ValueError as of `step`."""

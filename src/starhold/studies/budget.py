@@ -234,7 +234,7 @@ def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
         return entry
     left = [mode.effectors and tuple(name for name in mode.effectors if name not in gone) for mode in module.modes]
     modes = tuple(mode._replace(effectors=kept) for mode, kept in zip(module.modes, left, strict=True))
-    return replace(entry, law=make_law(modes))
+    return replace(entry, law=make_law(replace(module, modes=modes)))
 
 
 def sources(scenario: Scenario) -> tuple[Source, ...]:

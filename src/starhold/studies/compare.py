@@ -13,7 +13,7 @@ from starhold.scenario.reading import Scenario
 from starhold.simulation.lane import Progress, Recording, fly
 from starhold.studies.body import study_of
 from starhold.studies.flight import Flight
-from starhold.studies.modes import modes_flown
+from starhold.studies.modes import epoch_of, modes_flown
 from starhold.version import __version__
 
 Notice: TypeAlias = Callable[[str, int, int], None]
@@ -31,7 +31,7 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
         item.name: (item.written(value), "1" if item.gain.choices else item.gain.unit)
         for item, value in zip(entry.law.fields(), entry.gains, strict=True)
     }
-    values, modes = gains | study.resources(entry), modes_flown(entry.law, run)
+    values, modes = gains | study.resources(entry), modes_flown(entry.law, run, epoch_of(scenario, entry.law))
     return Flight(entry.name, entry.law.name, run, metrics, values, study.metric_set(run), modes=modes)
 
 
@@ -75,10 +75,18 @@ def _flown(
     if process is None:
         samples, carry = fly(loop, timing.steps, timing.record_every, progress=progress)
         return name_samples(scenario, loop, samples, carry), carry
-    from starhold.link.process import fly_by_process
+    from starhold.link.process import LostLawError, fly_by_process
 
-    samples, carry = fly_by_process(process, loop, timing.steps, timing.record_every, progress)
-    return commanded_by(process, name_samples(scenario, loop, samples, carry)), carry
+    def named(samples: Any, carry: Any) -> Recording:
+        return commanded_by(process, name_samples(scenario, loop, samples, carry))
+
+    try:
+        samples, carry = fly_by_process(process, loop, timing.steps, timing.record_every, progress)
+    except LostLawError as error:
+        if error.flight.steps:
+            error.recording = named(*error.flight.samples(timing.record_every))
+        raise
+    return named(samples, carry), carry
 
 
 def commanded_by(process: str, run: Recording) -> Recording:

@@ -44,7 +44,7 @@ class _Plant:
         self.flight = Stepper(loop, lanes, record=False)
         self.steps, self.reward = scenario.table.simulation.steps, reward or error_angle
         self.actions = Box(-limit, limit, (3,), np.float64)
-        self.observations = Box(-math.inf, math.inf, (len(self.flight.reset().numbers),), np.float64)
+        self.observations = Box(-math.inf, math.inf, (self.flight.size,), np.float64)
 
     def begin(self, generator: np.random.Generator) -> tuple[Array, dict[str, Any]]:
         """The first observation of flights with other random numbers."""

@@ -21,10 +21,16 @@ if TYPE_CHECKING:
 
 
 class Begun(NamedTuple):
-    """A mode of this name begins at a time (s)."""
+    """A mode of this name begins at a time (s), on a date (UTC) where the law's conditions know of dates."""
 
     mode: str
     time: float
+    utc: str = ""
+
+    @property
+    def results(self) -> dict[str, Any]:
+        """The content of a summary."""
+        return {name: value for name, value in self._asdict().items() if value != ""}
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,5 +97,5 @@ class Flight:
                 left = [one._asdict() for one in self.left(number, claim.kind)]
                 stated = {"certificate": certificate.name, "claim": claim.kind, "outcome": claim.outcome}
                 claims.append(stated | {"left_at": left[0]["time"] if left else None, "left": left})
-        modes = {"modes": [one._asdict() for one in self.modes]} if self.modes else {}
+        modes = {"modes": [one.results for one in self.modes]} if self.modes else {}
         return self.metrics | modes | ({"claims": claims} if self.certificates else {})

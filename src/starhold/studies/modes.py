@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from starhold.algebra.structure import leaves
+from starhold.laws.modes import Modes
 from starhold.loop.modes import loop_of_mode
+from starhold.parts.epoch import Date, date_after
+from starhold.parts.outage import NEVER
+from starhold.scenario.requirement import BEGINS, column_of
 from starhold.studies.body import Issued
 from starhold.studies.flight import Begun
 
@@ -16,6 +21,7 @@ if TYPE_CHECKING:
     from starhold.certification.certify import Wanted
     from starhold.laws.catalogue import Law
     from starhold.loop.closed_loop import ClosedLoop
+    from starhold.scenario.reading import Scenario
     from starhold.simulation.lane import Recording
 
 
@@ -45,10 +51,40 @@ def stretches(run: Recording) -> list[Stretch]:
     ]
 
 
-def modes_flown(law: Law, run: Recording) -> tuple[Begun, ...]:
-    """The modes of a recorded run by their names, with the times at which they begin."""
+def modes_flown(law: Law, run: Recording, epoch: Date | None = None) -> tuple[Begun, ...]:
+    """The modes of a recorded run by their names, with the times at which they begin, which are control instants; epoch: of
+    a flight whose modes have dates."""
     period = run.attrs["control_period"]
-    return tuple(Begun(law.module.modes[one.mode - 1].name, one.first * period) for one in stretches(run))
+    times = [(one.mode, one.first * period) for one in stretches(run)]
+    return tuple(
+        Begun(law.module.modes[mode - 1].name, time, date_after(epoch, time) if epoch else "") for mode, time in times
+    )
+
+
+def epoch_of(scenario: Scenario, law: Law) -> Date | None:
+    """The epoch of a flight whose law has conditions on dates, stations or the Sun; None for other laws."""
+    dated = isinstance(law.module, Modes) and law.module.WATCHES and hasattr(scenario.table, "orbit")
+    return scenario.table.orbit.epoch if dated and scenario.table.orbit is not None else None
+
+
+def begins_asked(scenario: Scenario, law: Law) -> dict[str, int]:
+    """The modes of a law whose first begin campaigns are required to have, counted from 1, by the columns of those
+    requirements."""
+    tables = [one for one in scenario.table.requirement if one.metric == BEGINS and one.method == "campaign"]
+    names = [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
+    return {column_of(one): names.index(str(one.in_mode)) + 1 for one in tables if one.in_mode in names}
+
+
+def first_fault(scenario: Scenario, loop: ClosedLoop) -> tuple[float, ...]:
+    """The instant at which the first fault of a flight happens, a sensor's outage among them: infinite without any, none
+    where the law notices no losses, or a campaign draws outages, which all lanes of a loop do not share."""
+    campaign = scenario.table.campaign
+    drawn = campaign is not None and any(".outage" in key for key in campaign.over)
+    if drawn or not isinstance(loop.law.module, Modes) or loop.law.module.on_loss is None:
+        return ()
+    windows = [getattr(fitted.params, "outage", NEVER) for fitted in loop.used("sensor")]
+    outages = [math.ceil(begin / loop.period - 1e-9) for begin, end in windows if end > begin]
+    return (float(min([*outages, *(event.step for event in loop.events)], default=math.inf)),)
 
 
 def named_modes(loop: ClosedLoop, name: str) -> dict[str, ClosedLoop]:
@@ -76,7 +112,7 @@ def hand_overs(loop: ClosedLoop, name: str) -> list[HandOver]:
             (place, switch.to),
             loop_of_mode(loop, place),
             loop_of_mode(loop, switch.to),
-            dict(zip(switch.tests, levels, strict=True)),
+            dict(zip(switch.keys, levels, strict=True)),
         )
         for place, (mode, _, switches) in enumerate(module.parts(loop.gains))
         for switch, (_, _, *levels) in switches

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -13,13 +14,16 @@ from numpy.typing import NDArray
 
 from starhold.analysis.rigid_body import EXTRAS, Cone
 from starhold.errors import InputError, input_at
+from starhold.parts.orbit import period_of
 from starhold.scenario.checking import nearest, show
-from starhold.scenario.requirement import CONE, RequirementTable
+from starhold.scenario.requirement import BEGINS, CONE, RequirementTable, column_of
 from starhold.scenario.units import shown, to_number
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
+ORBITS = re.compile(r"([0-9]+(?:\.[0-9]+)?) ?orbits?")
+"""A time in orbits of the flight."""
 LOST = "lost"
 """What may be required beside metrics, with the exclusion-cone: that the motion is not lost."""
 
@@ -56,12 +60,7 @@ class Requirement:
 def cones_of(tables: Iterable[RequirementTable]) -> dict[str, Cone]:
     """The cones that requirements ask for, by the names of their metrics; axes and directions of unit length."""
     cones = [table for table in tables if table.metric == CONE]
-    return {_cone_column(table): Cone(_unit(table.axis), _unit(table.direction)) for table in cones}
-
-
-def _cone_column(table: RequirementTable) -> str:
-    """The angle between the axis of a requirement and its direction."""
-    return f"angle of {table.called}" if table.id else "cone_angle"
+    return {column_of(table): Cone(_unit(table.axis), _unit(table.direction)) for table in cones}
 
 
 def extras_of(tables: Iterable[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
@@ -77,22 +76,23 @@ def tables_of(scenario: Scenario, method: str | None) -> dict[str, RequirementTa
 
 
 def read_requirements(
-    tables: Mapping[str, RequirementTable], units: Mapping[str, str], where: str
+    tables: Mapping[str, RequirementTable], units: Mapping[str, str], where: str, orbit: float | None = None
 ) -> tuple[Requirement, ...]:
-    """The requirements of tables, which errors call by their keys; units: those of the metrics that the method measures.
+    """The requirements of tables, which errors call by their keys; units: those of the metrics that the method measures;
+    orbit: how long (s) an orbit of the flight takes, of which times may be multiples.
     InputError where one asks for what is not measured, or for no bound."""
-    beside = [LOST, CONE] if {table.method for table in tables.values()} <= {"campaign", "flight"} else []
+    beside = [LOST, CONE, BEGINS] if {table.method for table in tables.values()} <= {"campaign", "flight"} else []
     requirements: list[Requirement] = []
     for key, table in tables.items():
         metric = str(table.metric)
-        column = _cone_column(table) if metric == CONE else metric
+        column = column_of(table)
         if metric not in (*units, *beside):
             raise InputError(where, f"{key}.metric", show(metric), nearest(metric, [*units, *beside]))
-        bound = _bound(table, units.get(column, "1"), where, key)
-        at_most = table.at_least is None
-        requirements.append(
-            Requirement(table.called, metric, column, units.get(column, "1"), bound, at_most, table.share, table.confidence)
-        )
+        if metric == BEGINS and table.method == "campaign" and column not in units:
+            raise InputError(where, f"{key}.in_mode", show(table.in_mode), "a mode of every law that is flown")
+        unit = "s" if metric == BEGINS else units.get(column, "1")
+        bound, at_most = _bound(table, unit, where, key, orbit), table.at_least is None
+        requirements.append(Requirement(table.called, metric, column, unit, bound, at_most, table.share, table.confidence))
     return tuple(requirements)
 
 
@@ -104,7 +104,17 @@ def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: M
     return read_requirements(tables, units, scenario.where)
 
 
-def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
+def orbit_of(scenario: Scenario) -> float | None:
+    """How long (s) an orbit of a scenario takes; None without one that comes back."""
+    orbit = getattr(scenario.table, "orbit", None)
+    if orbit is None:
+        return None
+    position, velocity = orbit.start
+    time = period_of(position, velocity, orbit.gravitational_parameter)
+    return time if math.isfinite(time) else None
+
+
+def _bound(table: RequirementTable, unit: str, where: str, key: str, orbit: float | None) -> float:
     side = "at_least" if table.at_most is None else "at_most"
     value = getattr(table, side)
     if table.metric == LOST:
@@ -119,6 +129,9 @@ def _bound(table: RequirementTable, unit: str, where: str, key: str) -> float:
         allowed = f"one number, in {shown(unit)} or with its unit"
         raise InputError(where, f"{key}.{side}", show(value), allowed)
     with input_at(where, f"{key}.{side}", show(value)):
+        orbits = ORBITS.fullmatch(value.strip()) if unit == "s" and orbit is not None and isinstance(value, str) else None
+        if orbits is not None:
+            return float(orbits[1]) * float(orbit or 0.0)
         return to_number(value, unit) if isinstance(value, str) else float(value)
 
 

@@ -14,10 +14,11 @@ from starhold.errors import InputError
 from starhold.laws.modes import Modes
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest, show
+from starhold.scenario.requirement import BEGINS
 from starhold.scenario.units import DECIBEL, apart, to_number
 from starhold.studies.body import study_of
-from starhold.studies.modes import stretches
-from starhold.studies.requirements import LOST, Requirement, cones_of, read_requirements, tables_of
+from starhold.studies.modes import modes_flown, stretches
+from starhold.studies.requirements import LOST, Requirement, cones_of, orbit_of, read_requirements, tables_of
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -163,7 +164,7 @@ def check_flight(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]
         raise InputError(scenario.where, "requirement", "an exclusion-cone", str(error)) from None
     for key, table in tables.items():
         times_of(scenario, key, table, meter.steps * meter.instant)
-    return read_requirements(tables, meter.units, scenario.where)
+    return read_requirements(tables, meter.units, scenario.where, orbit_of(scenario))
 
 
 def mode_names(entry: LawEntry) -> list[str]:
@@ -228,11 +229,21 @@ def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, 
     modes = mode_names(entry)
     for (key, table), required in zip(tables.items(), check_flight(scenario, entry), strict=True):
         about = times_of(scenario, key, table), modes.index(table.in_mode) + 1 if table.in_mode else None
+        if table.metric == BEGINS:
+            decided[key] = _begun(table, required, entry, run)
+            continue
         if about not in measured:
             measured[about] = [study.measure_required(part, cones) for part in _parts(run, *about)]
         flight = f"one flight of {entry.name}{f', in its mode {table.in_mode}' if table.in_mode else ''}{about[0]}"
         decided[key] = _flown(table, required, measured[about], run.attrs.get("diverged_at"), flight)
     return decided
+
+
+def _begun(table: RequirementTable, required: Requirement, entry: LawEntry, run: Recording) -> RequirementVerdict:
+    """The verdict on when a mode first begins."""
+    times = [begun.time for begun in modes_flown(entry.law, run) if begun.mode == table.in_mode]
+    evidence = f"one flight of {entry.name}{'' if times else f', in which the mode {table.in_mode} never begins'}"
+    return compared(table, required, times[0] if times else None, evidence)
 
 
 def _flown(

@@ -137,7 +137,7 @@ def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
 KINDS = {
     "compare": _compare,
     "certify": _certify,
-    **{name: partial(_studied, name) for name in commands.names() if commands.command(name).read is None},
+    **{name: partial(_studied, name) for name in commands.names() if commands.command(name).offered},
     "campaign": _campaign,
     "export": _export,
 }

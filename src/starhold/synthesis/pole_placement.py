@@ -247,12 +247,12 @@ def _decomposed(
     b = b / units[:, None]
     lengths = np.abs(b).max(axis=0)
     lengths[lengths == 0.0] = 1.0
-    b, scale, down = b / lengths, np.diag(lengths), np.diag(1.0 / units)
     size, noise = float(np.linalg.norm(a, 2)), 100.0 * len(a) * float(np.finfo(float).eps)
-    chain, weakest, unit = list[_Level](), 1.0, units
-    while True:
+
+    # A function of its own and no loop, in whose variables a type checker goes round for long.
+    def below(at: int, a: Array, b: Array, scale: Array, down: Array, unit: Array, weakest: float) -> list[_Level]:
         u, s, v = np.linalg.svd(b)
-        beside = float(size if chain else s[0])
+        beside = float(size if at else s[0])
         # Weak inputs magnify the rounding of the states that they leave to the next level.
         rank = int((s > noise / weakest * beside).sum())
         if rank == 0:
@@ -261,7 +261,7 @@ def _decomposed(
             left /= np.linalg.norm(left, axis=1)[:, None]
             raise UncontrollableError(np.round(modes / (size or 1.0), 12) * size, np.round(left, 12))
         rows, across = u[:, :rank].T, s[:rank, None] * v[:rank]
-        at, given, reply = len(chain), unit[:, None] * (b @ scale), across @ scale
+        given, reply = unit[:, None] * (b @ scale), across @ scale
         turn = _chosen_directions(directions, at, given, reply)
         inner = reply @ turn
         right = scale @ turn @ np.linalg.inv(inner)
@@ -269,13 +269,16 @@ def _decomposed(
         right += v[:rank].T / s[:rank] @ (np.eye(rank) - across @ right)
         p = _chosen_annihilator(annihilators, at, given, unit, rows, u[:, rank:].T)
         strength = float(s[rank - 1]) / beside
-        chain.append(_Level(a, rows, p, across, right, inner, turn, strength))
+        level = _Level(a, rows, p, across, right, inner, turn, strength)
         if not len(p):
-            return chain, units, lengths
+            return [level]
         # Orthonormal rows are their own pseudo-inverse, without rounding.
         back = p.T if annihilators is None else np.linalg.pinv(p)
-        a, b, down = p @ a @ back, p @ a @ rows.T, p @ down
-        scale, weakest, unit = inner / np.abs(inner).max(), min(weakest, strength), np.ones(len(a))
+        onward, reached = p @ a @ back, p @ a @ rows.T
+        scale = inner / np.abs(inner).max()
+        return [level, *below(at + 1, onward, reached, scale, p @ down, np.ones(len(onward)), min(weakest, strength))]
+
+    return below(0, a, b / lengths, np.diag(lengths), np.diag(1.0 / units), units, 1.0), units, lengths
 
 
 def _chosen(name: str, choice: Choice | None, at: int, given: Array, shape: tuple[int, int]) -> Array | None:

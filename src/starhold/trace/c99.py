@@ -48,6 +48,11 @@ static double with_bits(uint64_t bits)
 _HELPERS = {"bits_of": _BITS_OF, "with_bits": _WITH_BITS}
 
 
+def helpers(body: str) -> list[str]:
+    """Return the functions that a text in C calls to take doubles apart, and put them together; they need memcpy."""
+    return [text for name, text in _HELPERS.items() if f"{name}(" in body]
+
+
 class C99(Source):
     """The printer makes the text of a program. A function returns its value, or writes several to pointers."""
 
@@ -62,10 +67,9 @@ class C99(Source):
         return self._head(self.program.main).replace(TIE, " ") + ";"
 
     def _opening(self) -> list[str]:
-        body = "\n".join(self.lines)
-        helpers = [text for name, text in _HELPERS.items() if f"{name}(" in body]
-        lines = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(helpers), "", GUARD]
-        for text in helpers:
+        called = helpers("\n".join(self.lines))
+        lines = ["#include <math.h>", "#include <stdint.h>", *["#include <string.h>"] * bool(called), "", GUARD]
+        for text in called:
             lines += ["", text]
         return lines
 

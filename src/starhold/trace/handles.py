@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any, NoReturn
 
+from starhold.algebra import scalar as scalar
+from starhold.algebra import words as words
 from starhold.algebra.operations import INDEX, NUMBER, OPERATIONS, TRUTH, UNIFORM, WORD, written_at
 from starhold.errors import InputError
 
-INSTEAD = "+ - * /, sqrt and the other operations of starhold.algebra.scalar"
+ELEMENTARY = "sin, cos, atan2, exp, log, power, cbrt and tanh of starhold.algebra.elementary"
+INSTEAD = f"+ - * /, sqrt and the other operations of starhold.algebra.scalar, {ELEMENTARY}"
 
 
 class RecordingError(InputError):
@@ -47,7 +50,7 @@ class Handle:
         refuse("an operator that is none of the scalar operations", INSTEAD)
 
     def _powered(self, *_: Any) -> NoReturn:
-        refuse("a power", "products, sqrt of starhold.algebra.scalar")
+        refuse("a power", "products, sqrt of starhold.algebra.scalar, power and cbrt of starhold.algebra.elementary")
 
     def __abs__(self) -> NoReturn:
         refuse("abs of a number", "absolute of starhold.algebra.scalar")

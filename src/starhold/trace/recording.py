@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-from starhold.algebra.operations import INDEX, NUMBER, OPERATIONS, STATIC, TRUTH, WORD, Operation
+from starhold.algebra.operations import ABSENT, INDEX, NUMBER, OPERATIONS, STATIC, TRUTH, WORD, Operation, refuse_absent
 from starhold.algebra.structure import leaves, mapped
 from starhold.algebra.structured import RECORDER, Buffer
 from starhold.trace.handles import HANDLES, Handle, Index, Number, kind_of, refuse
@@ -152,6 +152,9 @@ class Recorder:
         """Record an operation."""
         if len(values) != len(operation.takes):
             raise TypeError(f"{operation.name} takes {len(operation.takes)} values, not {len(values)}")
+        if operation.name == "number_of" and kind_of(values[0]) == NUMBER:
+            # A count that is kept from step to step is a number already.
+            return values[0]
         for value, kind in zip(values, operation.takes, strict=True):
             fits = value.kind == kind if isinstance(value, Handle) else isinstance(value, _CONSTANTS.get(kind, ()))
             if not fits or (isinstance(value, bool) and kind != TRUTH):
@@ -178,6 +181,8 @@ class Recorder:
         return self._once(key, lambda ref: Op(ref, operation, refs), operation.gives)
 
     def _unfit(self, operation: Operation, value: Any, kind: str) -> NoReturn:
+        if value is ABSENT:
+            refuse_absent()
         given = value.kind if isinstance(value, Handle) else type(value).__name__
         wanted = {NUMBER: "a number", TRUTH: "a truth, as less gives", INDEX: "a count or a counter"}.get(kind, f"a {kind}")
         instead = "number_of(index)" if given == INDEX and kind == NUMBER else wanted

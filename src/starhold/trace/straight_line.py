@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from starhold.algebra.operations import WORD, Operation
+from starhold.algebra.polynomial import unreadable
 from starhold.algebra.structure import leaves
 from starhold.errors import InputError
 from starhold.kernel.numbers import rational
@@ -24,10 +26,19 @@ def labelled(name: str, value: Any) -> Iterator[tuple[str, float]]:
         yield name, value
 
 
+class _NumbersAlone(Recorder):
+    def apply(self, operation: Operation, values: tuple[Any, ...]) -> Any:
+        if WORD in (*operation.takes, operation.gives):
+            raise unreadable(
+                "a number's bits, of which sin, log and their like are made: proofs read + - * /, sqrt and cases"
+            )
+        return super().apply(operation, values)
+
+
 def straight_line(equation: Callable[..., Any], **given: Any) -> dict[str, Any]:
     """Return an equation as a program of the proof kernel; its arguments are shaped like those given, whose floats become
-    the inputs that it reads. InputError where it has loops, buffers or words."""
-    recorder = Recorder()
+    the inputs that it reads. InputError where it has loops or buffers, UnreadableError where it has words."""
+    recorder = _NumbersAlone()
     x, y = recorder.memory("x"), recorder.memory("y", writable=True)
     names = [label for name, value in given.items() for label, _ in labelled(name, value)]
     place = iter(range(len(names)))

@@ -7,6 +7,7 @@ from functools import cached_property
 from math import inf, isqrt, nextafter, sqrt
 from typing import Any, TypeVar
 
+from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.evidence.attitude import highest
 from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
 from starhold.kernel.numbers import RefusedError
@@ -220,5 +221,5 @@ def ended(proof: Generator[Any, None, _T]) -> _T:
             return end.value
 
 
-UNSHOWN = (NotFoundError, RefusedError)
+UNSHOWN = (NotFoundError, RefusedError, UnreadableError)
 """What is raised where no evidence is found."""

@@ -21,7 +21,8 @@ from .noise import SHARE, within_radii
 def points(claim: Claim) -> Proof:
     """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
     by no more than end.angle and turns no faster than end.rate. The torque is what the law asks for at the last sample and
-    an error, |error| <= error; it is told the attitude turned by error.attitude at most and the rate off by error.rate;
+    an error, |error| <= error; it is told the attitude turned by error.attitude at most, the rate off by error.rate, and
+    the target's rate and acceleration off by error.target.rate and error.target.acceleration;
     torques from outside that it is not told are no more than `outside`. Both may grow by `.per.rate` times the body's rate.
     With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
     noise.attitude and noise.rate beside."""
@@ -85,6 +86,8 @@ def points(claim: Claim) -> Proof:
     told = [f"errors of the command {most('error')}"]
     told += [f"of the attitude that it is told of up to {below(held.turned)} rad"] if held.turned else []
     told += [f"of the rate of up to {below(held.rated)} rad/s"] if held.rated else []
+    told += [f"of the target's rate of up to {below(held.led)} rad/s"] if held.led else []
+    told += [f"of the target's acceleration of up to {below(held.hurried)} rad/s2"] if held.hurried else []
     text = (
         f"every motion from {{V <= {below(numbers['level'])}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"

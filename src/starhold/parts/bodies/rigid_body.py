@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from starhold.algebra.operations import ABSENT
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import Quaternion, derivative, relative, renormalise, to_body
 from starhold.algebra.scalar import Scalar, Truth, both, is_finite, less, side
 from starhold.algebra.structure import rows
 from starhold.algebra.vector import ZERO, Vector, add, apply, cross, dot, gyroscopic_torque, scale, subtract
-from starhold.parts.contract import Card
+from starhold.parts.contract import CLOCK, Card
 from starhold.parts.craft import Craft
 from starhold.parts.quaternion_sign import SIGN_POLICIES as SIGN_POLICIES
 from starhold.parts.roles import Goal, Loads, Scene
@@ -53,6 +54,7 @@ class Measurement(NamedTuple):
     period: Annotated[float, Quantity("s", "for which the torque will be held")]
     wheel_momentum: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
     magnetic_field: Annotated[Vector, Quantity("T", "as a magnetometer tells it; zero without one")] = ZERO
+    time: Annotated[float, Quantity("s", 'since the start, for laws with `READS = ("time",)`; others must not use it')] = 0.0
 
 
 class Sample(NamedTuple):
@@ -123,7 +125,9 @@ def observe(state: State, scene: Scene) -> Measurement:
     goal = scene.goal
     error = relative(goal.attitude, state.attitude)
     position = to_body(state.attitude, state.position)
-    known = (scene.torque, position, scene.period, scene.momentum, getattr(scene.readings, "magnetic_field", ZERO))
+    field: Vector = getattr(scene.readings, "magnetic_field", ZERO)
+    time: Any = getattr(scene.readings, CLOCK, ABSENT)
+    known = (scene.torque, position, scene.period, scene.momentum, field, time)
     if scene.still:
         # The arithmetic on the zeros of a target at rest is left out here, for a compiler must not drop it.
         return Measurement(error, state.rate, state.rate, ZERO, ZERO, *known)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from starhold.algebra.circular import cosine_sine
-from starhold.algebra.exponential import exponential
+from starhold.algebra.elementary import exp
 from starhold.algebra.scalar import Scalar, absolute, less, maximum, minimum, where
 from starhold.algebra.several import each
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, scale
@@ -132,7 +132,7 @@ def slopes(wheels: Wheels) -> Numbers:
 
 def _stuck(speed: Scalar, most: Scalar, over: Scalar) -> Scalar:
     share = speed * (1.0 / over)
-    return -(PEAK * most) * (share * exponential(-0.5 * (share * share)))
+    return -(PEAK * most) * (share * exp(-0.5 * (share * share)))
 
 
 def shaken(angle: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Vector:

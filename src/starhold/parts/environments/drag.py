@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import exp, tau
+import math
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
-from starhold.algebra.exponential import exponential
+from starhold.algebra.elementary import exp
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, maximum, sqrt
 from starhold.algebra.several import weighted
@@ -36,7 +36,7 @@ ROLE = "environment"
 NEEDS = ("two-body",)
 ABOUT = "Earth"
 Row: TypeAlias = tuple[float, float, float, float, float, float, float]
-TURN = tau * SIDEREAL / DAY
+TURN = math.tau * SIDEREAL / DAY
 """The Earth's rate (rad/s)."""
 
 
@@ -102,7 +102,7 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
     square = dot(position, position)
     # In the form that the Earth's attraction has, so that a kernel computes it once.
     distance = square * sqrt(1.0 / square)
-    thinned = exponential((params.distance - distance) * (1.0 / params.scale_height))
+    thinned = exp((params.distance - distance) * (1.0 / params.scale_height))
     return Memory(unit(through), params.density * thinned * dot(through, through))
 
 
@@ -120,7 +120,7 @@ def bound(params: Params, envelope: Envelope) -> Push:
     wind, turn = envelope.speed, params.rotation * TURN
     # rho (v + turn r)^2 is largest at the lowest place, or higher up where air that hardly thins turns fast.
     place = max(lowest, 2.0 * params.scale_height - wind / turn) if turn else lowest
-    density = numbers.density * exp((numbers.distance - place) / params.scale_height)
+    density = numbers.density * math.exp((numbers.distance - place) / params.scale_height)
     size = largest_torque(numbers.normals, numbers.arms)
     return Push(params.coefficient * density * (wind + turn * place) ** 2 * size)
 

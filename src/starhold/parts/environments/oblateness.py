@@ -37,6 +37,12 @@ def acceleration(state: Any, params: Params, craft: Craft, memory: Any) -> Vecto
     return (x * (slope - 1.0), y * (slope - 1.0), z * (slope - 3.0))
 
 
+def perturbation(params: Params, craft: Craft, distance: float) -> tuple[float, float]:
+    """The largest acceleration (m/s2), and its largest gradient (1/s2), from a distance (m) on: both above the poles."""
+    size = params.j2 * craft.gravity * (params.radius / distance) ** 2 / distance**2
+    return 3.0 * abs(size), 12.0 * abs(size) / distance
+
+
 def examples() -> list[Params]:
     """The Earth, and Mars."""
     return [Params(), Params(1.96045e-3, BODIES["Mars"].radius)]

@@ -8,6 +8,8 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
+from starhold.errors import InputError
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -80,8 +82,8 @@ Block: TypeAlias = Table | Heading | str
 class Result(NamedTuple):
     """A study gives this. blocks: for reading, in order. What there is no file of is None: numbers, all that it computed, SI
     and radians, are for NAME.csv; figure makes the figure of NAME.png with the plotting library; summary, by law, is for
-    summary.json; xml is the text of NAME.xml; certificate writes one; document is for NAME.html and NAME.md. outcome:
-    whether all that is required is met, or proved."""
+    summary.json; xml is the text of NAME.xml, toml that of NAME.toml; certificate writes one; document is for NAME.html and
+    NAME.md. outcome: whether all that is required is met, or proved."""
 
     title: str
     blocks: Sequence[Block]
@@ -92,12 +94,14 @@ class Result(NamedTuple):
     certificate: Callable[[Path], None] | None = None
     document: Sequence[Section] | None = None
     outcome: Literal["met", "missed", "undecided"] = "met"
+    toml: str | None = None
 
 
 class Option(NamedTuple):
     """An option. key: the key of the scenario whose value it replaces, a whole number if `whole`, else a time; "" for a text
-    that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure. content: reads the file
-    that the text names, which `study` takes after the law, None without the option."""
+    that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure. content: reads what
+    the text says or names, which `study` takes after the law, None without the option. argument: how the help calls it
+    where it is no option but has to follow FILE."""
 
     key: str
     help: str
@@ -105,6 +109,7 @@ class Option(NamedTuple):
     default: str | None = None
     file: Literal["", "csv", "png"] = ""
     content: Callable[[str], Any] | None = None
+    argument: str = ""
 
 
 def number_or_text(value: str | float) -> str | float:
@@ -161,11 +166,24 @@ class Command(NamedTuple):
             return self.read(*about, **defaults | given)
         scenario: Scenario = about[0].about(self.body) if self.body else about[0]
         readers = {name: option.content for name, option in self.options.items() if option.content is not None}
+        for name in self.arguments:
+            if given.get(name) is None:
+                raise InputError(self.suffix, name, "nothing", self.options[name].help)
         texts = [(read, given.pop(name, None)) for name, read in readers.items()]
         if given:
             scenario = scenario.with_({self.options[name].key: number_or_text(value) for name, value in given.items()})
         files = [None if text is None else read(text) for read, text in texts]
         return scenario, self.pick(scenario, *about[1:] or (None,)), *files
+
+    @property
+    def arguments(self) -> list[str]:
+        """The names of what has to follow FILE."""
+        return [name for name, option in self.options.items() if option.argument]
+
+    @property
+    def offered(self) -> bool:
+        """Whether it needs no more than a scenario."""
+        return self.read is None and not self.arguments
 
     def studying(self, proof: bool) -> Callable[..., Any]:
         """Return what computes, with what is proved beside if that is asked for."""

@@ -15,7 +15,15 @@ from starhold.parts.epoch import OF_DATE, iso_text
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
-from starhold.studies.modes import certify_modes, hand_overs, mode_departures, named_modes, same_numbers
+from starhold.studies.modes import (
+    begins_asked,
+    certify_modes,
+    first_fault,
+    hand_overs,
+    mode_departures,
+    named_modes,
+    same_numbers,
+)
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -75,7 +83,8 @@ class RigidBodyStudy(BodyStudy):
         tolerances = settling.attitude_tolerance, settling.rate_tolerance
         steps, still = scenario.table.simulation.steps, loop.target.part.flag("STILL")
         wheels = "wheel_momentum" in recorded_of(loop)
-        return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels)
+        modal: Any = {"begins": begins_asked(scenario, loop.law), "fault": first_fault(scenario, loop)}
+        return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **modal)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return METRICS

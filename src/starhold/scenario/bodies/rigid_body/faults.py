@@ -63,7 +63,8 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
             if body is not None and (fault.time, place) > learnt:
                 now, learnt = now._replace(nominal=body), (fault.time, place)
             if wheels is not None and fault.strikes_wheel:
-                left = _left(scenario, wheels, place, fault)
+                now = now._replace(gains=_told(now.gains, wheels, fault))
+                left = _left(scenario, wheels, place, fault, now.gains)
                 share, limit = authority(left) / begun, torque_limit(scenario.known.table, _on(effectors, left))
                 wheels = wheels if action == "retune" else left
                 now = now._replace(parts=_on(now.parts, wheels))
@@ -120,11 +121,20 @@ def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
     return wheels._replace(**changes)
 
 
-def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable) -> Wheels:
-    """The wheels that a diagnosed fault leaves."""
+def _told(gains: Any, wheels: Wheels, fault: FaultTable) -> Any:
+    """The gains of a law that is told of a lost wheel: one less is left of those whose loss begins another mode."""
+    if not hasattr(gains, "wheels_lost") or wheels.torque_limit[_index(fault)] > 0.0:
+        return gains
+    return gains._replace(wheels_lost=gains.wheels_lost - 1.0)
+
+
+def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable, gains: Any) -> Wheels:
+    """The wheels that a diagnosed fault leaves. Where too few are left but another mode begins, they stay as they are."""
     try:
         return lose(wheels, _index(fault)) if wheels.torque_limit[_index(fault)] == 0.0 else wheels
     except ValueError as error:
+        if getattr(gains, "wheels_lost", 1.0) < 0.5:
+            return wheels
         raise InputError(scenario.where, f"fault[{place}]", "", f'{error}; action = "none" flies on') from None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +16,6 @@ from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, most, subtract
 from starhold.errors import InputError, input_at
 from starhold.export.aem import OFF_UNIT, from_date, read_aem
-from starhold.files import read_text
 from starhold.laws.interface import Start
 from starhold.loop.step import total
 from starhold.parts.bodies.rigid_body import State
@@ -30,7 +28,7 @@ from starhold.parts.targets import history
 from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque, torque_limit
 from starhold.scenario.bodies.rigid_body.tables import Pointing, TargetTable
 from starhold.scenario.checking import show, validate
-from starhold.scenario.parts import number_in, read_part
+from starhold.scenario.parts import csv_lines, number_in, read_part
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
@@ -177,10 +175,7 @@ def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], 
         return message.times, message.attitudes, message.frame
     rows: list[list[float]] = []
     order = list(range(len(COLUMNS)))
-    for number, cells in enumerate(csv.reader(read_text(path).splitlines()), 1):
-        cells = [cell.strip() for cell in cells]
-        if not any(cells):
-            continue
+    for number, cells in csv_lines(path):
         if not rows and number_in(cells[0]) is None:
             order = _order(cells, number)
             continue

@@ -1,0 +1,136 @@
+"""Numbers of a scenario fitted to telemetry."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from starhold.errors import InputError
+from starhold.report.commands import Block, Column, Command, Option, Result, Table, later
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.studies.identify import Identified
+POINTS = 4000
+"""Samples of a curve that are drawn."""
+
+
+def present(scenario: Scenario, entry: LawEntry, *given: Any) -> Result:
+    """One row a free number; what the data do not tell; the residuals; the keys to be pasted."""
+    result: Identified = given[-1]
+    title = f"{scenario.name}: numbers fitted to {result.telemetry}"
+    pasted = [f"{key} = {value}" for key, value in result.fitted().items()]
+    blocks: list[Block] = ["", _table(result), *_words(result), "", *pasted]
+    try:
+        learnt = result.learnt().text
+    except InputError as error:
+        # A fit of a model that lacks something may end at numbers that no file may have.
+        learnt = None
+        blocks.append(
+            f"The scenario refuses these numbers, so that there is no identify.toml: {error.key}: {error.allowed}."
+        )
+    summary = {entry.name: result.summary()}
+    return Result(title, blocks, _numbers(result), lambda: draw(result, title), summary, toml=learnt)
+
+
+def _table(result: Identified) -> Table:
+    from starhold.studies.observable import WIDTH
+
+    posterior, barely = result.posterior, result.posterior.barely(result.free)
+    columns = [Column("number"), Column("unit"), Column("file", "", ".6g"), Column("estimate", "", ".6g")]
+    columns += [Column("± 95 %", "", ".2g"), Column("told")]
+    rows: list[list[Any]] = []
+    numbers = zip(result.free.names, result.free.units, result.free.values, result.values, strict=True)
+    for k, (name, unit, before, value) in enumerate(numbers):
+        width = WIDTH * posterior.deviations[k] if posterior.is_told[k] else None
+        words = "[red]no[/red]" if width is None else "barely" if barely[k] else "yes"
+        rows.append([name, unit, before, value, width, words])
+    return Table(columns, rows)
+
+
+def _words(result: Identified) -> list[str]:
+    from starhold.studies.identify import COMMANDS
+
+    degrees, spread = result.degrees, (result.chi2 / result.degrees) ** 0.5
+    fits = "what the stated noise gives" if result.consistent >= 0.01 else "more than the stated noise gives"
+    worst = min(result.whiteness, key=lambda name: result.whiteness[name])
+    white = "no residual is correlated in time"
+    if not result.white:
+        white = f"{worst} is correlated in time (Ljung-Box, p = {result.whiteness[worst]:.1g}): something flies that the"
+        white += " scenario lacks, and the intervals are too narrow"
+    ended = "" if result.settled else f"The fit has not settled in {result.iterations} steps. "
+    return [
+        "",
+        COMMANDS[result.commands],
+        f"{ended}Residuals are {spread:.3f} deviations (root mean square of {degrees} degrees of freedom): {fits}; {white}.",
+        *result.posterior.sentences,
+        *result.notes,
+    ]
+
+
+def _numbers(result: Identified) -> Table:
+    """Estimates with their covariance, NaN where they are not told."""
+    posterior = result.posterior
+    heads = ["number", "unit", "file", "estimate", "deviation", *(f"covariance {name}" for name in result.free.names)]
+    values = zip(result.free.names, result.free.units, result.free.values, result.values, strict=True)
+    rows = [[*row, posterior.deviations[k], *posterior.covariance[k]] for k, row in enumerate(values)]
+    return Table([*map(Column, heads)], rows)
+
+
+def draw(result: Identified, title: str) -> Any:
+    """A row for each sensor: what it read with the fit, and the residuals in deviations of its noise."""
+    from starhold.report.figures import framed, plain
+    from starhold.report.plots import COLOURS
+
+    count = len(result.residuals)
+    figure, grid = framed(
+        (9.0, 1.2 + 2.0 * count), title, count, 2, (0.9, 0.2, 0.5, 0.6), sharex=True, hspace=0.16, wspace=0.2
+    )
+    for (name, (times, errors)), (left, right) in zip(result.residuals.items(), grid, strict=True):
+        every = max(1, len(times) // POINTS)
+        read, fitted = (rows[::every] for rows in result.readings[name])
+        for axis in (left, right):
+            plain(axis)
+        for k in range(read.shape[1]):
+            left.plot(times[::every], read[:, k], ".", color=COLOURS[k], markersize=2.0)
+            left.plot(times[::every], fitted[:, k], color=COLOURS[k], linewidth=0.9)
+        for k in range(errors.shape[1]):
+            right.plot(times[::every], errors[::every, k], ".", color=COLOURS[k], markersize=2.0)
+        for level in (-1.96, 1.96):
+            right.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
+        left.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+        left.set_ylabel(f"{name.replace('_', ' ')}, {result.units[name]}", fontsize=8)
+    for axis, words in zip(grid[-1], ("readings and fit (lines)", "residuals in deviations, 95 % dashed"), strict=True):
+        axis.set_xlabel(f"time, s; {words}", fontsize=8.5)
+    return figure
+
+
+COMMAND = Command(
+    "Fit numbers of a scenario to telemetry: identify.csv, identify.png, and identify.toml, the scenario to fly on with.",
+    "identify",
+    later("studies.identify.study"),
+    present,
+    doing=None,
+    options={
+        "telemetry": Option(
+            "",
+            "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder",
+            content=lambda given: given,
+            argument="TELEMETRY",
+        ),
+        "mapping": Option(
+            "", "a TOML file that says what its columns hold, or the name of one", content=lambda given: given
+        ),
+        "free": Option(
+            "",
+            'keys of the numbers to fit, with commas between: "spacecraft.inertia, part.gyro.bias"',
+            content=lambda given: given,
+        ),
+        "commands": Option(
+            "",
+            "recorded, law or none: what commands the craft; as recorded where that is, else the law",
+            content=lambda given: given,
+        ),
+    },
+    unstable=True,
+    kinds=("csv", "png", "toml"),
+)

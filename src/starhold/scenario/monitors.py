@@ -1,0 +1,104 @@
+"""The [[law.monitor]] tables of a law of modes are read: what each monitor looks at, with the unit of that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field
+from pydantic_core import PydanticCustomError
+
+from starhold.algebra.quantity import Quantity, quantities
+from starhold.errors import InputError
+from starhold.laws.monitors import TIMES, Monitor
+from starhold.loop.closed_loop import is_recorded
+from starhold.parts.bodies.rigid_body import Sample
+from starhold.parts.catalogue import fit
+from starhold.parts.part import Fitted
+from starhold.scenario.checking import nearest, show
+from starhold.scenario.quantity import quantity, raw, reader
+from starhold.scenario.tables import Name, Table
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+
+class MonitorTable(Table):
+    """A monitor of a reading or of an estimate, on whose trip the mode on_loss begins."""
+
+    name: Annotated[Name, Field(description="how errors call it")]
+    kind: Annotated[Literal["range", "rate", "stuck", "residual"], Field(description="what it looks at")]
+    reading: Annotated[str | None, Field(description="the name of a sensor's reading")] = None
+    estimate: Annotated[str | None, Field(description="in its place the name of what the estimator computes")] = None
+    sensor: Annotated[str | None, Field(description="the name of the sensor; the first of such a reading if absent")] = None
+    limit: Annotated[
+        Any, *raw("beyond which it trips, in the unit of what it looks at; of a rate per second, of stuck a time")
+    ]
+    times: Annotated[int, *quantity(replace(TIMES, whole=True))] = 1
+
+
+def read_monitor(table: MonitorTable, scenario: Scenario, where: str, key: str) -> tuple[Monitor, list[float]]:
+    """The monitor of a table with its numbers. InputError where the scenario has no such reading or estimate, or a limit has
+    another unit."""
+    if (table.reading is None) == (table.estimate is None):
+        raise InputError(where, key, "neither reading nor estimate" if table.reading is None else "both", "one of them")
+    estimators = [fitted for fitted in scenario.parts if fitted.part.role == "estimator"]
+    sensor: int | None = None
+    if table.reading is None:
+        if table.kind == "residual" or table.sensor is not None:
+            unfit = "kind" if table.kind == "residual" else "sensor"
+            raise InputError(where, f"{key}.{unfit}", show(getattr(table, unfit)), "a reading, in place of an estimate")
+        watched, given = str(table.estimate), estimators
+    else:
+        watched, given = table.reading, _sensors_of(table.reading, scenario)
+        names = [fitted.called for fitted in given]
+        if table.sensor is not None and table.sensor not in names:
+            allowed = nearest(table.sensor, names) if names else f"none, for no sensor gives {watched}"
+            raise InputError(where, f"{key}.sensor", show(table.sensor), allowed)
+        sensor = 0 if table.sensor is None else names.index(table.sensor)
+    what = "estimate" if sensor is None else "reading"
+    declared = _known(given[sensor or 0 :][:1])
+    if watched not in declared:
+        known = _known(estimators if sensor is None else [f for f in scenario.parts if f.part.role == "sensor"])
+        raise InputError(where, f"{key}.{what}", show(watched), _one_of(watched, known, f"{what} is there"))
+    if table.kind == "residual" and watched not in _known(estimators):
+        raise InputError(where, f"{key}.reading", show(watched), _one_of(watched, _known(estimators), "estimator is there"))
+    quantity_there = declared[watched]
+    size = SIZES[quantity_there.dimension]
+    if size == SIZES["quaternion"] and table.kind == "range":
+        raise InputError(where, f"{key}.kind", show(table.kind), "rate, stuck or residual of an attitude, which has no size")
+    unit = "rad" if size == SIZES["quaternion"] else quantity_there.unit
+    monitor = Monitor(table.name, table.kind, watched, unit, size, sensor)
+    try:
+        limit = reader(monitor.fields()[0].gain)(table.limit)
+    except PydanticCustomError as error:
+        raise InputError(where, f"{key}.limit", show(table.limit), error.message().removeprefix("must be ")) from None
+    return monitor, [limit, float(table.times)]
+
+
+SIZES = {"quaternion": 4, "axis": 3, "": 1}
+"""How many numbers a quantity of each dimension has."""
+
+
+def _known(fitted: Iterable[Fitted]) -> dict[str, Quantity]:
+    """The quantities that these sensors or estimators give, by name."""
+    known: dict[str, Quantity] = {}
+    for part in (one.part for one in fitted):
+        kind = part.module.Estimate if part.role == "estimator" else part.module.Reading
+        # What is not recorded declares no units; it has those of the body's state.
+        kinds = quantities(kind if part.role == "estimator" or is_recorded(part) else Sample)
+        known |= {name: one for name, one in kinds.items() if name in kind._fields and one.dimension in SIZES}
+    return known
+
+
+def _sensors_of(reading: str, scenario: Scenario) -> list[Fitted]:
+    """The sensors that give a reading, in the order in which a loop has them."""
+    noise = getattr(scenario.table, "sensor", None)
+    short = [fit("sensor", "gaussian", 0.0, 0.0)] if noise is not None and any(dict(noise).values()) else []
+    sensors = [*short, *(fitted for fitted in scenario.parts if fitted.part.role == "sensor")]
+    return [fitted for fitted in sensors if reading in fitted.part.module.Reading._fields]
+
+
+def _one_of(name: str, known: Mapping[str, Any], what: str) -> str:
+    return nearest(name, list(known)) if known else f"none, for no {what}"

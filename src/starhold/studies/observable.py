@@ -1,0 +1,140 @@
+"""A fit tells so much of its free numbers: their covariance, and by name the combinations that no reading depends on."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import linalg, stats
+
+from starhold.scenario.reading import Scenario
+from starhold.studies.fitting import Array, Free
+
+UNTOLD = 1e-8
+"""A combination of free numbers, each measured by how much readings depend on it, is not told where its singular value is
+below this share of the largest."""
+SHARE = 1e-4
+"""Numbers that take a smaller share in such a combination are not named."""
+ALIKE = 1e-4
+"""Vectors are proportional where the square of the sine between them is below this."""
+SIZELESS = 1e4
+"""A key without a size is measured by so many times what its readings alone would leave uncertain."""
+LEVEL = 0.95
+WIDTH = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
+"""Half the interval of this level, in standard deviations."""
+
+
+class Posterior(NamedTuple):
+    """The covariance of the free numbers, infinite on the diagonal for those that are not told; untold: directions (m, free)
+    along which readings stay as they are, and sentences that name them; rank: combinations that are told, the start's
+    included; singular: the singular values of the weighted Jacobian with columns of length 1."""
+
+    covariance: Array
+    untold: Array
+    sentences: tuple[str, ...]
+    rank: int
+    singular: Array
+
+    def barely(self, free: Free) -> Any:
+        """Which numbers are told no better than to the size of their key."""
+        return self.is_told & (free.sizes > 0.0) & (WIDTH * self.deviations > free.sizes)
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations of the free numbers."""
+        return np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def is_told(self) -> Any:
+        """Which numbers are told."""
+        return np.isfinite(np.diagonal(self.covariance))
+
+    @property
+    def correlations(self) -> Array:
+        """Correlations of the free numbers, NaN of those that are not told."""
+        sizes = np.where(self.is_told, self.deviations, np.nan)
+        return self.covariance / np.outer(sizes, sizes)
+
+    def over(self, scenario: Scenario, free: Free, values: Array) -> Scenario:
+        """The scenario with a campaign over the numbers that are told, together, but for whole matrices."""
+        from starhold.scenario.checking import read_toml
+
+        tables = dict[str, Any](read_toml(scenario.text, scenario.where).get("campaign", {}))
+        dropped = {place.key for place in free.places}
+        over = {
+            keys: table
+            for keys, table in tables.get("over", {}).items()
+            if not any(key.strip().partition("[")[0] in {k.partition("[")[0] for k in dropped} for key in keys.split(","))
+        }
+        matrix = [any(len(p.shape) == 2 and name.startswith(p.key) for p in free.places) for name in free.names]
+        groups = [
+            [k for k, name in enumerate(free.names) if name.startswith(p.key)] for p in free.places if len(p.shape) == 2
+        ]
+        fit = self.is_told & ~self.barely(free)
+        groups.append([k for k, whole in enumerate(matrix) if not whole and fit[k]])
+        for group in groups:
+            if group and fit[group].all():
+                names = [free.names[k] for k in group]
+                key = names[0].partition("[")[0] if matrix[group[0]] else ", ".join(names)
+                over[key] = _table(self.covariance[np.ix_(group, group)])
+        return scenario.with_({"campaign": tables | {"over": over}}) if over else scenario
+
+
+def _table(covariance: Array) -> dict[str, Any]:
+    """The distribution of numbers about those of the file."""
+    if len(covariance) == 1:
+        return {"distribution": "normal", "sigma": float(np.sqrt(covariance[0, 0]))}
+    return {"distribution": "correlated-normal", "covariance": (0.5 * (covariance + covariance.T)).tolist()}
+
+
+def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
+    """Return what residuals of unit variance with these slopes (n, start + free) tell; the start is free beside."""
+    # As few rows as there are numbers have the same squares.
+    few: Any = np.linalg.qr(slopes, mode="r")
+    slopes = few
+    lengths = np.linalg.norm(slopes, axis=0)
+    lengths[lengths == 0.0] = 1.0
+    first = slopes.shape[1] - len(free.names)
+    _, singular, axes = linalg.svd(slopes / lengths, full_matrices=False)
+    kept = singular > UNTOLD * singular[0]
+    parts = (axes[kept] / singular[kept, None])[:, first:] / lengths[first:]
+    covariance = parts.T @ parts
+    # Keys without a size are told unless they are as good as another.
+    sizes = np.where(free.sizes > 0.0, free.sizes, SIZELESS / lengths[first:])
+    _, among, combined = linalg.svd(axes[~kept][:, first:], full_matrices=False)
+    untold = _reduced(combined[among > SHARE] / lengths[first:] / sizes)
+    for k in np.flatnonzero((np.abs(untold) > SHARE).any(axis=0)):
+        covariance[k, k] = np.inf
+    # What is left of the free numbers once the start has explained what it can.
+    few = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")
+    _, known, axes = np.linalg.svd(few[first:, first:])
+    hardly = _reduced(axes[: len(axes) - len(untold)][known[: len(axes) - len(untold)] < WIDTH])
+    sentences = [_sentence(row, free, values / sizes, "do not tell") for row in untold]
+    sentences += [_sentence(row, free, values / sizes, "hardly tell") for row in hardly]
+    return Posterior(covariance, untold * sizes, tuple(sentences), int(kept.sum()), singular)
+
+
+def _reduced(rows: Array) -> Array:
+    """A basis of the space of independent rows in which each has a number of its own, the largest, as far as it goes."""
+    if not len(rows):
+        return rows
+    basis = linalg.orth(rows.T).T
+    order: Any = linalg.qr(basis, pivoting=True)
+    pivots = order[2][: len(basis)]
+    return linalg.solve(basis[:, pivots], basis)
+
+
+def _sentence(row: Array, free: Free, values: Array, verb: str) -> str:
+    """Name a combination on which readings do not depend, or not beyond their noise; row and values in sizes."""
+    named = np.flatnonzero(np.abs(row) > SHARE * np.abs(row).max())
+    names, shares, known = [free.names[k] for k in named], row[named], values[named]
+    why = "no reading depends on it" if verb == "do not tell" else "it may change by its own size"
+    if len(names) == 1:
+        return f"These data {verb} {names[0]}: {why}."
+    cosine = abs(shares @ known) / max(1e-300, float(np.linalg.norm(shares) * np.linalg.norm(known)))
+    keys = ", ".join(dict.fromkeys(name.partition("[")[0] for name in names))
+    if 1.0 - cosine * cosine < ALIKE and free.values[named].all():
+        scale = "common scale" if "," in keys else "scale"
+        return f"These data {verb} the {scale} of {keys}, only ratios: {why}."
+    text = " : ".join(f"{x:.3g}" for x in shares / np.abs(shares).max())
+    return f"These data {verb} {', '.join(names)} apart, which may change as {text} in their sizes: {why}."

@@ -1,0 +1,168 @@
+"""Telemetry: readings, estimates and commands that a satellite recorded, under the names that runs of a scenario have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from starhold.algebra.quantity import Quantity
+from starhold.algebra.structure import flatten
+from starhold.errors import InputError
+from starhold.export.aem import from_date
+from starhold.loop.closed_loop import ClosedLoop, is_recorded
+from starhold.parts.epoch import OF_J2000, iso_text
+from starhold.scenario.bodies.rigid_body.start import date_of_axes
+from starhold.scenario.checking import nearest
+from starhold.scenario.reading import Scenario
+from starhold.simulation.lane import recorded
+from starhold.simulation.stepper import sensed_of
+from starhold.studies.telemetry_files import (
+    Array,
+    ColumnsTable,
+    MappingTable,
+    heads_of,
+    read_mapping,
+    seconds_of,
+    table_of,
+    values_of,
+)
+
+Known: TypeAlias = dict[str, tuple[Quantity, int]]
+"""Quantities by name, with how many numbers each has."""
+MISSED = 1.5
+"""A step longer than this many intervals has rows missing."""
+
+
+class Gaps(NamedTuple):
+    """Rows that a file has; those that are missing by the interval, whose time is empty, that of another row, or before that
+    of an earlier one; and the interval (s)."""
+
+    rows: int
+    missing: int
+    timeless: int
+    doubled: int
+    disordered: int
+    interval: float
+
+    @property
+    def sentence(self) -> str:
+        """Tell what is there, and what is missing."""
+        words = ("missing", "without a time", "at the time of another", "out of order")
+        faults = [f"{count} {word}" for count, word in zip(self[1:5], words, strict=True) if count]
+        return f"{self.rows} rows, one every {self.interval:g} s; {', '.join(faults) if faults else 'none missing'}"
+
+
+@dataclass(frozen=True, repr=False)
+class Telemetry:
+    """Recorded quantities over time.
+
+    times: (n,) s, increasing, since the scenario's epoch where times are absolute and it states one, since the first sample
+    where it states none, or as a run counts them; columns: arrays (n, k), SI, by the names that runs have, NaN where there
+    is nothing; known: unit and meaning of each; gaps: of each file; absolute: whether times count from an epoch."""
+
+    name: str
+    times: Array
+    columns: Mapping[str, Array]
+    known: Mapping[str, Quantity]
+    gaps: Mapping[str, Gaps]
+    absolute: bool
+
+    def __repr__(self) -> str:
+        return f"<Telemetry {self.name}: {len(self.times)} samples of {', '.join(self.columns)}>"
+
+    @property
+    def sentence(self) -> str:
+        """Tell what was read and what is missing."""
+        files = [f"{name} has {gaps.sentence}" for name, gaps in self.gaps.items()]
+        counts = {name: int(np.isnan(values).any(axis=1).sum()) for name, values in self.columns.items()}
+        empty = [f"{name} in {count}" for name, count in counts.items() if count]
+        return ". ".join([*files, *([f"Of {len(self.times)} samples are empty: {', '.join(empty)}"] if empty else [])]) + "."
+
+
+def quantities_of(loop: ClosedLoop) -> Known:
+    """The quantities that telemetry of a loop may have, with how many numbers each has: what runs record, and the readings
+    of sensors that they do not."""
+    known = {name: (meant, size) for name, meant, size in recorded(loop)}
+    for fitted, reading in zip(loop.used("sensor"), sensed_of(loop)[1], strict=True):
+        for name, value in {} if is_recorded(fitted.part) else reading._asdict().items():
+            meant = known[name][0]._replace(text=f"{name} as {fitted.called} measures it")
+            known[f"{fitted.called.replace('-', '_')}_{name}"] = meant, len(flatten((value,)))
+    return known
+
+
+def read(scenario: Scenario, loop: ClosedLoop, source: Any, mapping: str | Path | None = None) -> Telemetry:
+    """The telemetry in a file, the folder of a run, or a Dataset of `simulate`, for a loop of a scenario. mapping: a file,
+    or the name of one that comes with starhold, that says which columns hold what; recordings of starhold need none.
+    InputError for a file, a column or a unit that does not fit."""
+    import pandas as pd
+
+    known = quantities_of(loop)
+    table, where = MappingTable() if mapping is None else read_mapping(mapping), str(mapping)
+    for name in table.columns:
+        if name not in known:
+            raise InputError(where, f"telemetry.columns.{name}", "no quantity of this scenario", nearest(name, [*known]))
+    main = Path("the run") if hasattr(source, "data_vars") else Path(source)
+    frame, table = table_of(source, main, table)
+    columns = _columns(known, table, frame, main)
+    absolute = table.time.base not in ("run", "first")
+    start = _epoch(scenario) if absolute else 0.0 if table.time.base == "run" else None
+    zero, parts, gaps = start, [], dict[str, Gaps]()
+    for file in dict.fromkeys(column.file for column in columns.values()):
+        place = main.parent / file if file else main
+        here = table_of(place, place, table)[0] if file else frame
+        seconds = seconds_of(here, table.time, place, where)
+        if not np.isfinite(seconds).any():
+            raise InputError(str(place), table.time.column, "no time", "a row at least")
+        zero = float(np.nanmin(seconds)) if zero is None else zero
+        numbers = {n: values_of(here, n, c, known[n], place, where) for n, c in columns.items() if c.file == file}
+        each = {(n, k): values[:, k] for n, values in numbers.items() for k in range(values.shape[1])}
+        # Times since 1970 are known to less than a microsecond.
+        part = pd.DataFrame(each, index=np.round(seconds - zero, 6) if absolute else seconds - zero)
+        gaps[place.name], part = _in_order(part, table.interval)
+        parts.append(part)
+    whole = pd.concat(parts, axis=1).sort_index()
+    arrays = {n: whole[n].to_numpy(dtype=float) for n in columns}
+    of_date = date_of_axes(scenario) if scenario.body == "rigid-body" else None
+    for n, column in columns.items():
+        if column.frame == OF_J2000 and of_date is not None:
+            arrays[n] = from_date(arrays[n], of_date, back=True)
+    meant = {n: known[n][0] for n in columns}
+    return Telemetry(main.name, whole.index.to_numpy(dtype=float), arrays, meant, gaps, absolute and start is not None)
+
+
+def _columns(
+    known: Mapping[str, tuple[Quantity, int]], table: MappingTable, frame: Any, path: Path
+) -> dict[str, ColumnsTable]:
+    """The columns of each quantity: those that a mapping names, or those under the names that starhold gives."""
+    named = {name: heads_of(name, *meant) for name, meant in known.items()}
+    if table.columns:
+        return {n: c if c.columns else c.model_copy(update={"columns": named[n]}) for n, c in table.columns.items()}
+    columns = {name: ColumnsTable(columns=heads) for name, heads in named.items() if set(heads) <= {*frame.columns}}
+    if not columns:
+        allowed = f"a mapping of its columns, or columns such as time, {', '.join(next(iter(named.values())))}"
+        raise InputError(str(path), "", f"columns {', '.join(map(str, frame.columns[:8]))}", allowed)
+    return columns
+
+
+def _epoch(scenario: Scenario) -> float | None:
+    """When a scenario's flight begins, UTC in s since 1970; None where it states no epoch."""
+    epoch = getattr(getattr(scenario.table, "orbit", None), "epoch", None)
+    return None if epoch is None else float(np.datetime64(iso_text(epoch), "us").astype(float)) * 1e-6
+
+
+def _in_order(part: Any, interval: float | None) -> tuple[Gaps, Any]:
+    """A table by its times, increasing, rows of equal times as one; what is missing by the interval, which is the median
+    step if None."""
+    timed = part[part.index.notna()]
+    times = timed.index.to_numpy()
+    disordered = int((times < np.maximum.accumulate(times)).sum())
+    # Of rows of one time the first number of each column is taken.
+    ordered = timed.groupby(level=0).first()
+    steps = np.diff(ordered.index.to_numpy())
+    usual = float(interval or (np.median(steps) if len(steps) else 0.0))
+    missing = int((np.round(steps[steps > MISSED * usual] / usual) - 1.0).sum()) if usual else 0
+    return Gaps(len(part), missing, len(part) - len(timed), len(timed) - len(ordered), disordered, usual), ordered

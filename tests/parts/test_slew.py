@@ -1,0 +1,123 @@
+"""A slew: times by the formulas of textbooks, its path by SciPy, its torque by Euler's equation, the Sun by ERFA."""
+
+import math
+
+import erfa
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from starhold.parts.targets import slew
+from starhold.scenario.reading import parse
+from starhold.studies.compare import record
+from tests.making import built
+from tests.missions import cubesat
+from tests.refusals import refused
+
+RATE, ACCELERATION, PERIOD = math.radians(0.5), math.radians(0.02), 0.5
+LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.006\nk_attitude = 0.0008\n'
+
+
+def profile(angle, **more):
+    """The slew about a slanted axis by an angle, and its goals at every control step."""
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    end = (Rotation.from_quat([0.1, 0.2, -0.3, 0.9]) * Rotation.from_rotvec(angle * axis)).as_quat()[[3, 0, 1, 2]]
+    start = Rotation.from_quat([0.1, 0.2, -0.3, 0.9]).as_quat()[[3, 0, 1, 2]]
+    params = slew.Params(tuple(end), RATE, ACCELERATION, tuple(start), 10.0, **more)
+    numbers = slew.prepare(params, PERIOD)
+    return numbers, [slew.goal(numbers, None, step, None) for step in range(1000)], Rotation.from_quat(end[[1, 2, 3, 0]])
+
+
+@pytest.mark.parametrize("angle", [0.05, 0.3, 2.8])
+def test_a_slew_goes_from_rest_to_rest_at_its_limits_in_the_least_time(angle):
+    numbers, goals, end = profile(angle)
+    rates, slopes = (np.array([getattr(goal, name) for goal in goals]) for name in ("rate", "acceleration"))
+    turns = Rotation.from_quat(np.array([goal.attitude for goal in goals])[:, [1, 2, 3, 0]])
+    coasts = angle > RATE**2 / ACCELERATION
+    least = angle / RATE + RATE / ACCELERATION if coasts else 2.0 * math.sqrt(angle / ACCELERATION)
+    assert 2.0 * numbers.speeding + numbers.coasting == pytest.approx(least, rel=1e-12)
+    moving = np.flatnonzero(np.linalg.norm(rates, axis=1) > 0.0) * PERIOD
+    assert (moving[0], moving[-1]) == pytest.approx((10.5, 10.0 + least), abs=PERIOD)
+    assert np.linalg.norm(rates, axis=1).max() <= (RATE if coasts else math.sqrt(angle * ACCELERATION)) * (1.0 + 1e-12)
+    assert set(np.round(np.linalg.norm(slopes, axis=1) / ACCELERATION, 12)) <= {0.0, 1.0}
+    assert (turns[-1].inv() * end).magnitude() < 1e-14
+    # The step from one attitude to the next is the mean rate of a profile of straight pieces.
+    steps = (turns[:-1].inv() * turns[1:]).as_rotvec() / PERIOD
+    assert np.abs(steps - 0.5 * (rates[1:] + rates[:-1])).max() < 0.5 * ACCELERATION * PERIOD
+    flat = np.all(slopes[1:] == slopes[:-1], axis=1)
+    assert np.abs(steps - 0.5 * (rates[1:] + rates[:-1]))[flat].max() < 1e-14
+
+
+PART = """
+[[part]]
+type = "slew"
+attitude = [0.3, 0.8, -0.5, 0.1]
+rate = "0.5 deg/s"
+acceleration = "0.02 deg/s^2"
+begin = 20
+"""
+START = "angles = [0, 0, 0]\nrate = [0, 0, 0]"
+
+
+def scenario(more=""):
+    text = cubesat(PART + more, LAW, duration=400, angles="[0, 0, 0]", rate=(0.0, 0.0, 0.0))
+    return parse(text, "slew.toml")
+
+
+def test_a_law_that_is_told_the_profile_follows_it_with_the_torque_that_it_takes():
+    own = scenario()
+    run = record(own, built(own))
+    errors = 2.0 * np.linalg.norm(run["attitude_error"][:, 1:], axis=1)
+    assert math.degrees(errors.max()) < 0.05
+    assert errors[-1] < 1e-4
+    numbers = slew.prepare(slew.Params((0.3, 0.8, -0.5, 0.1), RATE, ACCELERATION), PERIOD)
+    inertia, axis = np.diag([0.05, 0.065, 0.025]), np.array(numbers.axis)
+    gyroscopic = np.abs(np.cross(axis, inertia @ axis)) * RATE**2
+    most = (ACCELERATION * np.abs(inertia @ axis) + gyroscopic).max()
+    assert 0.9 * most < np.abs(run["torque"]).max() < 1.1 * most
+    with refused("part slew", f"the slew takes up to {most:.4g} N m about a body axis, more than {0.9 * most:.4g} N m"):
+        built(scenario(f"torque_limit = {0.9 * most}\n"))
+    built(scenario(f"torque_limit = {1.0001 * most}\n"))
+
+
+def test_a_path_into_the_cone_about_the_sun_is_refused_with_its_angle():
+    day = sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0
+    sun = erfa.pmat06(2451545.0, day - 2451545.0) @ -erfa.epv00(2451545.0, day - 2451545.0)[0]["p"]
+    numbers = slew.prepare(slew.Params((0.3, 0.8, -0.5, 0.1), RATE, ACCELERATION), PERIOD)
+    angles = np.linspace(0.0, 2.0 * math.acos(0.3 / math.sqrt(0.99)), 200_001)
+    seen = Rotation.from_rotvec(np.outer(angles, numbers.axis)).apply([1.0, 0.0, 0.0]) @ sun / np.linalg.norm(sun)
+    nearest = math.degrees(np.arccos(seen.max()))
+    cone = 'axis = [1, 0, 0]\nkeep_out = "{} deg"\n'
+    built(scenario(cone.format(nearest - 0.05)))
+    with refused("part slew", "the axis passes the Sun at", "it is to keep") as caught:
+        built(scenario(cone.format(nearest + 0.05)))
+    assert float(str(caught.value).partition("Sun at ")[2].split()[0]) == pytest.approx(nearest, abs=0.02)
+    # Where it begins and where it ends count too.
+    for place in (0, -1):
+        there = Rotation.from_rotvec(angles[place] * np.array(numbers.axis)).inv().apply(sun / np.linalg.norm(sun))
+        with refused("the axis passes the Sun at 0.0", "deg, after"):
+            built(scenario(f"axis = {there.tolist()}\nkeep_out = 0.1\n"))
+
+
+def test_a_slew_of_a_mode_is_refused_where_its_craft_cannot():
+    modes = """
+[[law]]
+name = "mission"
+type = "modes"
+[[law.mode]]
+name = "slew"
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+target = { type = "slew", attitude = [0.3, 0.8, -0.5, 0.1], rate = 0.01, acceleration = 3e-4, torque_limit = LIMIT }
+until = { after = "380 s" }
+[[law.mode]]
+name = "rest"
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+"""
+    text = cubesat(modes, duration=400, angles="[0, 0, 0]", rate=(0.0, 0.0, 0.0))
+    built(parse(text.replace("LIMIT", "1e-4"), "m.toml"))
+    with refused("the slew takes up to"):
+        built(parse(text.replace("LIMIT", "1e-6"), "m.toml"))
