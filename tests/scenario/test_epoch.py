@@ -44,6 +44,7 @@ PARTS = "".join(
         "solar-pressure": "plates = [[0.06, 1, 0, 0, 0.05, 0, 0.02, 0.2, 0.3]]",
         **dict.fromkeys(("magnetometer", "sun-sensor", "gyro", "gnss", "triad"), ""),
         "magnetic-unloading": "dipole_limit = 0.3\ngain = 1e-3",
+        "star-tracker": "cross = 1e-5\nroll = 1e-4",
         "ground-station": 'latitude = "60 deg"\nlongitude = "20 deg"',
     }.items()
 )
@@ -92,7 +93,7 @@ WRITTEN = rows("""
 @pytest.mark.parametrize("epoch", [epoch for row in WRITTEN for epoch in row])
 def test_every_part_gets_the_epoch_of_the_orbit_however_it_is_written(epoch):
     found = epochs(scenario(epoch, law=MODES))
-    assert len(found) == 9
+    assert len(found) == 10
     assert set(found.values()) == {NOON}
 
 
@@ -101,9 +102,11 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
     declaring = {name for role in PACKAGES for name, part in parts(role).items() if name in named and _declares(part)}
     assert declaring == {
         "residual-dipole", "solar-pressure", "magnetometer", "sun-sensor", "triad", "magnetic-unloading", "magnetorquers",
-        "ground-station", "sun", "yaw-steering",
+        "ground-station", "sun", "yaw-steering", "star-tracker", "coarse-sun-sensors", "quest", "slew",
     }  # fmt: skip
-    assert declaring - {"magnetorquers", "sun", "yaw-steering"} == set(epochs(scenario()))
+    assert declaring - {"magnetorquers", "sun", "yaw-steering", "coarse-sun-sensors", "quest", "slew"} == set(
+        epochs(scenario())
+    )
 
 
 def _declares(part):

@@ -57,7 +57,7 @@ def turn_of(mounting: Vector) -> Turn:
 
 
 def axes_of(mounting: Vector, errors: Matrix | Vector) -> Axes:
-    """What a vector in body axes is multiplied by as a sensor shows it, () for nothing."""
+    """The matrix from body axes to the axes of a sensor as they are, () for the same."""
     turn = turn_of(mounting)
     if not turn and not is_given(errors):
         return ()

@@ -43,13 +43,13 @@ def attitude_at_start(params: Any, state: Any) -> Memory:
 
 
 def measured_or_carried(
-    readings: Any, memory: Memory, period: Scalar, found: Callable[[Scalar], tuple[Quaternion, Truth]]
+    readings: Any, memory: Memory, period: Scalar, observe: Callable[[Scalar], tuple[Quaternion, Truth]]
 ) -> tuple[Estimate, Memory]:
     """The attitude that is found at a time (s) where it can be used, else the one before, turned as the gyro says."""
     rate, time = readings.rate, memory.steps * period
     mean = scale(0.5, add(memory.rate, rate))
     carried = normalise(multiply(memory.attitude, short_turn(scale(0.5 * period, mean))))
-    measured, usable = found(time)
+    measured, usable = observe(time)
     attitude = chosen(usable, nearer(measured, carried), carried)
     age = where(usable, 0.0, memory.age + period)
     # Without any measurement the age is that of the flight, and a period.

@@ -1,4 +1,4 @@
-"""What real wheels add to motors with viscous and Coulomb friction: stiction, limits of power, and rotors out of balance.
+"""Real wheels have stiction, motors of limited power, and rotors out of balance.
 
 Friction that is largest as a rotor begins to turn is Stribeck's, sqrt(e) (static - coulomb) (W/s) exp(-(W/s)^2/2) beside the
 others, W the speed and s that at which it is largest. A rotor out of balance turns a torque about the craft with it,

@@ -78,12 +78,12 @@ def prepare(params: Params, period: float) -> Numbers:
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
     """The best attitude by the directions that are there, else by the gyro."""
 
-    def found(time: Scalar) -> tuple[Quaternion, Truth]:
+    def observe(time: Scalar) -> tuple[Quaternion, Truth]:
         pairs = pairs_of(readings, time, params)
         clear = reduce(either, [_apart(*two, params.sine_squared) for two in combinations(pairs, 2)])
         return best(pairs, clear), clear
 
-    return measured_or_carried(readings, memory, period, found)
+    return measured_or_carried(readings, memory, period, observe)
 
 
 def pairs_of(readings: Any, time: Scalar, params: Numbers) -> list[Pair]:
@@ -135,8 +135,8 @@ def best(pairs: list[Pair], clear: Truth) -> Quaternion:
     adjugate: Any = [tuple(_cofactor(rows, i, j) for j in range(4)) for i in range(4)]
     longest, size = adjugate[0], absolute(adjugate[0][0])
     for i in range(1, 4):
-        own = absolute(adjugate[i][i])
-        longest, size = chosen(less(size, own), adjugate[i], longest), maximum(size, own)
+        other = absolute(adjugate[i][i])
+        longest, size = chosen(less(size, other), adjugate[i], longest), maximum(size, other)
     return normalise(stretch(1.0 / maximum(size, TINY), longest))
 
 

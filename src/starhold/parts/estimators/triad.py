@@ -63,7 +63,7 @@ def prepare(params: Params, period: float) -> Numbers:
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
     """The attitude by both directions where they are there, else by the gyro."""
 
-    def found(time: Scalar) -> tuple[Quaternion, Truth]:
+    def observe(time: Scalar) -> tuple[Quaternion, Truth]:
         there = both(less(0.5, readings.sun_is_seen), less(0.5, getattr(readings, "magnetic_field_is_new", 1.0)))
         axes, clear = triad(readings.sun, readings.magnetic_field, params.sine_squared)
         reference, _ = triad(
@@ -73,7 +73,7 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
         # An unusable measurement is replaced by something finite.
         return to_quaternion(chosen(usable, product(axes, transpose(reference)), IDENTITY)), usable
 
-    return measured_or_carried(readings, memory, period, found)
+    return measured_or_carried(readings, memory, period, observe)
 
 
 def triad(first: Vector, second: Vector, sine_squared: Scalar) -> tuple[Matrix, Truth]:

@@ -122,10 +122,10 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     for weight, face in zip(weights, params.normals, strict=True):
         gram = combine(1.0, gram, weight, along_axis(face, 1.0, 0.0))
     flowing = tuple(weight * current for weight, current in zip(weights, currents, strict=True))
-    found = apply(inverse(gram), weighted(flowing, params.normals))
-    length = norm(found)
+    direction = apply(inverse(gram), weighted(flowing, params.normals))
+    length = norm(direction)
     visible = both(less(params.threshold, length), opposite(is_out(step, params.outage)))
-    shown: Any = tuple(where(visible, divide(x, length), 0.0) for x in found)
+    shown: Any = tuple(where(visible, divide(x, length), 0.0) for x in direction)
     return Reading(shown, where(visible, 1.0, 0.0)), memory
 
 

@@ -89,8 +89,8 @@ def rotors_in(table: RigidBodyTable) -> tuple[list[Any], dict[str, list[Any]], l
 
 def _given(name: str, table: Rotor, shared: Rotor) -> Any:
     """A number of a wheel: its own or what all share, None without either."""
-    own = getattr(table, name)
-    return getattr(shared, name) if own is None else own
+    value = getattr(table, name)
+    return getattr(shared, name) if value is None else value
 
 
 def _number(name: str, table: Rotor, shared: Rotor, place: int) -> Any:
