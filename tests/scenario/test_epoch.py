@@ -59,6 +59,13 @@ k_attitude = 0.0008
 target = { type = "sun" }
 until = { after = 5 }
 [[law.mode]]
+name = "turn"
+type = "pd"
+k_rate = 0.004
+k_attitude = 0.0008
+target = { type = "slew", attitude = [0.6, 0, 0.8, 0], rate = 0.01, acceleration = 1e-4 }
+until = { after = 5 }
+[[law.mode]]
 name = "panels"
 type = "pd"
 k_rate = 0.004
@@ -92,7 +99,7 @@ WRITTEN = rows("""
 @pytest.mark.parametrize("epoch", [epoch for row in WRITTEN for epoch in row])
 def test_every_part_gets_the_epoch_of_the_orbit_however_it_is_written(epoch):
     found = epochs(scenario(epoch, law=MODES))
-    assert len(found) == 9
+    assert len(found) == 10
     assert set(found.values()) == {NOON}
 
 
@@ -101,9 +108,9 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
     declaring = {name for role in PACKAGES for name, part in parts(role).items() if name in named and _declares(part)}
     assert declaring == {
         "residual-dipole", "solar-pressure", "magnetometer", "sun-sensor", "triad", "magnetic-unloading", "magnetorquers",
-        "ground-station", "sun", "yaw-steering",
+        "ground-station", "slew", "sun", "yaw-steering",
     }  # fmt: skip
-    assert declaring - {"magnetorquers", "sun", "yaw-steering"} == set(epochs(scenario()))
+    assert declaring - {"magnetorquers", "slew", "sun", "yaw-steering"} == set(epochs(scenario()))
 
 
 def _declares(part):
