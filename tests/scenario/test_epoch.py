@@ -60,6 +60,13 @@ k_attitude = 0.0008
 target = { type = "sun" }
 until = { after = 5 }
 [[law.mode]]
+name = "turn"
+type = "pd"
+k_rate = 0.004
+k_attitude = 0.0008
+target = { type = "slew", attitude = [0.6, 0, 0.8, 0], rate = 0.01, acceleration = 1e-4 }
+until = { after = 5 }
+[[law.mode]]
 name = "panels"
 type = "pd"
 k_rate = 0.004
