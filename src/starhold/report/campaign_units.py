@@ -175,7 +175,7 @@ def headline(law: LawResult, sampling: str, words: Wording) -> str:
     if outcome == "not decided":
         return _open(chosen, len(law.verdicts), sampling, words)
     lost = "no run was" if not law.lost else f"{count_text(law.lost)} of {counted(law.runs, 'run')} were"
-    return f"it has no requirements, so nothing is judged; {lost} lost."
+    return f"has no requirements, so nothing is judged; {lost} lost."
 
 
 def flown_text(result: CampaignResult) -> str:
