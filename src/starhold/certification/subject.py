@@ -1,4 +1,4 @@
-"""The loop a certificate speaks of, and bounds on what acts on it from outside."""
+"""The loop of a certificate, and bounds of external effects on it."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ from flint import arb, fmpq
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
-from starhold.certification.openness import READ, assumed_away, envelope_of
 from starhold.certification.spline import spline_bounds
+from starhold.certification.unmodelled import READ, assumed_away, envelope_of
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
@@ -52,7 +52,7 @@ class Subject:
         return rows(tensor(self.loop.craft.inertia))
 
     def envelope(self, noisy: bool) -> Envelope:
-        """Tell what its motions do not leave, for the bounds of parts; noisy: but for a share of times."""
+        """Return the envelope of its motions, for the bounds of parts; noisy: except for a share of times."""
         return envelope_of(self.loop, above(self.total_momentum), noisy)
 
     @property

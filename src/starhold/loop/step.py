@@ -23,8 +23,8 @@ from starhold.parts.roles import Loads, Scene
 
 class Step(NamedTuple):
     """The equations of one control step. `measure` gives the law's measurement before the quaternion sign policy is applied,
-    `sense` what the law is given at a control instant; `update` decides by it, or takes a command from outside; `slope` is
-    the rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
+    `sense` the law's inputs at a control instant; `update` decides by it, or takes a command from outside; `slope` is the
+    rates of (state, effectors, outputs of actuators that another one follows), which `propagate` integrates."""
 
     measure: Callable[..., Any]
     sense: Callable[..., Sensed]
@@ -36,8 +36,8 @@ class Step(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """A law is given this at a control instant: its measurement, the readings of the sensors and the estimate. With the rest
-    the step goes on: the carry, the memories and the sign of the quaternion."""
+    """The inputs of a law at a control instant: its measurement, the readings of the sensors and the estimate; and what the
+    step needs afterwards: the carry, the memories and the sign of the quaternion."""
 
     measurement: Any
     readings: Any
@@ -81,7 +81,7 @@ def make_equations(parts: Composition) -> Step:
         shown = []
         for sensor, memory, params, first in zip(parts.sensors, memories.sensors, setup.sensors, named.sensors, strict=True):
             reading, memory = sensor.module.measure(state, memory, params, Dice(key, word_of(step), first), step)
-            # Of several readings of a name all that do not ask for more are given the first.
+            # If there are several readings of one name, a part that does not request all gets the first.
             vars(readings).update(reading._asdict() | vars(readings))
             kept.append(memory)
             every.append(reading)
@@ -235,7 +235,7 @@ def make_equations(parts: Composition) -> Step:
     def propagate(carry, craft, setup):
         """One substep."""
         applied = getattr(carry.state, body.COMMAND)
-        # A held command is shared out once.
+        # A held command is allocated once.
         commands = tuple(_commands(applied, carry.effectors, setup, carry.memory)) if not named.dynamic else None
         begun = _Begun(commands, applied, carry.actuators)
         state, effectors, outputs = advance(

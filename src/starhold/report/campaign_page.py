@@ -94,7 +94,7 @@ def _histogram(name: str, metric: str, spreads: dict[int, Spread], result: Campa
 
 
 def _geometric(edges: NDArray[np.float64]) -> bool:
-    """Tell whether bins are equal on a logarithmic scale and not on a linear one."""
+    """Return whether bins are equal on a logarithmic scale and not on a linear one."""
     widths, ratios = np.diff(edges), np.diff(np.log(edges)) if edges[0] > 0.0 else np.array([math.inf])
     even = float(np.ptp(ratios)) <= FLAT * float(np.abs(ratios).max()) if np.isfinite(ratios).all() else False
     return even and float(np.ptp(widths)) > FLAT * float(widths.max())

@@ -25,7 +25,7 @@ from starhold.scenario.checking import free_name, in_file, nearest, show, try_la
 from starhold.scenario.schema import columns
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
-ONE = "one of each, or an estimator that takes them all"
+ONE = "one of each, or an estimator that fuses them all"
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts in [[part]] tables; laws and bodies have tables of their own."""
 SINGLE = {"estimator": "one estimator", "target": "one target"}
@@ -189,7 +189,7 @@ def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
         for name in sensor.part.module.Reading._fields:
             if name in sensors and name in single:
                 given = f"a second sensor of {name}, beside {sensors[name][0]}"
-                raise InputError(where, _key(sensor), given, "one of each, or an estimator that takes them all")
+                raise InputError(where, _key(sensor), given, "one of each, or an estimator that fuses them all")
             sensors.setdefault(name, []).append(sensor.called)
     for estimator in loop.used("estimator"):
         for name, key in several.items():
