@@ -24,7 +24,7 @@ from starhold.analysis import libration_point, rigid_body
 from starhold.analysis.pointing import MEANINGS
 from starhold.analysis.ranking import Measure
 from starhold.analysis.rigid_body import make_meter
-from starhold.certification.openness import READ
+from starhold.certification.unmodelled import READ
 from starhold.cli.main import app
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Card, Gain, Measurement, Start

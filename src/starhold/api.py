@@ -308,7 +308,7 @@ def read_aem(file: str | Path) -> Aem:
 
 @shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
-    """Tell what is left after the loss of any one or two wheels, under a law, or the first; proof: how near its target the
+    """Return what is left after the loss of any one or two wheels, under a law, or the first; proof: how near its target the
     loop is proved to stay after each, too, which takes seconds each."""
     return studied("failures", scenario, law, proof=proof)
 
@@ -325,8 +325,9 @@ def budget(scenario: reading.Scenario | str | Path, law: str | None = None, proo
 
 @shortly
 def verify(scenario: reading.Scenario | str | Path, law: str | None = None) -> tuple[RequirementVerdict, ...]:
-    """Tell which requirements of a scenario a law keeps, the first law if not given: a verdict for each [[requirement]], in
-    order, with number, limit and margin (SI), and what it rests on. InputError for any mistake, before anything is flown."""
+    """Return which requirements of a scenario a law keeps, the first law if not given: a verdict for each [[requirement]],
+    in order, with number, limit and margin (SI), and what it rests on. InputError for any mistake, before anything is flown.
+    """
     return studied("verify", scenario, law)
 
 

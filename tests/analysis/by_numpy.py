@@ -79,7 +79,7 @@ def of_libration_point(run, units, goal, tolerance):
     lost = run.attrs.get("diverged_at")
     away = goal.distance(position)
     settled = None if lost is not None else stays_within(away, tolerance)
-    # A quarter, for these motions go to and fro slowly.
+    # A quarter, because these motions oscillate slowly.
     cut_off = settled is not None and too_late(settled, len(away), LAST)
     settled = None if cut_off else settled
     half = slice(len(away) // 2, None)

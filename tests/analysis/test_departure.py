@@ -287,7 +287,7 @@ def test_a_law_that_switches_at_rest_leaves_its_claim_where_its_torque_is_held()
     flight = proved_flight(text + law.format(0.0))
     certificate = flight.certificates[0]
     assert [(c.kind, c.outcome) for c in certificate.claims] == [("sliding", "proved"), ("sampling", "undecided")]
-    held = "the torque is held for 0.1 s, with which it is not shown to be stable"
+    held = "the torque is held for 0.1 s, for which stability is not proved"
     assert flight.departures[0]["sliding"][0] == (0.0, held)
     assert np.degrees(flight.metrics["final_attitude_error"]) > 10.0
     # Of a layer that is wide enough the held torque is proved to do.
@@ -303,7 +303,7 @@ def test_a_hand_over_is_left_where_the_next_mode_holds_its_torque_for_too_long()
     flight = proved_flight(text.replace('quaternion_sign = "shortest"\n', ""))
     handed = flight.certificates[2]
     assert {c.kind: c.outcome for c in handed.claims} == {"hand-over": "proved", "sampling": "refuted"}
-    held = "the torque is held for 5 s, with which not even the linear loop is stable"
+    held = "the torque is held for 5 s, so long that even the linear loop is unstable"
     assert flight.left(2, "hand-over")[0] == (10.0, held)
 
 

@@ -66,7 +66,7 @@ def test_margins_of_an_unstable_loop_are_nan_with_a_reason():
     ("scenario", "law", "why"),
     [
         ("three-laws", "mpc", "law mpc: found the law mpc iterates"),
-        ("three-laws", "sliding", "has no slope at rest on target"),
+        ("three-laws", "sliding", "has no derivative at rest on target"),
         ("l2-circle", None, "rigid-body"),
         ("three-laws", "none", "none"),
     ],

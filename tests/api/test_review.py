@@ -115,7 +115,7 @@ def test_another_body_is_reviewed_too(tmp_path):
     found = sh.review(scenario, folder=tmp_path)
     assert found.verdicts == sh.verify(scenario)
     assert isinstance(found.evidence.linear, str)
-    assert "Margins are told of laws that turn a body." in (tmp_path / "review.md").read_text(encoding="utf-8")
+    assert "Margins exist only for laws that rotate a body." in (tmp_path / "review.md").read_text(encoding="utf-8")
 
 
 def test_a_document_is_safe_in_both_forms():

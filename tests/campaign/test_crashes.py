@@ -88,7 +88,7 @@ def test_a_killed_worker_of_a_cluster_leaves_its_blocks_to_the_others(tmp_path, 
 def test_without_any_worker_left_the_campaign_ends_and_can_be_resumed(tmp_path, store, trail, expected):
     with cluster(tmp_path) as (address, _, _):
         _, progress = kill_worker_once(trail)
-        with pytest.raises(InputError, match=r"no worker for 1 s; what was flown is kept, --resume goes on from there$"):
+        with pytest.raises(InputError, match=r"no worker for 1 s; what was flown is kept, --resume continues from there$"):
             fly(store, Scheduler(address, patience=1.0), Toy(0.2, trail), progress)
     assert 1 <= len(chunks(store.folder)) < 14
     assert resumed(store) == expected
@@ -103,7 +103,7 @@ def test_a_killed_scheduler_ends_the_campaign_which_can_be_resumed(tmp_path, sto
             scheduler.kill()
 
         with pytest.raises(
-            InputError, match=r"^tcp://.*does not answer; what was flown is kept, --resume goes on from there$"
+            InputError, match=r"^tcp://.*does not answer; what was flown is kept, --resume continues from there$"
         ):
             fly(store, Scheduler(address), Toy(0.2), progress)
         assert time.monotonic() - started[0] < 15.0
@@ -158,9 +158,9 @@ def test_another_process_that_writes_there_is_refused(tmp_path):
         assert driver.poll() is None
         time.sleep(0.05)
     try:
-        with pytest.raises(InputError, match="another starhold that writes there"):
+        with pytest.raises(InputError, match="another starhold is writing there"):
             Store.open(folder).resume(manifest())
-        with pytest.raises(InputError, match="another starhold that writes there"):
+        with pytest.raises(InputError, match="another starhold is writing there"):
             Store.create(folder, manifest(), force=True)
     finally:
         driver.kill()
@@ -212,7 +212,7 @@ def test_a_corrupted_chunk_is_told_and_flown_again(store, how):
     law, first = spoiled.parent.name, int(spoiled.name[:9])
     reader = Store.open(store.folder)
     assert [(law, first, 16)] == missing(reader)
-    reason = f"its bytes are not those that were written; runs {first} to {first + 15} are left out"
+    reason = f"its bytes were changed; runs {first} to {first + 15} are left out"
     assert reader.notices == [f"{spoiled}: {reason}, --resume flies them again"]
     again = Store.open(store.folder).resume(manifest())
     assert missing(again) == [(law, first, 16)]

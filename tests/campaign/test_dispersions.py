@@ -240,7 +240,7 @@ def test_a_distribution_is_one_class():
             def _numbers(self, key):
                 return {"half": key.numbers("half", checked=False), "mean": key.centre("mean")}
 
-            mean: Annotated[Any, *raw("by default what the file has")] = None
+            mean: Annotated[Any, *raw("by default the file's value")] = None
 
             def draw(self, u):
                 side = np.where(u < 0.5, np.sqrt(2.0 * u) - 1.0, 1.0 - np.sqrt(2.0 * (1.0 - u)))
@@ -288,7 +288,7 @@ BAD = {
     "sigma of nothing": ({"initial.rate[1]": normal(sigma=0.1, relative=True)}, "no shares of 0.0"),
     "shares that are not said to be": (
         {"spacecraft.torque_limit": normal(sigma="10 %")},
-        '.sigma: found "10 %"; allowed: a quantity in N m; shares of what the file has take relative = true',
+        '.sigma: found "10 %"; allowed: a quantity in N m; for shares of the file\'s value use relative = true',
     ),
     "unit of sigma": ({"initial.rate": normal(sigma="1 m")}, ".sigma: found"),
     "low above high": ({"initial.rate": uniform(1, 0)}, ".low: found 1; allowed: below high"),
@@ -319,7 +319,7 @@ BAD = {
     "no value to be a mean": ({"spacecraft.torque_rate_limit": normal(sigma=1)}, ".mean: found nothing"),
     "beyond reach": (
         {"law.mpc.r": {"distribution": "truncated-normal", "sigma": 1e-3, "low": 100, "high": 200}},
-        ".low: found 100; allowed: an interval that the normal distribution reaches",
+        ".low: found 100; allowed: an interval where the normal distribution has probability",
     ),
     "uncut": ({"law.mpc.r": {"distribution": "truncated-normal", "sigma": 1}}, "low, high or both"),
     "median zero": ({"sensor.rate_noise": {"distribution": "log-normal", "median": 0, "sigma": 1}}, ".median: found 0"),

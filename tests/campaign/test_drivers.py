@@ -179,13 +179,13 @@ def test_too_few_failures_for_pairs(rng):
     drivers = find_drivers(inputs, failed, {})
     assert told(drivers) == ["x0"]
     assert drivers.pairs == ()
-    assert drivers.remark == "too few failures to say what pairs of inputs do: 12, where 20 are the least"
+    assert drivers.remark == "too few failures to test pairs of inputs: 12; at least 20 are needed"
 
 
 # Too few for pairs, and enough; between and beyond is slow.
 @pytest.mark.parametrize("failures", [6, 50, *(pytest.param(count, marks=pytest.mark.slow) for count in (24, 300))])
 def test_chance_is_called_a_driver_as_rarely_as_said(failures):
-    """Of all that was looked at, something is called significant in one campaign of twenty at most."""
+    """Of all that was tested, anything is called significant in one campaign of twenty at most."""
     campaigns, wrong = 150, 0
     for seed in range(campaigns):
         rng = np.random.default_rng(1000 * failures + seed)

@@ -93,7 +93,7 @@ def test_a_part_of_ones_own_is_flown_and_its_change_refused(tmp_path):
     assert any((frame[name] == frame["part.a.b c.drag"]).all() for name in flown)
     assert found.again(3).differs == ()
     (tmp_path / "slow.py").write_text(ENVIRONMENT.replace("-params.drag", "-2.0 * params.drag"))
-    with pytest.raises(InputError, match=r"slow.py: found a file that was changed since the campaign"):
+    with pytest.raises(InputError, match=r"slow.py: found a file changed since the campaign"):
         found.again(3)
     with pytest.raises(InputError, match=r'campaign.files."slow.py": ".*, was "'):
         campaign(tmp_path / "c", scenario, over=over, resume=True, runs=20)

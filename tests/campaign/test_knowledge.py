@@ -148,7 +148,7 @@ def test_the_verdict_says_what_the_law_knows():
     (law,) = fly(scenario=turn(), over=over, requirement=asked, runs=5).laws
     told = law.verdicts[0].sentence()
     assert told.endswith(
-        "The law supposes the file's own spacecraft.inertia, and is told each drawn spacecraft.torque_limit."
+        "The law assumes the file's own spacecraft.inertia, and is told each drawn spacecraft.torque_limit."
     )
     for action, told in (("none", "never learns"), ("reallocate", "learns at the diagnosis each drawn")):
         scenario = turn(fault=[{"time": 1.0, "inertia": [2.2, 3.1, 4.4], "action": action}])
@@ -163,12 +163,12 @@ def test_the_verdict_says_what_the_law_knows():
     ("over", "told"),
     [
         ({"spacecraft.inertia": INERTIA | {"known": True}}, "known: found an old name; allowed: judged_apart, its new name"),
-        ({"sensor.rate_noise": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
-        ({"law.lyapunov.k_rate": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
-        ({"initial.rate[1]": LIMIT | {"known_to_law": True}}, "false, for no law is told it"),
+        ({"sensor.rate_noise": LIMIT | {"known_to_law": True}}, "false, because no law receives it"),
+        ({"law.lyapunov.k_rate": LIMIT | {"known_to_law": True}}, "false, because no law receives it"),
+        ({"initial.rate[1]": LIMIT | {"known_to_law": True}}, "false, because no law receives it"),
         (
             {"fault[1].inertia": INERTIA | {"known_to_law": True}},
-            "false, for the action on a fault says what laws learn of it",
+            "false, because the action on a fault says what laws learn about it",
         ),
     ],
 )
@@ -202,7 +202,9 @@ def test_what_every_command_is_computed_with_is_drawn_only_as_known(tmp_path):
     asked = [{"metric": "effort", "at_most": 9, "share": 0.5}]
     for part, key in ((leak, "part.leak.torque"), (thrusters, "part.thrusters.torque")):
         scenario = short(4.0, [LYAPUNOV], folder=tmp_path, part=[part])
-        with pytest.raises(InputError, match="known_to_law: found false; allowed: true, for commands of laws are computed"):
+        with pytest.raises(
+            InputError, match="known_to_law: found false; allowed: true, because laws compute their commands"
+        ):
             begin(with_campaign(scenario, {"over": {key: normal(1e-4)}, "runs": 3}), ["lyapunov"])
         over = {key: normal(1e-4, known_to_law=True)}
         (law,) = fly(scenario=scenario, over=over, requirement=asked, runs=5).laws
@@ -221,7 +223,7 @@ def test_a_scenario_may_say_what_its_laws_suppose():
     )
     assert measured(supposed)["effort"] == measured(unnoticed)["effort"]
     assert compare(supposed)[0].certificates == ()
-    with pytest.raises(InputError, match=r"nominal: found laws that take the craft for another one"):
+    with pytest.raises(InputError, match=r"nominal: found a [nominal] table that differs from the craft"):
         sh.certify(supposed)
     with pytest.raises(InputError, match=r"nominal.sensor: found a table that laws are not designed for"):
         supposed.with_({"nominal.sensor": {"rate_noise": 0.1}})

@@ -89,7 +89,7 @@ def test_sobol_refuses_with_a_reason():
     alone = np.zeros(512)
     alone[0] = 1.0
     assert "too few runs have another value" in sobol(NAMES, unit, alone).reason
-    assert "two are the least" in sobol(NAMES, unit[:8], ishigami(unit[:8])).reason
+    assert "at least two are needed" in sobol(NAMES, unit[:8], ishigami(unit[:8])).reason
     shuffled = np.random.default_rng(0).permutation(unit)
     for other in (shuffled, unit[:511], unit[:0]):
         assert "no Saltelli design" in sobol(NAMES, other, ishigami(other)).reason
@@ -144,7 +144,7 @@ def test_morris_drops_the_trajectories_with_failed_runs():
     for field in ("mu", "mu_star", "mu_star_width", "sigma"):
         assert np.array_equal(getattr(found, field), getattr(expected, field))
     holes[4:] = np.nan
-    assert morris(NAMES, unit, holes) == Refused("1 of 20 trajectories have all their values, two are the least")
+    assert morris(NAMES, unit, holes) == Refused("1 of 20 trajectories have all their values; at least two are needed")
 
 
 def test_morris_refuses_other_designs():

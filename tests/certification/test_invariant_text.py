@@ -180,7 +180,7 @@ def test_a_small_file_is_read():
         ('"region"', '"regoin"', "claim[1].theorem", "did you mean region?"),
         ('V = "x**2 + y**2"', 'V = "x**2 + w"', "claim[1].V", 'found the name "w"'),
         ('V = "x**2 + y**2"\n', "", "claim[1].V", "this key is required"),
-        ("equilibrium = { x = 0, y = 0 }", "rest = { x = 0, y = 0 }", "claim[1].rest", "it is called equilibrium"),
+        ("equilibrium = { x = 0, y = 0 }", "rest = { x = 0, y = 0 }", "claim[1].rest", "the key is named equilibrium"),
         ("equilibrium = { x = 0, y = 0 }", "equilibrium = { x = 0 }", "claim[1].equilibrium.y", "this key is required"),
         ("equilibrium = { x = 0, y = 0 }", 'equilibrium = { x = 0, y = "1/0" }', "claim[1].equilibrium.y", "a fraction"),
         ("equilibrium = { x = 0, y = 0 }", "level = -1", "claim[1].level", "a positive number"),

@@ -8,8 +8,8 @@ import pytest
 from starhold.certification.assumptions import ASSUMPTIONS
 from starhold.certification.certificate import ORBIT, write
 from starhold.certification.certify import Wanted, certify
-from starhold.certification.openness import envelope_of, named, pushes
 from starhold.certification.station import certify_station
+from starhold.certification.unmodelled import envelope_of, named, pushes
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.laws import modal, wheel

@@ -17,10 +17,10 @@ from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import _numbers as numbers_apart
 from starhold.certification.comparison import differences
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.openness import _rate as goal_rate
-from starhold.certification.openness import driven_errors, envelope_of, named, pushes
 from starhold.certification.proofs import checked
 from starhold.certification.subject import described, make_subject
+from starhold.certification.unmodelled import _rate as goal_rate
+from starhold.certification.unmodelled import driven_errors, envelope_of, named, pushes
 from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.parts.catalogue import find
@@ -189,7 +189,7 @@ def test_a_share_is_told_and_a_flight_before_the_filter_settles_leaves_it():
     assert departures(certificate, loop, flown) == {"pointing": ()}
     run["mekf_rate"][100] = [3e-4, 0.0, 0.0]
     (left,) = departures(certificate, loop, flown)["pointing"]
-    assert (left.time, left.how) == (time[100], "the estimate errs by more than is told")
+    assert (left.time, left.how) == (time[100], "the estimation error exceeds the stated bound")
     run["mekf_attitude"][40] = [1.0, 3e-4, 0.0, 0.0]
     assert departures(certificate, loop, flown)["pointing"][0].time == time[40]
 

@@ -142,7 +142,7 @@ REFUSED = {
         ("--radius 1e9_km", "--radius: found 1e9 km; allowed: a circle smaller than"),
         ("--primaries earth-moon", "--primaries: found earth-moon; allowed: a pair with the Sun"),
         ("--primaries sun-erth", "did you mean sun-earth?"),
-        ("--primaries sun-jupiter --radius 1_km", "a circle that the Sun reaches"),
+        ("--primaries sun-jupiter --radius 1_km", "a circle in sunlight"),
         ("--point L3", "--point: found L3; allowed: L1 or L2"),
         ("--reflectivity 1.2", "--reflectivity: found 1.2; allowed: must be at most 1"),
         ("--diffuse 0.5", "must add up to more than 0 and at most 1, not 1.5"),

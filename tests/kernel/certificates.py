@@ -12,8 +12,8 @@ from starhold.certification.evidence.finding import NotFoundError, certificate, 
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.openness import Pushes
 from starhold.certification.subject import make_subject
+from starhold.certification.unmodelled import Pushes
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.programs import digest
 from starhold.scenario.building import build

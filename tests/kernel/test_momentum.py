@@ -7,8 +7,8 @@ import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.pointing import Pushed
-from starhold.certification.openness import pushes
 from starhold.certification.subject import make_subject
+from starhold.certification.unmodelled import pushes
 from starhold.kernel.numbers import Account
 from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
 from starhold.scenario.building import build

@@ -16,8 +16,8 @@ from starhold.algebra.quaternion import multiply, relative, vector_part
 from starhold.algebra.vector import scale
 from starhold.certification.evidence import noise
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.openness import driven_errors, samples_of
 from starhold.certification.subject import make_subject
+from starhold.certification.unmodelled import driven_errors, samples_of
 from starhold.conformance.bench import CRAFT
 from starhold.kernel.numbers import Account
 from starhold.kernel.theorems.noise import tail

@@ -68,7 +68,7 @@ def test_every_section_is_there(reader: Reader) -> None:
 def test_an_empty_campaign_is_told(tmp_path: Any) -> None:
     bare = LawResult("pd", 10, 0, 0, (), (), (), None)
     found = page(replace(result(), laws=(bare,), over={}, requirements=()))
-    assert "nothing is required of it, so nothing is judged; no run was lost." in found.text
+    assert "has no requirements, so nothing is judged; no run was lost." in found.text
     assert found.data()["histograms"] == found.data()["envelopes"] == []
     for heading in ("Metrics", "Distributions", "Runs worth flying again", "Sensitivity indices", "Dispersions flown"):
         assert heading not in found.words
@@ -135,7 +135,7 @@ def test_only_drivers_that_stand_out_are_shown(reader: Reader) -> None:
     assert f"rank correlation {noise.correlation:.2f}" in shown
     assert f"+{noise.correlation:.2f}" in reader.words
     few = page(result(names=("lyapunov",), runs=40))
-    assert "too few failures to say what drives them" in few.text.lower()
+    assert "too few failures to find their drivers" in few.text.lower()
 
 
 def test_names_from_files_are_no_markup() -> None:

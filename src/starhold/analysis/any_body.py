@@ -1,4 +1,4 @@
-"""Metrics of a body of which only the recording is known, in the units of the recording."""
+"""Metrics of a body known only by its recording, in the units of the recording."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -15,12 +15,12 @@ from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.simulation.lane import Recording
 
 COMMAND = "command"
-"""The recorded quantity that a law asks for."""
+"""The recorded quantity that holds a law's command."""
 
 
 class Noted(NamedTuple):
-    """Notes on a lane: of the command the peak of its components and the sum of its norm; of a window the largest square of
-    the length of each recorded quantity."""
+    """Notes on a lane: the peak of the command's components and the sum of its norm; for a window the largest squared norm
+    of each recorded quantity."""
 
     peak: float
     total: float
@@ -47,7 +47,7 @@ def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, cloc
 def measure(run: Recording) -> dict[str, Any]:
     """Metrics of a run: for each recorded quantity its largest norm in the last quarter, and of the command the peak of its
     components and the integral of its norm. Final values are None for a motion that diverged, at `diverged_at`."""
-    # Nothing here is about a limit.
+    # No metric here depends on a limit.
     return _meter_of(run).of_recording(run, np.inf)
 
 
@@ -57,7 +57,7 @@ def _meter_of(run: Recording) -> Meter:
 
 
 def metric_set(run: Recording) -> MetricSet:
-    """The metrics that `measure` gives of such runs; laws are ranked by their effort."""
+    """Return the metrics of `measure` for such runs; laws are ranked by their effort."""
     measures: dict[str, Measure] = {}
     for name, (unit, meaning, _) in _measured(run).items():
         said = f"largest norm in the last quarter; {meaning}"
@@ -74,7 +74,7 @@ def _measured(run: Recording) -> dict[str, Quantity]:
 
 
 def _with_size(recorded: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    # Of quaternions the norm says nothing.
+    # The norm of a quaternion carries no information.
     return {name: quantity for name, quantity in recorded.items() if quantity.dimension != "quaternion"}
 
 

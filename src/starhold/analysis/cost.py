@@ -1,4 +1,4 @@
-"""A call of a law costs the time that it takes when the states of a run are shown to the compiled law again."""
+"""The cost of a call of a law: the processor time when the compiled law runs again on the states of a run."""
 
 import time
 
@@ -12,15 +12,15 @@ from starhold.loop.programs import replay
 from starhold.simulation.lane import Recording, recorded
 
 CALLS = 50_000
-"""Calls timed at most, as many as the published table timed."""
+"""The most calls timed, as many as for the published table."""
 CHUNK = 1e-4
-"""Seconds that a timed chunk should last, long beside what it takes to start one; a slow law is timed by fewer calls."""
+"""The intended seconds of a timed chunk, long compared with its start; a slow law is timed by fewer calls."""
 
 
 class Replay:
     """The compiled calls of a loop's law run again on states (number, numbers of a state): from the measured state to the
-    limited torque, models the law needs included, each waiting for the one before. What the law remembers goes on from call
-    to call."""
+    saturated torque, including models that the law needs, each waiting for the one before. The law's memory carries over
+    from call to call."""
 
     def __init__(self, loop: ClosedLoop, states: NDArray[np.float64]) -> None:
         self._kernel, loop = compile_calls(loop)
@@ -42,7 +42,7 @@ def compile_calls(loop: ClosedLoop) -> tuple[Kernel, ClosedLoop]:
 
 
 def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float64]:
-    """Return the loop's states at the samples of its recording, of a long one at the first of them (number, numbers of a
+    """Return the loop's states at the samples of its recording, for a long one at the first of them (number, numbers of a
     state)."""
     carry = loop.carry()
     columns = [recording[name][:CALLS] for name in type(carry.state)._fields]

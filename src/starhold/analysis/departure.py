@@ -1,4 +1,5 @@
-"""A flight leaves what is claimed of its law where it meets an assumption no longer; claims are about motions from a set."""
+"""Finds where a flight leaves the claims about its law: where it no longer meets an assumption; claims are about motions
+from a set."""
 
 import math
 from collections.abc import Mapping
@@ -27,21 +28,21 @@ from starhold.simulation.lane import Recording
 from starhold.trace.straight_line import evaluated
 
 Array: TypeAlias = NDArray[np.float64]
-CHANGES = "what flies, or what the law knows of it, changes"
-LOST = "the simulation loses the motion"
-"""Which no proof speaks of: it is too fast for the integration, or farther away than a scenario follows it."""
+CHANGES = "the loop, or the law's model of it, changes"
+LOST = "the motion diverges"
+"""No proof covers this: the motion is too fast for the integration, or beyond the divergence bound."""
 TURNED = "the torque is held while the body, or stored momentum, turns it by {:.2g} rad"
 
 
 class Departure(NamedTuple):
-    """From `time` (s) on a flight is not what a claim speaks of; `how` is a sentence without its end that says why."""
+    """From `time` (s) on a claim does not cover a flight; `how` is a sentence without its full stop that says why."""
 
     time: float
     how: str
 
 
 class Span:
-    """A span is a recorded run between two control steps, and the loop that flies it; unit: of its times (s)."""
+    """A span is a recorded run between two control steps, and the loop that flies it; unit: its unit of time (s)."""
 
     def __init__(self, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None, unit: float = 1.0) -> None:
         every, self.unit = run.attrs["record_every"], unit
@@ -59,7 +60,7 @@ class Span:
 
     @cached_property
     def shown(self) -> Measurement:
-        """The measurements that the law is shown, but for noise and torque from outside: numbers are columns (n,)."""
+        """Return the law's measurements without noise and external torque; numbers are columns (n,)."""
         wheels = self.loop.wheels
         stored: Any = ZERO if wheels is None else tuple((self["wheel_momentum"] @ np.array(wheels.axes)).T)
         attitude: Any = tuple(fed_back(self.loop, self["attitude_error"]).T)
@@ -68,20 +69,21 @@ class Span:
         return Measurement(attitude, error_rate, rate, turning, ZERO, ZERO, ZERO, self.loop.period, stored)
 
     def on_limit(self, command: Array) -> Any:
-        """Tell at which samples a command, or a part of it (n, components), is on the limit at which it saturates."""
+        """Return at which samples a command, or a part of it (n, components), is saturated."""
         return on_limit(command, self.loop.saturation_limit(), self.loop.limit)
 
     def reaches(self, values: Array, limits: Array) -> Any:
-        """Tell which values have reached their limits."""
+        """Return which values have reached their limits."""
         return values >= limits * ALMOST
 
     def first(self, held: Any, how: str) -> list[Departure]:
-        """Return a departure at the first sample at which something holds (n,); one truth is about the first sample."""
+        """Return a departure at the first sample at which a condition (n,) holds; a single boolean is about the first
+        sample."""
         places = np.flatnonzero(held)
         return [Departure(float(self["time"][places[0]]) * self.unit, how)] if len(places) else []
 
     def unmet(self, claim: Claim) -> list[Departure]:
-        """Return a departure for everything that a claim assumes and the flight does not meet."""
+        """Return a departure for every assumption of a claim that the flight does not meet."""
         told = (found for name in claim.assumptions if (found := assumption(name).unmet) is not None)
         return [one for unmet in told for held, how in unmet(self) for one in self.first(held, how)]
 
@@ -94,20 +96,19 @@ def departures(
     last: int | None = None,
     change: str = CHANGES,
 ) -> dict[str, tuple[Departure, ...]]:
-    """Tell for each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
-
-    loop: what the certificate speaks of, flown from control step `first` until it changes at `last` (None: it does not),
-    as `change` tells.
-    That torque is held between samples counts unless it is proved that it may be."""
+    """Return for each proved kind of claim about motions how a run leaves it, in order of time; empty where it does not.
+    loop: the certificate's loop, flown from control step `first` until it changes at `last` (None: never), as `change` says.
+    Torque held between samples counts as a departure unless a proof allows it.
+    """
     span = Span(loop, run, first, last)
     common = [] if span.changes is None else [Departure(span.changes, change)]
     if not len(span["time"]):
         return {claim.kind: tuple(common) for claim in _left(certificate) if common}
-    held = {"refuted": "with which not even the linear loop is stable", "proved": ""}
+    held = {"refuted": "so long that even the linear loop is unstable", "proved": ""}
     sampled = certificate.claim("sampling")
-    why = held.get("" if sampled is None else sampled.outcome, "with which it is not shown to be stable")
+    why = held.get("" if sampled is None else sampled.outcome, "for which stability is not proved")
     held_too_long = span.first(bool(why), f"the torque is held for {loop.period:g} s, {why}")
-    # What is proved of held torque is proved of the linear loop at rest, without stored momentum.
+    # Proofs about held torque are about the linear loop at rest, without stored momentum.
     most = _turn_that_counts(loop, sampled)
     held_too_long += span.first(_turned(span) >= most, TURNED.format(most))
     if run.attrs.get("diverged_at") is not None:
@@ -121,16 +122,16 @@ def departures(
 
 
 def _turned(span: Span) -> Array:
-    """Return bounds (n,) of the angle (rad) by which a held torque turns beside the motion in a control period: the body
-    turns, and stored momentum makes its rate turn."""
+    """Return bounds (n,) of the angle (rad) by which a held torque lags the motion in a control period: the body rotates,
+    and stored momentum rotates its rate."""
     stored = np.linalg.norm(np.broadcast_arrays(*span.shown.wheel_momentum, span["time"])[:3], axis=0)
     precession = stored / float(np.linalg.eigvalsh(tensor(span.loop.craft.inertia))[0])
     return (np.linalg.norm(span["rate"], axis=1) + precession) * span.loop.period
 
 
 def _turn_that_counts(loop: ClosedLoop, sampled: Claim | None) -> float:
-    """Return the angle (rad) from which on turning counts: one radian, and less where the period comes near the longest that
-    is stable. A rate of turn phi in a period is damped while the period is below (phi/2)/tan(phi/2) of the longest; a tenth
+    """Return the angle (rad) from which this rotation matters: one radian, and less where the period is near the longest
+    stable one. A rate of turn phi in a period is damped while the period is below (phi/2)/tan(phi/2) of the longest; a tenth
     is left for what stiffness adds."""
     longest = None if sampled is None else sampled.numbers["longest"]
     share = 0.0 if longest is None else min(1.0, 1.1 * loop.period / longest)
@@ -138,7 +139,7 @@ def _turn_that_counts(loop: ClosedLoop, sampled: Claim | None) -> float:
 
 
 def _left(certificate: Certificate) -> list[Claim]:
-    """Return the claims that a flight can leave: those that are proved, and not of the linear motion alone."""
+    """Return the claims that a flight can leave: proved ones that are not about the linear motion alone."""
     return [claim for claim in certificate.claims if claim.outcome == "proved" and LINEAR not in claim.assumptions]
 
 
@@ -146,12 +147,12 @@ def _left(certificate: Certificate) -> list[Claim]:
 
 
 def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
-    """Tell whether a flight starts outside of the claim's set, and when it leaves that."""
+    """Return whether a flight starts outside the claim's set, and when it leaves the set."""
     found = [*_away(claim, span), *_misled(claim, span)]
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
-        found += span.first(total > momentum * (1.0 + 1e-9), "the total momentum is more than told")
+        found += span.first(total > momentum * (1.0 + 1e-9), "the total momentum exceeds the stated bound")
     # V is at most `start` at the start, and `level` from then on; None for no bound.
     start = claim.numbers.get("start")
     level = claim.numbers.get("level", start)
@@ -165,17 +166,18 @@ def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departur
 
 
 def _away(claim: Claim, span: Span) -> list[Departure]:
-    """Tell when a flight that should have ended near its target is farther away."""
+    """Return when a flight that should be near its target is farther away."""
     settling = claim.numbers.get("settling")
     if settling is None:
         return []
     sine = np.linalg.norm(span["attitude_error"][:, 1:], axis=1)
     far = sine > math.sin(min(claim.numbers["angle"], math.pi) / 2.0) * (1.0 + 1e-6)
-    return span.first(far & (span["time"] - span.begun > settling), "it is farther from the target than in the end")
+    return span.first(far & (span["time"] - span.begun > settling), "it is outside the ultimate bound")
 
 
 def _misled(claim: Claim, span: Span) -> list[Departure]:
-    """Tell when an estimate errs by more than is claimed for a share of flights, as it does before the estimator settles."""
+    """Return when the estimation error exceeds the bound claimed for a share of flights, as it does before the estimator
+    settles."""
     if not claim.numbers.get("share"):
         return []
     found = list[Departure]()
@@ -183,15 +185,15 @@ def _misled(claim: Claim, span: Span) -> list[Departure]:
         turned: Any = relative(tuple(span["attitude"].T), tuple(span[f"{name}_attitude"].T))
         off = np.linalg.norm(span[f"{name}_rate"] - span["rate"], axis=1)
         far = error_angle(np.transpose(turned)) > claim.numbers["attitude_error"]
-        found += span.first(far | (off > claim.numbers["rate_error"]), "the estimate errs by more than is told")
+        found += span.first(far | (off > claim.numbers["rate_error"]), "the estimation error exceeds the stated bound")
     return found
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
-    """Tell whether the loop's start lies in the sets of the proved claims that are about a level of V."""
+    """Return whether the loop starts in the sets of the proved claims about a level of V."""
     if loop.remembers:
         return {}
-    # The true start, whatever the sensors make of it.
+    # The true start, not as measured.
     loop, found = loop.without("sensor", "estimator"), dict[str, bool]()
     shown = shown_at(loop, loop.start)
     momentum = momentum_of(loop, shown)
@@ -205,7 +207,7 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
 
 
 def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
-    """Return the measurement that the law is shown at a state as a flight begins; numbers may be columns (n,)."""
+    """Return the law's measurement at a state as a flight begins; numbers may be columns (n,)."""
     carry = loop.carry()._replace(state=state)
     shown = make_step(loop.composition()).measure(carry, 0, 0, loop.craft, loop.setup())
     error = np.array(shown.attitude)
@@ -214,10 +216,10 @@ def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
 
 
 def proved_by(certificate: Certificate, claim: Claim, loop: ClosedLoop) -> Mapping[str, Any]:
-    """Return the programs that a claim is proved by, by their roles."""
+    """Return the programs in a claim's proof, by their roles."""
     found = certificate.programs(claim)
     if not found and "stiffness" in claim.witness:
-        # A claim without a proof tells its V by a number.
+        # A claim without a proof identifies its V by a number.
         own = Loop(make_subject(loop))
         V = own.lyapunov(claim.witness["stiffness"])
         return {"lyapunov": own.by_digest[V]}
@@ -246,7 +248,7 @@ def momentum_of(loop: ClosedLoop, shown: Measurement) -> Any:
 
 
 def fed_back(loop: ClosedLoop, error: Array) -> Array:
-    """Return the quaternions (n, 4) that the law is shown without noise, of the true errors (n, 4)."""
+    """Return the law's quaternions (n, 4) without noise, from the true errors (n, 4)."""
     if loop.sign_policy == "as_published":
         return error
     if loop.sign_policy == "shortest":

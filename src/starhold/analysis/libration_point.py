@@ -1,4 +1,4 @@
-"""Metrics of a craft that holds a place or a circle near a libration point, all in SI units."""
+"""Metrics of a craft that holds a point or a circle near a libration point, all in SI units."""
 
 import math
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ DAY, YEAR = 86_400.0, 365.25 * 86_400.0
 
 
 class CircleGoal(NamedTuple):
-    """A circle round the X axis through the libration point, run through at a rate; scaled."""
+    """A circle around the X axis through the libration point, followed at a rate; scaled."""
 
     radius: float
     rate: float
@@ -37,7 +37,7 @@ class CircleGoal(NamedTuple):
 
 
 class EquilibriumGoal(NamedTuple):
-    """A place of rest; scaled."""
+    """An equilibrium; scaled."""
 
     place: Vector
 
@@ -51,7 +51,7 @@ class EquilibriumGoal(NamedTuple):
 
 
 def goal_of(gains: Any) -> CircleGoal | EquilibriumGoal:
-    """Tell from its gains what a law makes for: a circle of this radius and rate, else rest at this y and z, or at the
+    """Return a law's target from its gains: a circle of this radius and rate, else an equilibrium at this y and z, or at the
     libration point."""
     if hasattr(gains, "radius") and hasattr(gains, "rate"):
         return CircleGoal(gains.radius, gains.rate)
@@ -60,12 +60,12 @@ def goal_of(gains: Any) -> CircleGoal | EquilibriumGoal:
 
 MEASURES: dict[str, Measure] = {
     "settling_time": Measure(
-        "settling", "days", "time from which it stays near what is held, the last quarter at least", 1.0 / DAY
+        "settling", "days", "time from which it stays near its target, at least for the last quarter", 1.0 / DAY
     ),
     "deviation": Measure("off circle", "km", "largest error of the distance from the X axis, second half", 1e-3),
     "deviation_overall": Measure("off, overall", "km", "the same over the whole run", 1e-3),
-    "largest_x": Measure("|x|", "km", "largest distance from the plane of the circle or rest, second half", 1e-3),
-    "final_distance": Measure("final distance", "km", "largest distance from the place of rest, last quarter", 1e-3),
+    "largest_x": Measure("|x|", "km", "largest distance from the plane of the circle or equilibrium, second half", 1e-3),
+    "final_distance": Measure("final distance", "km", "largest distance from the equilibrium, last quarter", 1e-3),
     "limit_share": Measure("on limit", "%", "share of the time with the control on its limit", 100.0),
     "peak_control": Measure("peak control", "µm/s²", "largest norm of the control", 1e6),
     "peak_ratio": Measure(
@@ -77,7 +77,7 @@ MEASURES: dict[str, Measure] = {
 
 
 class Goal(NamedTuple):
-    """The numbers of the notes, scaled: the radius of the circle or the place of rest, the distance that counts as near, and
+    """The numbers of the notes, scaled: the radius of the circle or the equilibrium, the distance that counts as near, and
     the last instant."""
 
     radius: float
@@ -87,9 +87,9 @@ class Goal(NamedTuple):
 
 
 class Noted(NamedTuple):
-    """Notes on a lane: the last instant not near; sums of the control's norm and of
-    instants on the limit; the least and the largest radius since the middle; and of a window the largest square of the
-    distance, error of the radius, |x|, and square of the control."""
+    """Notes on a lane: the last instant not near; sums of the control's norm and of instants on the limit; the least and the
+    largest radius since the middle; and for a window the largest square of the distance, error of the radius, |x|, and
+    square of the control."""
 
     outside: float
     total: float
@@ -114,9 +114,9 @@ def make_meter(
     half, tail, rows = middle(steps), tail_start(steps), places(first)
     length, push = units.length, units.acceleration
     windows = {
-        "distance": Window(rows.window_away, lambda x: np.sqrt(x) * length, "distance from what is held", "m"),
+        "distance": Window(rows.window_away, lambda x: np.sqrt(x) * length, "distance from the target", "m"),
         "off_circle": Window(rows.window_off, lambda x: x * length, "error of the distance from the X axis", "m"),
-        "x": Window(rows.window_x, lambda x: x * length, "distance from the plane of the circle or rest", "m"),
+        "x": Window(rows.window_x, lambda x: x * length, "distance from the plane of the circle or equilibrium", "m"),
         "control": Window(rows.window_control, lambda x: np.sqrt(x) * push, "norm of the control", "m/s^2"),
     }
     of_place = {"final_distance": Metric("m", "root", (rows.window_away,), (length,), since="tail", final=True)}
@@ -127,7 +127,7 @@ def make_meter(
         "radius_most": Metric("m", "number", (rows.radius_most,), (length,), final=True),
     }
     table = {
-        # A quarter, for these motions go to and fro slowly.
+        # A quarter, because these motions oscillate slowly.
         "settling_time": Metric("s", INSTANT, (rows.outside,), (period * units.time,), kept=LAST),
         **(of_circle if circle else of_place),
         "largest_x": Metric("m", "number", (rows.window_x,), (length,), since="half", final=True),
@@ -138,16 +138,16 @@ def make_meter(
     flown = steps * period * units.time
     yearly = (period * units.velocity, YEAR / flown if flown > 0.0 else math.nan)
     table["effort_per_year"] = Metric("m/s", "number", (rows.total,), yearly)
-    # What is noted late, the radius, is asked of circles alone, which have no later mark.
+    # The radius, noted late, matters only for circles, which have no later mark.
     marks = (half,) if circle else (half, tail)
     early, late = (_note(limit, circle, since) for since in (False, True))
     return Meter(first, given, (early, late), table, windows, steps, period * units.time, marks)
 
 
 def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float) -> dict[str, Any]:
-    """Metrics of a run as `simulate` gives it; `tolerance` (scaled) is the distance within which it has settled. Times that
-    are never reached are None, as are all final values of a motion that diverged; `diverged_at` (s) is None for one that
-    did not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
+    """Return the metrics of a run of `simulate`; `tolerance` (scaled) is the distance within which it has settled. Times
+    that are never reached are None, as are all final values of a motion that diverged; `diverged_at` (s) is None for one
+    that did not; `cut_off` names a time that is None because it lies within the last quarter of the run."""
     limit, kind = float(run.attrs["control_limit"]), run.attrs["limit"]
     period = run.attrs["control_period"] * run.attrs["record_every"]
     metrics = make_meter(len(run["time"]) - 1, period, kind, units, goal, tolerance).of_recording(run, limit)
@@ -186,7 +186,7 @@ def _note(limit: str, circle: bool, late: bool) -> Any:
 
 
 def _units() -> dict[str, str]:
-    """The metrics with their units, SI."""
+    """The metrics with their SI units."""
     goals = CircleGoal(0.0, 0.0), EquilibriumGoal(ZERO)
     units = {"diverged_at": "s", "peak_ratio": "1", **COSTS}
     for goal in goals:

@@ -1,5 +1,5 @@
-"""Claims about laws near a libration point against flights: when and how a flight leaves them, whether a start lies in their
-sets, and flights of random states of a certified set, which test the certifier and are no part of any proof."""
+"""Compares claims about laws near a libration point with flights: when and how a flight leaves them, whether a start lies in
+their sets, and flights from random states of a certified set, which test the certifier and are not part of a proof."""
 
 import math
 from collections.abc import Mapping
@@ -21,15 +21,16 @@ from starhold.simulation.lanes import simulate_many
 from starhold.trace.straight_line import evaluated
 
 SLACK = 1e-6
-"""The integration moves V, scaled distances and velocities by so much in a motion along a border."""
+"""The integration error of V, scaled distances and velocities in a motion along a border."""
 PERIOD = 1e-4
-"""Control that is renewed so often counts as continuous (scaled)."""
+"""Control with this period (scaled) counts as continuous."""
 FLOOR = 1e-6
-"""Share of V at the centre of the circle: what the held control makes of zero."""
+"""The share of V at the centre of the circle by which held control perturbs zero."""
 
 
 def departures(certificate: Certificate, loop: ClosedLoop, run: Recording, unit: float) -> dict[str, tuple[Departure, ...]]:
-    """For each proved kind of claim how a run leaves it, in order of time; empty where it does not. unit: of time, in s."""
+    """Return for each proved kind of claim how a run leaves it, in order of time; empty where it does not. unit: of time, in
+    s."""
     span, at = Span(loop, run, unit=unit), run.attrs.get("diverged_at")
     common = [] if at is None else [Departure(at * unit, LOST)]
     found: dict[str, tuple[Departure, ...]] = {}
@@ -48,7 +49,8 @@ def outside(
     velocity: NDArray[np.float64],
     slack: float = 0.0,
 ) -> Any:
-    """Which states, (3, n) each, lie outside a claim's set by more than a slack, (n,); none of a claim about all states."""
+    """Return which states, (3, n) each, lie outside a claim's set by more than a slack, (n,); none for a claim about all
+    states."""
     numbers, beyond = claim.numbers, np.zeros(position.shape[1], dtype=bool)
     if "level" in numbers:
         value = value_of(certificate.programs(claim), loop, position, velocity)
@@ -59,7 +61,7 @@ def outside(
         steep = math.sqrt(loop.craft.rate**2 + 2.0 * loop.craft.stiffness)
         beyond |= np.abs(position[0] + velocity[0] / steep) > numbers["width"] * (1.0 + slack)
         beyond |= np.abs(position[0]) > numbers["reach"] * (1.0 + slack)
-        # The claim takes Y and Z as held; where a flight starts otherwise it is none of those that it speaks of.
+        # The claim assumes that Y and Z are held; it does not cover a flight that starts otherwise.
         beyond |= abs(position[1:, 0] - (loop.gains.y, loop.gains.z)).max() + abs(velocity[1:, 0]).max() > slack
     return beyond
 
@@ -67,13 +69,13 @@ def outside(
 def value_of(
     programs: Mapping[str, Any], loop: ClosedLoop, position: NDArray[np.float64], velocity: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """V at many states, (3, n) each."""
+    """Return V at many states, (3, n) each."""
     measurement: Any = PointMeasurement(tuple(position), tuple(velocity), 0.0, math.inf)
     return np.asarray(evaluated(programs["lyapunov"], measurement=measurement, gains=loop.gains, craft=loop.known)[0])
 
 
 def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHTS, seed: int = 1) -> Trial | None:
-    """Fly the certified set of the circle; None where that is not proved. Raises BrokenClaimError."""
+    """Fly from states of the circle's certified set; None where that is not proved. Raises BrokenClaimError."""
     # A claim within limits comes after the other, and is about a smaller set.
     claim = next((c for c in reversed(_proved(certificate)) if "level" in c.numbers), None)
     if claim is None:
@@ -94,7 +96,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
         wrong = (after > before * (1.0 + RISE) + floor) | (batch.lost_at >= 0.0)
         if wrong.any():
             shown = ", ".join(f"{x:.9g}" for x in states[: ROWS.velocity.stop, int(np.argmax(wrong))])
-            raise BrokenClaimError(f"{certificate.name}, {claim.kind}: V rises on a flight, which is then at ({shown})")
+            raise BrokenClaimError(f"{certificate.name}, {claim.kind}: V increases on a flight, which is then at ({shown})")
         highest, before = max(highest, float((after / np.maximum(before, floor)).max())), after
         need = max(need, float(_size(states[ROWS.control], loop.limit).max()))
     if "limit" not in claim.numbers:
@@ -107,7 +109,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
 
 
 def draw(gains: Any, level: float, count: int, random: np.random.Generator) -> NDArray[np.float64]:
-    """States (9, count) of {V <= level} in the plane x = 0 without a rate along X, half of them on its surface."""
+    """Return states (9, count) of {V <= level} in the plane x = 0 without a rate along X, half of them on its surface."""
     v = level * np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count))
     s, turn, angle = random.uniform(-1.0, 1.0, count), *random.uniform(0.0, 2.0 * np.pi, (2, count))
     r = np.sqrt(np.maximum(gains.radius**2 + s * np.sqrt(2.0 * v / gains.alpha), 0.0))
@@ -121,7 +123,7 @@ def draw(gains: Any, level: float, count: int, random: np.random.Generator) -> N
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
-    """Whether the loop's start lies in the sets of the proved claims that are about a part of all states."""
+    """Return whether the loop starts in the sets of the proved claims that are not about all states."""
     start = np.array(loop.start.position)[:, None], np.array(loop.start.velocity)[:, None]
     return {
         claim.kind: not outside(certificate, claim, loop, *start)[0]

@@ -1,4 +1,4 @@
-"""The linear loop near rest on target: matrices of the plant, of the law and of both, read off the equations that fly."""
+"""The linear loop near rest on target: matrices of plant, law and both, derived from the equations that fly."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ rate relative to the target (rad/s), body axes."""
 COMMAND = tuple(f"command_{axis}" for axis in AXES)
 DISTURBANCE = tuple(f"disturbance_{axis}" for axis in AXES)
 MOST_HELD = 1000
-"""Control periods that a delay may last."""
+"""The longest delay in control periods."""
 CALLS, SOLVED = 30, 10
-"""The law is called so often at rest for its memory to settle, and what then still changes is solved for so often."""
+"""The number of calls of the law at rest for its memory to settle, and of solutions for what then still changes."""
 LONG = 2**40
-"""Calls after which what changes must have died away."""
+"""The number of calls after which changes must have died out."""
 SETTLED = 1e-9
-"""A number has settled once a call changes it by so small a part of its largest change."""
+"""A number has settled once a call changes it by less than this part of its largest change."""
 
 
 class LinearityError(ValueError):
@@ -41,8 +41,8 @@ class LinearityError(ValueError):
 
 
 class System(NamedTuple):
-    """x' = A x + B u, y = C x + D u, or of a step of `period` (s) x+ = A x + B u; period 0 for continuous time. The names of
-    states, inputs and outputs stand in order."""
+    """The system x' = A x + B u, y = C x + D u, or for a step of `period` (s) x+ = A x + B u; period 0 for continuous time.
+    The names of states, inputs and outputs are in order."""
 
     A: Array
     B: Array
@@ -71,9 +71,9 @@ class Linear:
     """A linear loop: the plant from command and disturbance (N m, body axes) to its states, the law from these to the
     command, in continuous time and sampled.
 
-    Continuous: `plant`, `law` (of one with a memory what its differences are over a period). Sampled: `stepped`, exact for
-    a command that is held for a period and acts `delay` (s) later, and for a disturbance that is held, and `stepped_law`.
-    `left_out` names what flies and is not in the matrices."""
+    Continuous: `plant`, `law` (for a law with memory its differences divided by the period). Sampled: `stepped`, exact for a
+    command that is held for a period and acts `delay` (s) later, and for a held disturbance, and `stepped_law`. `left_out`
+    names parts of the loop that the matrices lack."""
 
     plant: System
     law: System
@@ -110,8 +110,8 @@ class Linear:
 
 
 def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
-    """Return the linear loop near rest on target, the target held where it is at the start. delay: from the control instant
-    until the command acts (s). LinearityError where there is none."""
+    """Return the linear loop near rest on target, with the target fixed where it is at the start. delay: from the control
+    instant until the command acts (s). LinearityError where there is none."""
     if not 0.0 <= delay <= MOST_HELD * loop.period:
         raise LinearityError(f"a delay between 0 and {MOST_HELD} control periods is wanted, not {delay:g} s")
     if not loop.aims:
@@ -119,15 +119,17 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
     for one in (loop.law, *(f.part for f in loop.used("effector") if f.part.flag("ACTS"))):
         if one.reads:
             readings = " and the ".join(name.replace("_", " ") for name in one.reads)
-            raise LinearityError(f"{one.name} takes the {readings} too, not attitude and rate alone")
+            raise LinearityError(f"{one.name} also uses the {readings}, not attitude and rate alone")
     left_out: list[str] = []
     still = _at_rest(loop, left_out)
     try:
         with np.errstate(all="ignore"):
             plant, law = _matrices(still)
     except ArithmeticError:
-        # A division by zero, too.
-        raise LinearityError(f"the law {loop.law.name}, or a part of the loop, has no slope at rest on target") from None
+        # Also a division by zero.
+        raise LinearityError(
+            f"the law {loop.law.name}, or a part of the loop, has no derivative at rest on target"
+        ) from None
     plant, law = _needed(plant, law)
     if len(law.states):
         difference = (law.A - np.eye(len(law.states))) / loop.period
@@ -138,8 +140,8 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
 
 
 def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
-    """The loop at rest on target, in inertial axes that are those of the target, so that the error there is exactly zero;
-    appends to `left_out` the names of the parts removed."""
+    """Return the loop at rest on target, in inertial axes equal to the target's, so that the error is exactly zero; append
+    to `left_out` the names of removed parts."""
     counted = loop.law.counters(loop.law.remember(loop.gains, loop.known, loop.period))
     if counted is not None or buffers(loop.carry().memory):
         raise LinearityError(f"the law {loop.law.name} iterates, and has no derivative")
@@ -168,8 +170,8 @@ def _at_rest(loop: ClosedLoop, left_out: list[str]) -> ClosedLoop:
 
 
 def _settled(loop: ClosedLoop, step: Step, setup: Setup) -> Carry:
-    """The carry with the memory that the law has after a long time at rest on target, whatever it does when it starts.
-    LinearityError where its memory goes on changing."""
+    """Return the carry with the law's memory after a long time at rest on target, beyond its start-up. LinearityError where
+    its memory does not settle."""
     carry = loop.carry()
 
     def called(numbers: Any) -> list[Any]:
@@ -189,17 +191,17 @@ def _settled(loop: ClosedLoop, step: Step, setup: Setup) -> Carry:
                 break
             change = np.linalg.lstsq(np.eye(len(memory)) - slopes, change)[0]
         memory = memory + change
-    raise LinearityError(f"the law {loop.law.name} goes on changing its memory at rest on target")
+    raise LinearityError(f"the memory of the law {loop.law.name} does not settle at rest on target")
 
 
 def _with_memory(carry: Carry, numbers: Any) -> Carry:
-    """A carry whose law remembers these numbers."""
+    """Return a carry whose law remembers these numbers."""
     given = iter(numbers)
     return carry._replace(memory=mapped(carry.memory, lambda _: next(given)))
 
 
 def _matrices(loop: ClosedLoop) -> tuple[System, System]:
-    """The plant in continuous time and the law in steps, with all states."""
+    """Return the plant in continuous time and the law in steps, with all states."""
     step, setup = make_step(loop.composition()), loop.setup()
     carry = _settled(loop, step, setup)
     lags = any(fitted.part.hook("rates") is not None for fitted in loop.used("actuator"))
@@ -217,7 +219,7 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
     numbers = iter(x[6:])
     effectors, outputs = (mapped(part, lambda _: next(numbers)) for part in (carry.effectors, carry.actuators))
     turn_parts: Any = [*NO_TURN[:1], *(0.5 * turn for turn in x[:3])]
-    # The scalar part of the quaternion has no slope at rest.
+    # The derivative of the quaternion's scalar part is zero at rest.
     attitude = (Dual(1.0, np.zeros(count)), *turn_parts[1:])
     torque = tuple(x[-3:]) if lags else tuple(u)
     state = carry.state._replace(attitude=attitude, rate=tuple(x[3:6]), torque=torque)
@@ -249,7 +251,7 @@ def _matrices(loop: ClosedLoop) -> tuple[System, System]:
 
 
 def _filled(rates: Any, states: Any) -> list[Any]:
-    """The rates of states, 0 where a part has none."""
+    """Return the rates of states, 0 where a part has none."""
     numbers: list[Any] = []
     for rate, state in zip(rates or (None,) * len(states), states, strict=True):
         values = flatten((state,))
@@ -267,7 +269,7 @@ def _flat(rate: Any, state: Any) -> list[Any]:
 
 
 def _needed(plant: System, law: System) -> tuple[System, System]:
-    """Plant and law without states that nothing needs: states of the plant that nothing depends on, such as the momenta of
+    """Return plant and law without irrelevant states: states of the plant that nothing depends on, such as the momenta of
     wheels without friction; memory that the command does not depend on; and states that never change, such as flags."""
     law = _remembered(law)
     feeds = plant.A != 0.0
@@ -287,7 +289,7 @@ def _needed(plant: System, law: System) -> tuple[System, System]:
 
 
 def _remembered(law: System) -> System:
-    """The law without memory that its command does not depend on, or that never changes."""
+    """Return the law without memory that its command does not depend on, or that never changes."""
     size = len(law.states)
     constant = (np.eye(size) == law.A).all(axis=1) & (law.B == 0.0).all(axis=1)
     needed = (law.C != 0.0).any(axis=0)
@@ -299,16 +301,16 @@ def _remembered(law: System) -> System:
 
 
 def sampled(plant: System, period: float, delay: float = 0.0) -> System:
-    """Return a plant from instant to instant, exactly, under a command that is held for a period and acts `delay` (s) later,
-    and a disturbance that is held. Commands that are still to act are states (Astrom and Wittenmark, Computer-Controlled
-    Systems, 1997)."""
+    """Discretize a plant exactly, under a command that is held for a period and acts `delay` (s) later, and a held
+    disturbance. Pending commands are states (Astrom and Wittenmark, Computer-Controlled Systems, 1997).
+    """
     size = len(plant.states)
     whole = int(np.floor(delay / period * (1.0 + 1e-12)))
     rest = max(0.0, delay - whole * period)
     split = rest > 1e-12 * period
     over, pushed = _under_hold(plant, period)
     command, others = slice(0, 3), slice(3, None)
-    # Until `rest` the command before acts, and then the new one.
+    # Until `rest` the previous command acts, then the new one.
     late, new = _under_hold(plant, period - rest)[1][:, command], np.zeros((size, 3))
     if split:
         to_end = expm(plant.A * (period - rest))

@@ -10,20 +10,20 @@ from numpy.typing import NDArray
 from starhold.analysis.linear import AXES, Linear
 
 POINTS = 600
-"""Frequencies of a response."""
+"""The number of frequencies of a response."""
 BELOW = 1e-2
-"""The lowest frequency, in parts of that of the slowest pole of the closed loop."""
+"""The lowest frequency, as a fraction of that of the slowest pole of the closed loop."""
 
 
 UNITS = {"gain": "1", "less": "1", "phase": "rad", "delay": "s", "crossover": "rad/s", "sensitivity": "1"}
 
 
 class Margins(NamedTuple):
-    """The margins of the loop about one axis, those about the others closed. gain: the least factor above 1 of the command
-    that loses stability (inf for none); less: the greatest factor below 1 that does (0 for none); phase (rad) and delay (s):
-    the least further lag that does (inf for none); crossover: the highest frequency (rad/s) at which the loop's gain is 1,
-    its bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse is the least distance of L from -1. All
-    but the crossover are NaN where the loop is not stable."""
+    """The margins of the loop about one axis, with the others closed. gain: the least factor above 1 of the command that
+    loses stability (inf for none); less: the greatest factor below 1 that does (0 for none); phase (rad) and delay (s): the
+    least further lag that does (inf for none); crossover: the highest frequency (rad/s) at which the loop's gain is 1, its
+    bandwidth (NaN for none); sensitivity: the largest |1/(1 + L)|, whose inverse is the least distance of L from -1. All but
+    the crossover are NaN where the loop is not stable."""
 
     axis: str
     gain: float
@@ -40,14 +40,14 @@ class Margins(NamedTuple):
 
 
 class Response(NamedTuple):
-    """The loop cut about each axis: frequencies (n,) in rad/s, up to half the sampling frequency, and L (3, n)."""
+    """The loop opened about each axis: frequencies (n,) in rad/s, up to half the sampling frequency, and L (3, n)."""
 
     frequencies: NDArray[np.float64]
     loops: NDArray[np.complex128]
 
 
 def response(linear: Linear) -> Response:
-    """Return the frequency response of the loop that is cut about one axis, with those about the others closed."""
+    """Return the frequency response of the loop opened about one axis, with the others closed."""
     # A pole of z is exp(s period); of a loop that waits some are zero.
     turns = [abs(np.log(pole)) / linear.period for pole in linear.poles.astype(complex) if abs(pole) > 1e-9]
     highest = math.pi / linear.period
@@ -57,7 +57,7 @@ def response(linear: Linear) -> Response:
 
 
 def _cut(linear: Linear, frequencies: Any, axes: Iterable[int]) -> NDArray[np.complex128]:
-    """L (axes, n) about some of the axes."""
+    """Return L (axes, n) about some of the axes."""
     whole = linear.stepped_loop.at(np.exp(1j * np.asarray(frequencies) * linear.period))
     cut: list[Any] = []
     for i in axes:
@@ -86,7 +86,7 @@ def _about(linear: Linear, k: int, measured: Response) -> Margins:
     crossover = max(crossings, default=math.nan)
     if not linear.is_stable:
         return Margins(AXES[k], math.nan, math.nan, math.nan, math.nan, crossover, math.nan)
-    # Where L is real and negative; at half the sampling frequency it always is real.
+    # Where L is real and negative; at half the sampling frequency it is always real.
     reals = [at(f) for f in _roots(w, L.imag, lambda f: at(f).imag)] + [complex(L[-1])]
     gains = [-1.0 / value.real for value in reals if value.real < 0.0]
     lags = [((math.pi + np.angle(at(f))) % (2.0 * math.pi), f) for f in crossings]
@@ -102,14 +102,14 @@ def _about(linear: Linear, k: int, measured: Response) -> Margins:
 
 
 def _log_size(values: Any) -> Any:
-    """The logarithm of the size of numbers, of which some may be 0: a law need not act about every axis."""
+    """Return the logarithm of the modulus of numbers; some may be 0, because a law need not act about every axis."""
     return np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
 
 
 def _roots(w: Any, values: Any, function: Callable[[float], float]) -> list[float]:
-    """The frequencies at which a function changes its sign between two of w; not those at which it jumps, as it does across
-    a resonance without damping."""
-    # Loaded here, for it takes long and not every loop has margins.
+    """Return the frequencies at which a function changes sign between two of w, except jumps, as across an undamped
+    resonance."""
+    # Loaded here, because it takes long and not every loop has margins.
     from scipy.optimize import brentq
 
     roots: list[float] = []

@@ -1,7 +1,7 @@
-"""Metrics of flights: notes that an equation takes at each control instant, and the numbers made of them at the end.
-
-The same notes are taken inside a kernel, of many flights at once without keeping samples, and of a recording, whose samples
-are the instants. A row of a table says how a metric is made of the notes; the report's page reads that table too.
+"""Metrics of flights: notes (accumulated numbers) that an equation takes at each control instant, and the metrics computed
+from them at the end. The same notes are taken inside a kernel, for many flights at once without storing samples, and from a
+recording, whose samples are the instants. A row of a table says how a metric follows from the notes; the report's page reads
+that table too.
 """
 
 import itertools
@@ -26,28 +26,28 @@ from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
 
 LAST = 0.25
-"""Share of the run over which chatter and the final error are measured."""
+"""The share of the run over which chatter and the final error are measured."""
 ALMOST = 1.0 - 1e-9
-"""A share of a limit from which on it counts as reached."""
+"""The share of a limit from which it counts as reached."""
 KEPT = 0.1
-"""Share of the run at its end in which nothing counts as settled: a motion that goes to and fro, or that a longer run
-would show to leave again, is within its bounds there by chance."""
+"""The share of the run at its end in which nothing counts as settled: an oscillating motion, or one that would leave again
+in a longer run, may be within its bounds there by chance."""
 
 
 def stays_within(values: Any, bound: float) -> int | None:
-    """The index from which all values are at most the bound, or None."""
+    """Return the index from which all values are at most the bound, or None."""
     outside = np.flatnonzero(~(np.asarray(values) <= bound))
     first = int(outside[-1]) + 1 if outside.size else 0
     return first if first < len(values) else None
 
 
 def too_late(index: float, count: int, kept: float = KEPT) -> bool:
-    """Whether the sample of this index, of so many, lies within the last share of a run."""
+    """Return whether the sample of this index, of so many, lies within the last share of a run."""
     return index > (1.0 - kept) * (count - 1)
 
 
 def on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
-    """Tell which samples (n, components) are on their limit; none where there is none."""
+    """Return which samples (n, components) are on their limit; none where there is no limit."""
     if kind == "none" or not np.isfinite(limit):
         return np.zeros(len(u), dtype=bool)
     size = np.linalg.norm(u, axis=1) if kind == "norm" else np.abs(u).max(axis=1)
@@ -64,14 +64,14 @@ Note: TypeAlias = Callable[[Any, Mapping[str, Any], Any, Any, Any], Any]
 
 
 WINDOWS = 40
-"""Windows of time that envelopes have, more or less."""
+"""The approximate number of time windows of envelopes."""
 PIECE = 2**16
-"""Samples of a recording that are copied and noted at once."""
+"""The number of samples of a recording that are copied and noted at once."""
 
 
 class Window(NamedTuple):
-    """A quantity whose largest value in each window of time makes an envelope over the runs: its place among what is noted,
-    where it begins anew in each window, what gives the quantity of the noted number, what it means, and its unit."""
+    """A quantity whose largest value in each window of time makes an envelope over the runs: its index among the notes,
+    which restart in each window, a function from the noted number to the quantity, its meaning, and its unit."""
 
     row: int
     value: Callable[[Array], Array]
@@ -80,12 +80,12 @@ class Window(NamedTuple):
 
 
 class Metric(NamedTuple):
-    """A metric in its unit is made of the noted numbers at `rows` as `kind` says, multiplied by `times` in order.
+    """A metric in its unit is computed from the notes at `rows` by the rule `kind`, multiplied by `times` in order.
 
     over: the count of instants it is a mean over, "samples" or "tail" (changes between those of the last quarter), with a
-    factor; since: the rows are of windows, and the largest counts from here on, "start", "half" or "tail"; final: it says
-    how a flight ends, so that one that diverges has none; kept: the share of the flight, at its end, in which nothing
-    counts as settled."""
+    factor; since: the rows are of windows, and the largest counts from here on, "start", "half" or "tail"; final: it
+    describes the end of a flight, so that one that diverges has none; kept: the share of the flight, at its end, in which
+    nothing counts as settled."""
 
     unit: str
     kind: str
@@ -101,26 +101,26 @@ INSTANT = "instant"
 KINDS: Mapping[str, Callable[..., Array]] = {
     "number": lambda x: x,
     "root": np.sqrt,
-    # Of the square of the sine of half the angle.
+    # From the square of the sine of half the angle.
     "angle": lambda x: 2.0 * np.arcsin(np.sqrt(np.minimum(x, 1.0))),
-    # Of the square of the distance between the ends of two unit vectors.
+    # From the square of the distance between the ends of two unit vectors.
     "apart": lambda x: 2.0 * np.arcsin(0.5 * np.sqrt(x)),
-    # Of two vectors.
+    # From two vectors.
     "distance": lambda *x: np.sqrt(sum((a - b) ** 2 for a, b in zip(x[:3], x[3:], strict=True))),
-    # Of the first turn, and of the share of it beyond the target; a start on target has none.
+    # From the initial angle, and the share of it beyond the target; a start on target has none.
     "overshoot": lambda a, b, c, x: np.where(a**2 + b**2 + c**2 < 1e-18, 0.0, np.maximum(x, 0.0)),
-    # From which on values stay within their bounds, of the last instants outside (-1: never).
+    # The time from which values stay within their bounds, from the last instants outside (-1: never).
     INSTANT: lambda *x: np.maximum.reduce(x) + 1.0,
 }
-"""Functions from noted numbers (lanes,) to a metric. `report/assets/flight.js` makes the same of one flight."""
+"""Functions from notes (lanes,) to a metric. `report/assets/flight.js` does the same for one flight."""
 
 
 @dataclass(frozen=True)
 class Meter:
-    """The notes to be taken of flights, and the metrics made of them. first: before a flight; numbers: arguments of the
-    notes; notes: the equation before the last of `marks`, and from it on; table: metrics by name; windows: quantities of
+    """The notes to be taken of flights, and the metrics computed from them. first: before a flight; numbers: arguments of
+    the notes; notes: the equation before the last of `marks`, and from it on; table: metrics by name; windows: quantities of
     envelopes by name; steps: control steps of a flight, of `instant` seconds each (or of the body's own unit of time, where
-    that is unknown); marks: instants at which windows end, in order."""
+    that is unknown); marks: instants at which windows must end, in order."""
 
     first: Any
     numbers: Any
@@ -142,7 +142,7 @@ class Meter:
         return early, late
 
     def begun(self, lanes: int) -> Array:
-        """The notes of lanes before they fly, (numbers, lanes)."""
+        """Return the notes of lanes before they fly, (numbers, lanes)."""
         return np.repeat(np.array(flatten(self.first), dtype=float)[:, None], lanes, axis=1)
 
     def cuts(self) -> list[int]:
@@ -150,9 +150,9 @@ class Meter:
         return window_ends(self.steps, self.marks)
 
     def metrics(self, noted: Array, windows: Array, lost: Array) -> Metrics:
-        """Metrics of lanes from their notes (numbers, lanes), those of windows (windows, quantities, lanes), and the control
-        step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other metrics of a
-        motion that diverged are NaN."""
+        """Return metrics of lanes from their notes (numbers, lanes), those of windows (windows, quantities, lanes), and the
+        control step at which each diverged (lanes,), -1 for those that did not, whose `diverged_at` is NaN. All other
+        metrics of a motion that diverged are NaN."""
         kept = lost < 0.0
         metrics = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
         for name, metric in self.table.items():
@@ -163,8 +163,8 @@ class Meter:
         return metrics
 
     def of_recording(self, run: Recording, limit: float) -> dict[str, Any]:
-        """Metrics of a recording whose samples are the instants. Those without a value are None; `cut_off` names the times
-        that come too late to count, `diverged_at` is the time at which the motion diverged."""
+        """Return metrics of a recording whose samples are the instants. Those without a value are None; `cut_off` names the
+        times that are too late to count, `diverged_at` is the time at which the motion diverged."""
         lost, ends = run.attrs.get("diverged_at"), [*self.marks, self.steps + 1]
         noted, windows = self._replayed(run, limit, ends)
         metrics: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
@@ -182,7 +182,7 @@ class Meter:
         return metrics
 
     def program(self, columns: Columns, limit: float) -> Program:
-        """The notes from the last of `marks` on, of samples with these columns, recorded; see `over_samples`."""
+        """Record the notes from the last of `marks` on, for samples with these columns; see `over_samples`."""
         return over_samples(self.notes[1], self.first, (self.numbers, limit), columns)
 
     def _late(self, metric: Metric, instants: Array) -> NDArray[np.bool_]:
@@ -209,7 +209,7 @@ class Meter:
 
     def _replayed(self, run: Recording, limit: float, ends: Sequence[int]) -> tuple[Array, Array]:
         """Return the notes of a recording, (numbers, 1), and of its windows, (windows, quantities, 1)."""
-        # Numbers of each sample, for users may add anything to a Dataset.
+        # Only numbers of each sample, because users may add anything to a Dataset.
         numbers = {name: values for name, values in run.arrays.items() if values.dtype.kind in "fiu" and name != "time"}
         sampled = {name: x for name, x in numbers.items() if x.ndim in (1, 2) and len(x) == len(run["time"])}
         columns = tuple((name, values.shape[1:]) for name, values in sampled.items())
@@ -275,8 +275,8 @@ def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterat
 
 
 def window_ends(steps: int, marks: Sequence[int]) -> list[int]:
-    """The control steps at which windows of a flight end, every mark among them. The last window holds the last instant too;
-    where that is a mark, it has a window of its own."""
+    """The control steps at which windows of a flight end, every mark among them. The last window includes the last instant;
+    if that is a mark, it has a window of its own."""
     edges = [0, *marks, steps]
     ends: set[int] = set()
     for first, last in itertools.pairwise(edges):
@@ -301,6 +301,6 @@ def outside(then: Any, square: Any, bound: Any, now: Any) -> Any:
 
 
 def is_on_limit(command: Any, limit: Any, kind: str) -> Any:
-    """Whether a command is on its limit, as `on_limit` tells of samples; never where there is none."""
+    """Return whether a command is on its limit, as `on_limit` for samples; never where there is none."""
     size = sqrt(dot(command, command)) if kind == "norm" else most(command)
     return less(size, -1.0) if kind == "none" else less_equal(limit * ALMOST, size)

@@ -1,6 +1,6 @@
 """Pointing errors over windows of time, by the indices of ECSS-E-ST-60-10C (2008, control performance).
 
-Errors are rotation vectors (rad, body axes), small ones, so that they add up: arrays (runs, instants, 3).
+Errors are rotation vectors (rad, body axes), small enough to add: arrays (runs, instants, 3).
 """
 
 import math
@@ -20,19 +20,19 @@ PERFORMANCE = {
     "PDE": "drift error: between the means over two windows",
 }
 KNOWLEDGE = {"AKE": "APE", "MKE": "MPE", "RKE": "RPE", "KDE": "PDE"}
-"""The indices of knowledge, each with that of performance that is taken of the estimate's error likewise."""
+"""The indices of knowledge, each with the index of performance that is computed in the same way."""
 MEANINGS = PERFORMANCE | {
     name: PERFORMANCE[like].replace(" error", " error of the estimate") for name, like in KNOWLEDGE.items()
 }
 ANGLE, LINE = "angle", "line of sight"
 OVERLAP, MOST = 4, 2**22
-"""Windows in which errors are relative to the mean begin at each instant, or, where that were more than MOST errors, as
-often as they may, and at least OVERLAP times a window."""
+"""Windows of relative errors begin at each instant or, where that gives more than MOST errors, as often as possible and at
+least OVERLAP times in a window."""
 
 
 class Figures(NamedTuple):
-    """The numbers of an index about an axis: the level that the share of confidence keeps (rad), the mean of the index, with
-    its sign where it has one, and its standard deviation (rad). None where errors are combined that it is not known of."""
+    """The numbers of an index about an axis: the level below which the share `confidence` stays (rad), the mean of the
+    index, with its sign where it has one, and its standard deviation (rad). None where unknown for combined errors."""
 
     level: float
     mean: float | None
@@ -40,7 +40,7 @@ class Figures(NamedTuple):
 
 
 def indices(errors: Array, length: int, apart: int) -> dict[str, Array]:
-    """The vectors of each index of PERFORMANCE, (runs, number, 3). errors: (runs, instants, 3); length: instants of a
+    """Return the vectors of each index of PERFORMANCE, (runs, number, 3). errors: (runs, instants, 3); length: instants of a
     window; apart: instants from the start of a window to that of the other, for drift. ValueError where they do not fit."""
     instants = errors.shape[1]
     if min(length, apart) < 1 or length + apart > instants:
@@ -60,22 +60,22 @@ def indices(errors: Array, length: int, apart: int) -> dict[str, Array]:
 
 
 def spacing(runs: int, instants: int, length: int) -> int:
-    """The number of instants between the starts of the windows of relative errors."""
+    """Return the number of instants between the starts of the windows of relative errors."""
     wanted = -(-runs * (instants - length + 1) * length // MOST)
     return min(wanted, max(1, length // OVERLAP))
 
 
 def shortfall(apart: int, length: int) -> float:
-    """By what share, at most, the largest relative error is too small where windows begin so many instants apart.
-
-    A window and the next one taken that holds an instant too differ by k < apart instants at either end. With M the largest
-    relative error of all windows their means differ by at most 2 k M / (length - k)."""
+    """Bound the share by which the largest relative error is too small where windows begin so many instants apart. A window
+    and the next one taken with the same instant differ by k < apart instants at either end. With M the largest relative
+    error of all windows their means differ by at most 2 k M / (length - k).
+    """
     return min(1.0, 2.0 * (apart - 1) / (length - apart + 1))
 
 
 def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:
-    """Errors (runs, number) about each body axis, with their signs, and the size of the rotation; with a boresight (any
-    length, body axes) also its tilt: half the cone that it sweeps."""
+    """Return errors (runs, number) about each body axis, signed, and the size of the rotation; with a boresight (any length,
+    body axes) also its tilt: half the angle of the cone that it sweeps."""
     components = {axis: vectors[..., place] for place, axis in enumerate("xyz")}
     components[ANGLE] = np.linalg.norm(vectors, axis=-1)
     if boresight is not None:
@@ -84,8 +84,8 @@ def about_axes(vectors: Array, boresight: Any = None) -> dict[str, Array]:
 
 
 def level(values: Array, confidence: float, interpretation: Interpretation) -> float:
-    """The least size that the share `confidence` of errors (runs, number) keeps. mixed: of all of them; temporal: of those
-    of each run, the largest over the runs; ensemble: of the runs, by the largest of each."""
+    """Return the least bound that the share `confidence` of errors (runs, number) keeps. mixed: of all of them; temporal: of
+    those of each run, the largest over the runs; ensemble: of the runs, each by its largest error."""
     sizes = np.abs(values)
     if interpretation == "mixed":
         return float(np.quantile(sizes, confidence, method="inverted_cdf"))
@@ -95,10 +95,10 @@ def level(values: Array, confidence: float, interpretation: Interpretation) -> f
 
 
 def figures(values: Array, confidence: float, interpretation: Interpretation) -> Figures:
-    """The figures of errors (runs, number)."""
+    """Return the figures of errors (runs, number)."""
     return Figures(level(values, confidence, interpretation), float(values.mean()), float(values.std()))
 
 
 def root_sum_square(sources: list[Figures]) -> Figures:
-    """The figures of the sum of independent errors: levels and deviations as the root of their sums of squares."""
+    """Return the figures of the sum of independent errors: levels and deviations as root sum squares."""
     return Figures(math.hypot(*(one.level for one in sources)), None, math.hypot(*(one.deviation for one in sources)))

@@ -10,7 +10,7 @@ COSTS = {
 }
 """Metrics of a law's calls, with their units."""
 LATE = " †"
-"""Stands by the dash of a time that a run is too short for."""
+"""The mark beside the dash of a time for which a run is too short."""
 
 
 @dataclass(frozen=True)
@@ -33,26 +33,26 @@ class Metrics(dict[str, Any]):
 
 @dataclass(frozen=True)
 class MetricSet:
-    """How results of laws on a body are shown: the metrics shown, less being better in each; those that laws are ranked by
-    in turn; and the unit of time, with its seconds."""
+    """How to display the results of laws on a body: the metrics shown, where less is always better; those by which laws are
+    ranked in turn; and the unit of time, with its seconds."""
 
     measures: Mapping[str, Measure]
     order: tuple[str, ...]
     clock: str = "s"
     tick: float = 1.0
     units: Mapping[str, str] = field(default_factory=dict[str, str])
-    """The units of metrics as they are computed, those that are not shown included."""
+    """The units of metrics as computed, including those not shown."""
 
     def measured(self, row: Mapping[str, Any]) -> Metrics:
-        """The results of a law with the units of all that are numbers."""
+        """Return the results of a law with the units of all numbers."""
         return Metrics(row, {name: self.units[name] for name in row if name in self.units})
 
     def columns(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """The metrics that some of the laws have, in order."""
+        """Return the metrics that some of the laws have, in order."""
         return [metric for metric in self.measures if any(metric in row for row in results.values())]
 
     def ranked(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """Names from best to worst."""
+        """Return names from best to worst."""
 
         def key(name: str) -> tuple[float, ...]:
             values = [results[name].get(metric) for metric in self.order]
@@ -62,7 +62,7 @@ class MetricSet:
         return sorted(results, key=key)
 
     def winners(self, results: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
-        """For each metric the names with the least value; nobody wins where all are equal or none has a value."""
+        """Return for each metric the names with the least value; none where all are equal or none has a value."""
         won: dict[str, list[str]] = {}
         for metric in self.measures:
             values = {name: row[metric] for name, row in results.items() if row.get(metric) is not None}
@@ -73,7 +73,7 @@ class MetricSet:
         return won
 
     def shown(self, metric: str, value: Any) -> str:
-        """A metric's value in the unit of its heading; a dash where there is none."""
+        """Show a metric's value in the unit of its heading; a dash where there is none."""
         if value is None:
             return "—"
         scaled = float(value) * self.measures[metric].scale
@@ -82,11 +82,11 @@ class MetricSet:
         return f"{scaled:.3g}" if abs(scaled) < 1e3 else f"{scaled:.0f}"
 
     def moment(self, time: float, digits: int = 6) -> str:
-        """A time (s) with its unit."""
+        """Show a time (s) with its unit."""
         return f"{time / self.tick:.{digits}g} {self.clock}"
 
     def cell(self, metric: str, row: Mapping[str, Any]) -> str:
-        """Show the results of a law as `shown` does, with a mark where a time is reached too late to be counted."""
+        """Show the results of a law as `shown` does, with a mark where a time is too late to count."""
         return self.shown(metric, row.get(metric)) + (LATE if metric in row.get("cut_off", ()) else "")
 
     def late(self, results: Mapping[str, Mapping[str, Any]]) -> str:
@@ -99,6 +99,6 @@ class MetricSet:
         )
 
     def headings(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """Headings that laws with these results are ranked by; the first always is."""
+        """Return the headings by which laws with these results are ranked; the first always counts."""
         there = self.columns(results)
         return [self.measures[metric].heading for metric in self.order if metric in there]

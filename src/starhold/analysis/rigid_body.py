@@ -1,4 +1,4 @@
-"""Metrics of a body that turns, all in SI units."""
+"""Metrics of a rotating body, all in SI units."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -24,20 +24,19 @@ from starhold.simulation.lane import Recording
 DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""
 PEAKS = {"peak_attitude_error": "angle", "peak_rate_error": "root"}
-"""Largest errors of a whole flight, or of the part of it that a requirement is about, with the kinds of metrics."""
+"""Largest errors of a whole flight, or of the part that a requirement covers, with the kinds of metrics."""
 EXTRAS = ("overshoot", "iterations", *PEAKS)
-"""Metrics that are measured in campaigns and for requirements where they are asked for; the first two cost more in a
-kernel."""
+"""Metrics that campaigns and requirements measure on request; the first two cost more in a kernel."""
 OF_CAMPAIGNS = ("peak_rate", "drift", "peak_wheel_momentum", *PEAKS)
-"""Metrics that a recorded run is given for requirements alone: its page draws them."""
+"""Metrics of a recorded run that only requirements use: its page draws them."""
 WHEEL = ("wheel_momentum", "wheel_command", "wheel_available")
 
 MEASURES: dict[str, Measure] = {
     "settling_time": Measure(
-        "settling", "s", "time after which attitude and rate stay within their tolerances, the last tenth at least"
+        "settling", "s", "time after which attitude and rate stay within their tolerances, at least for the last tenth"
     ),
     "iterations_1e-3": Measure("steps to 1e-3", "", "control steps after which |q| stays within 10^-3, likewise"),
-    "overshoot": Measure("overshoot", "%", "largest turn beyond the target, of the initial angle", 100.0),
+    "overshoot": Measure("overshoot", "%", "largest rotation beyond the target, as a share of the initial angle", 100.0),
     "transient_time": Measure("transient", "s", "time after which angle and rate stay within the ends of [transient]"),
     "peak_rate": Measure("peak rate", "deg/s", "largest norm of the body's rate", 180.0 / np.pi),
     "peak_acceleration": Measure("peak accel.", "deg/s²", "largest component of the rate's derivative", 180.0 / np.pi),
@@ -54,20 +53,20 @@ MEASURES: dict[str, Measure] = {
 
 
 def error_angle(q: Any) -> NDArray[np.float64]:
-    """Angle (rad, 0..pi) of each quaternion in an array (..., 4), accurate for small angles too."""
+    """Return the angle (rad, 0..pi) of each quaternion in an array (..., 4), accurate for small angles too."""
     q = np.asarray(q, dtype=float)
     return 2.0 * np.arctan2(np.linalg.norm(q[..., 1:], axis=-1), np.abs(q[..., 0]))
 
 
 def acceleration(run: Recording) -> NDArray[np.float64]:
-    """Derivative of the body's rate (rad/s2), (n, 3): its mean from each sample to the next, the last repeated."""
+    """Return the body's angular acceleration (rad/s2), (n, 3): its mean from each sample to the next, the last repeated."""
     rate = run["rate"]
     mean = np.diff(rate, axis=0) / (run.attrs["control_period"] * run.attrs["record_every"])
     return np.concatenate([mean, mean[-1:]]) if len(mean) else np.zeros_like(rate)
 
 
 class Cone(NamedTuple):
-    """A body axis (unit, body axes) that is to stay away from a direction (unit, inertial axes)."""
+    """A body axis (unit, body axes) that must avoid a direction (unit, inertial axes)."""
 
     axis: Vector
     direction: Vector
@@ -86,7 +85,7 @@ class Bounds(NamedTuple):
 
 
 class Turning(NamedTuple):
-    """Notes on overshoot: the first error as a rotation vector, whether the target was crossed, and the largest turn
+    """Notes on overshoot: the first error as a rotation vector, whether the target was crossed, and the largest rotation
     beyond it as a share of the first."""
 
     first: Vector
@@ -184,7 +183,7 @@ def make_meter(
 
 
 def _table(rows: Any, period: float, every: int, wheels: bool) -> dict[str, Metric]:
-    """The metrics of notes that lie at these rows."""
+    """Return the metrics of notes at these rows."""
     last = rows.attitude_outside, rows.rate_outside
     table = {
         "settling_time": Metric("s", INSTANT, last, (period,)),
@@ -221,21 +220,21 @@ def recorded_meter(
     cones: Mapping[str, Cone] | None = None,
     wheels: bool = False,
 ) -> Meter:
-    """The meter of a recording of so many samples but one, at intervals of `every` control periods (s); with cones, even
-    if none, that of requirements."""
+    """Return the meter of a recording of so many samples less one, at intervals of `every` control periods (s); with cones,
+    even an empty mapping, the meter for requirements."""
     tolerances = attitude_tolerance, rate_tolerance
     meter = make_meter(steps, period * every, limit, tolerances, EXTRAS, cones or {}, every=every, wheels=wheels)
     table = {name: metric for name, metric in meter.table.items() if cones is not None or name not in OF_CAMPAIGNS}
-    # What is noted in the last quarter alone is not looked at before: one kernel does for all samples.
+    # Notes of the last quarter are not read before it, so one kernel serves all samples.
     return replace(meter, table=table, notes=(meter.notes[1],) * 2)
 
 
 def measure(
     run: Recording, attitude_tolerance: float, rate_tolerance: float, cones: Mapping[str, Cone] | None = None
 ) -> dict[str, Any]:
-    """Metrics of a run as `label` gives it. Times that are never reached are None, as are all final values and times of
-    a run that diverged; `diverged_at` (s) is None for one that did not. So are times within the last tenth of the run, whose
-    names `cut_off` lists. cones: those that requirements ask for, whose metrics are given too; None: no requirement asks."""
+    """Return the metrics of a run from `label`. Times that are never reached are None, as are all final values and times of
+    a run that diverged, and times within the last tenth of the run, whose names `cut_off` lists; `diverged_at` (s) is None
+    for a run that did not diverge. cones: those of requirements, whose metrics are added; None: no requirement."""
     attrs = run.attrs
     given = attrs["control_period"], int(attrs["record_every"]), attrs["limit"]
     more = cones, "wheel_momentum" in run.arrays
@@ -249,9 +248,9 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
 
     def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, bounds: Bounds) -> Noted:
         q, torque, command = (quantities[name] for name in ("attitude_error", "torque", "command"))
-        # Of a target at rest the rate error is the rate; the arithmetic on its zeros is spared here, as in `observe`.
+        # For a target at rest the rate error is the rate; this avoids arithmetic on its zeros, as in `observe`.
         rate = quantities["rate" if still else "rate_error"]
-        # A recording need not have the body's own rate, of which no metric of a recording is made.
+        # A recording may lack the body's own rate, which no metric of a recording needs.
         turning = quantities.get("rate", rate)
         angle_square = q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
         rate_square, torque_square = dot(rate, rate), dot(torque, torque)
@@ -263,8 +262,8 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             size = where(less(now, bounds.last), size, 0.0)
             chatter = chatter + where(chatters, sqrt(dot(change, change)), 0.0)
         bound, peak_wheel = is_on_limit(command, most_command, limit), seen.peak_wheel_momentum
-        # A motor is on its limit where it is asked for all that it can give: less as its momentum fills up, nothing once
-        # it is lost.
+        # A motor is on its limit where the command is all that it can give: less as its momentum saturates, nothing once it
+        # is lost.
         for momentum, wanted, there in zip(*(quantities.get(name, ()) for name in WHEEL), strict=True):
             peak_wheel, wanted = maximum(peak_wheel, absolute(momentum)), absolute(wanted)
             bound = either(bound, both(less(0.0, wanted), less_equal(there * ALMOST, wanted)))
@@ -294,14 +293,14 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
 
 
 def _nearest(least: Any, cone: Cone, attitude: Any) -> Any:
-    """The square of the least distance between the ends of the axis and of the direction."""
+    """Return the square of the least distance between the ends of the axis and of the direction."""
     apart = subtract(to_reference(attitude, cone.axis), cone.direction)
     return minimum(least, dot(apart, apart))
 
 
 def _turned(seen: Any, q: Any, now: Any) -> Turning:
-    """Notes on overshoot. A body that starts near a half turn may pass it first: what counts follows the first crossing of
-    the target."""
+    """Take notes on overshoot. A body that starts near a half turn may pass it first, so only motion after the first
+    crossing of the target counts."""
     turn, begins = rotation_vector(q), less(now, 0.5)
     first = chosen(begins, turn, seen.first)
     along = dot(turn, first) / maximum(dot(first, first), 1e-300)
@@ -310,7 +309,7 @@ def _turned(seen: Any, q: Any, now: Any) -> Turning:
 
 
 def _levels(seen: tuple[Any, ...], square: Any, now: Any) -> tuple[Any, ...]:
-    """The last instants at which a square was above those of 10^-k."""
+    """Return the last instants at which a square was above those of 10^-k."""
     return tuple(outside(then, square, 10.0 ** (-2 * k), now) for then, k in zip(seen, DECADES, strict=True))
 
 
@@ -323,4 +322,4 @@ AGAINST_LIMITS = {
 UNITS = {"diverged_at": "s", **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units, **AGAINST_LIMITS, **COSTS}
 """The metrics with their units, SI."""
 METRICS = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"), units=UNITS)
-"""Settled before unsettled, then sooner, then more accurate, then more sparing."""
+"""The order of ranking: settled before unsettled, then sooner, then more accurate, then with less effort."""

@@ -1,5 +1,4 @@
-"""The root of the modal law that slews fastest within limits is searched over the initial angle, and a fit put through
-it."""
+"""Searches for the root of the modal law that slews fastest within limits, over the initial angle, and fits the result."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -21,29 +20,29 @@ from starhold.laws.modal import fitted
 from starhold.loop.closed_loop import ClosedLoop
 
 PIECE = 3
-"""Angles that each piece of the fit has at least: it has three numbers."""
+"""The least number of angles for each piece of the fit, which has three numbers."""
 TOGETHER = 128
-"""Roots flown together, after which those that cannot be the best are left out."""
+"""The number of roots flown in a batch, after which hopeless ones are dropped."""
 DECAYS = np.geomspace(0.02, 30.0, 80)
-"""Decays (1/rad) among which the best of a piece is looked for first."""
+"""The decays (1/rad) of the first search for the best of a piece."""
 
 
 @dataclass(frozen=True)
 class Best:
-    """The best root (1/s) has the shortest transient, which stands beside it."""
+    """The best root (1/s), with its transient, the shortest."""
 
     root: float
     transient: Transient
 
     @property
     def time(self) -> float:
-        """Tell how long the transient takes (s)."""
+        """Return the duration of the transient (s)."""
         return math.inf if self.transient.time is None else self.transient.time
 
 
 class Found(NamedTuple):
-    """The best roots for one initial angle (rad) are those within the limits, and within those with their tolerances; None
-    where no root that was tried keeps to them and comes to its end."""
+    """The best roots for one initial angle (rad): within the limits, and within the limits with their tolerances; None where
+    no root that was tried keeps to them and settles."""
 
     angle: float
     hard: Best | None
@@ -51,9 +50,9 @@ class Found(NamedTuple):
 
 
 class Unmet(NamedTuple):
-    """No root achieves this from an angle: to come to its "end" at all; or, of those that do, to keep the limit of the
-    "rate" or of the "acceleration", where `least` is the least of their peaks (rad/s or rad/s2) and `root` (1/s) has it; or
-    to keep "both"."""
+    """The condition that no root meets from an angle: to reach its "end" at all; or, of those that do, to keep the limit of
+    the "rate" or of the "acceleration", where `least` is the least of their peaks (rad/s or rad/s2) and `root` (1/s) has it;
+    or to keep "both"."""
 
     what: Literal["end", "rate", "acceleration", "both"]
     least: float = math.nan
@@ -83,7 +82,7 @@ PUBLISHED = TwoPieceFit(*(modal.Fit._field_defaults[name] for name in TwoPieceFi
 @dataclass(frozen=True)
 class SlewProblem:
     """The slews start from an angle (rad) about the axis (3,) at a rate (3,) (rad/s) and are flown for `steps` control steps
-    of the modal law's loop; the target is at rest; they are over within the ends, in rad and rad/s; b in s."""
+    of the modal law's loop; the target is at rest; they end within the ends, in rad and rad/s; b in s."""
 
     loop: ClosedLoop
     steps: int
@@ -94,9 +93,9 @@ class SlewProblem:
     b: float
 
     def watcher(self) -> Watcher:
-        """The watcher flies the problem's loop and looks at each step."""
+        """Return the watcher that flies the problem's loop and checks each step."""
         root = (-1.0, -1.0, -1.0)
-        # Its gains only say of what form those of the lanes are.
+        # Its gains only give the form of those of the lanes.
         return Watcher(replace(self.loop, gains=modal.Gains(root, root, self.b)), self.angle_end, self.rate_end)
 
     def start(self, angle: float) -> list[float]:
@@ -127,10 +126,10 @@ def search(
     notice: Callable[[int, int], None] = lambda done, total: None,
     threads: int | None = None,
 ) -> list[Found]:
-    """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no narrower.
-
-    Every root is flown: until it leaves the eased limits, or until it has taken longer than the best so far, or to the end.
-    `notice` hears how many angles are done, and how many there are."""
+    """Return the best of all roots (n,) for each angle, within `limits` and within `eased`, which are no narrower. Every
+    root is flown until it leaves the eased limits, takes longer than the best so far, or ends. `notice` is called with the
+    number of angles done and their total.
+    """
     answers: list[Found] = []
     work = partial(_best, problem, problem.watcher(), np.sort(np.asarray(roots, dtype=float)), limits, eased)
     with ThreadPoolExecutor(max_workers=threads or cpu_count() or 1) as pool:
@@ -162,14 +161,14 @@ def _best(problem: SlewProblem, watcher: Watcher, roots: Any, limits: Limits, ea
 
 
 def _settled(limits: Limits, least: float, period: float, flown: Flown) -> bool:
-    """Tell whether no lane of a block can be the best any more: it is beyond the limits, lost, or too late."""
+    """Return whether no lane of a block can be the best any more: all are beyond the limits, diverged, or too late."""
     beyond = ~flown.transients(period).within(limits) | flown.lost
     late = flown.outside & (flown.steps * period > least)
     return bool((beyond | late).all())
 
 
 def unmet(problem: SlewProblem, angle: float, roots: ArrayLike, limits: Limits) -> Unmet:
-    """Tell why `search` finds none of these roots (n,) at an angle (rad)."""
+    """Return why `search` finds none of these roots (n,) at an angle (rad)."""
     roots = np.asarray(roots, dtype=float)
     flown = problem.fly(angle, roots)
     ended = ~np.isnan(flown.time)

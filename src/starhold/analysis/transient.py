@@ -31,7 +31,7 @@ class Ends(NamedTuple):
 
 
 class Watched(NamedTuple):
-    """A transient has these notes: squares of the error angle's half sine and of the relative rate, both over their ends,
+    """The notes of a transient: squares of the sine of half the error angle and of the relative rate, both over their ends,
     at the last instant; the control step, with its fraction, at which each was last above 1; the largest square of the
     body's rate (rad2/s2), and for each of its components the largest mean rate of change over a control step (rad/s2)."""
 
@@ -50,7 +50,7 @@ def watch(parts: Composition) -> Any:
     assert target is not None
 
     def last_above(then: Any, now: Any, before: Any, step: Any) -> Any:
-        # A fraction of the step before, by a line through the two squares.
+        # A fraction of the previous step, by linear interpolation of the two squares.
         crossing = number_of(step) + (before - 1.0) / (before - now)
         return where(less(1.0, now), number_of(step + 1), where(less(1.0, before), crossing, then))
 
@@ -82,7 +82,7 @@ def watch(parts: Composition) -> Any:
 Array: TypeAlias = NDArray[np.float64]
 
 LEG = 0.5
-"""Seconds of motion between two looks at which lanes are still worth flying."""
+"""Seconds of motion between two checks which lanes are still worth flying."""
 
 
 class Limits(NamedTuple):
@@ -94,9 +94,9 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True)
 class Transient:
-    """The time (s) from which on angle and relative rate stay within their ends, by a line between control steps, None where
-    that is never; the largest norm of the body's rate (rad/s); of each component of its derivative the largest mean over a
-    control step (rad/s2)."""
+    """The time (s) from which angle and relative rate stay within their ends, interpolated between control steps, or None;
+    the largest norm of the body's rate (rad/s); of each component of its derivative the largest mean over a control step
+    (rad/s2)."""
 
     time: float | None
     peak_rate: float
@@ -125,10 +125,9 @@ class Transients:
 
 
 def of_run(run: Recording, angle_end: float, rate_end: float) -> Transient:
-    """The transient of a recorded run, the same bits as a `Watcher` notes where every control step is recorded; of fewer
-    samples it knows no more than they tell.
-
-    angle_end: rad; rate_end: rad/s. The time is None too for a run that diverged."""
+    """Return the transient of a recorded run, with the bits of a `Watcher` where every control step is recorded; fewer
+    samples give only what they contain. angle_end: rad; rate_end: rad/s. The time is None also for a run that diverged.
+    """
     ends, step = _ends(angle_end, rate_end), run.attrs["control_period"]
     squares = ends.angle * _square(run["attitude_error"][:, 1:]), ends.rate * _square(run["rate_error"])
     over = [_last_above(values) for values in squares]
@@ -141,8 +140,8 @@ def of_run(run: Recording, angle_end: float, rate_end: float) -> Transient:
 def against_limits(
     run: Recording, limits: Limits, angle_end: float, rate_end: float, cut_off: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Metrics of a run against limits, SI units: its time (None where it comes to no end), its peaks, of the acceleration
-    those of each component too, the limits (None for none), and whether they are kept. A time within the last tenth of the
+    """Return metrics of a run against limits, SI units: its time (None where it does not end), its peaks, also of each
+    component of the acceleration, the limits (None for none), and whether they are kept. A time within the last tenth of the
     run is None, and joins the names of such times, `cut_off`."""
     flown = of_run(run, angle_end, rate_end)
     step = run.attrs["control_period"] * run.attrs["record_every"]
@@ -165,7 +164,7 @@ def _square(vectors: Array) -> Array:
 
 
 def _last_above(values: Array) -> float | None:
-    """The place, with its fraction, at which values (n,) were last above 1; None where they are at the end."""
+    """Return the index, with its fraction, at which values (n,) were last above 1; None where they are at the end."""
     above = np.flatnonzero(~(values <= 1.0))
     if not len(above):
         return 0.0
@@ -180,8 +179,8 @@ def _ends(angle: float, rate: float) -> Ends:
 
 
 class Flown(NamedTuple):
-    """Lanes after some control steps: how many, what is noted of them (numbers of `Watched`, lanes), and which of them lost
-    their motion (lanes,)."""
+    """Lanes after some control steps: their number, the notes (numbers of `Watched`, lanes), and which lanes diverged
+    (lanes,)."""
 
     steps: int
     seen: Array
@@ -199,7 +198,7 @@ class Flown(NamedTuple):
 
 
 class Watcher:
-    """Flies a loop on many lanes and notes their transients. The loop is flown as it is, but for events."""
+    """Flies a loop on many lanes and notes their transients. The loop is unchanged, but without events."""
 
     def __init__(self, loop: ClosedLoop, angle_end: float, rate_end: float) -> None:
         self.loop, self.ends = replace(loop, events=()), _ends(angle_end, rate_end)
@@ -215,8 +214,8 @@ class Watcher:
         return self._flown(batch, steps).transients(self.loop.period)
 
     def search(self, starts: Array, gains: Any, steps: int, enough: Callable[[Flown], bool]) -> Transients:
-        """Fly likewise on this thread, and end early once `enough` says so. Lanes that are then still outside their
-        end have no time."""
+        """Do the same on this thread, and stop early once `enough` is true. Lanes that are then still outside their end have
+        no time."""
         batch, phase = self._batch(starts, gains, steps)
         flown = self._flown(batch, 0)
         while flown.steps < steps and not enough(flown):
@@ -228,7 +227,7 @@ class Watcher:
     def _batch(self, starts: Array, gains: Any, steps: int) -> tuple[RunningBatch, Any]:
         state, target = unflatten(list(starts), self.loop.start), self.loop.target
         if not target.part.flag("STILL"):
-            raise ValueError("transients are watched towards a target at rest alone")
+            raise ValueError("transients are noted only for a target at rest")
         error, none = relative(self.loop.first_attitude(), state.attitude), np.zeros(starts.shape[1])
         angle, square = self.ends.angle * dot(error[1:], error[1:]), dot(state.rate, state.rate)
         noted = np.array([angle, self.ends.rate * square, none, none, square, none, none, none])

@@ -26,18 +26,18 @@ from starhold.trace.straight_line import evaluated
 
 FLIGHTS = 10_000
 LEGS = (1, 250, 250, 500)
-"""Each flight is looked at after legs of so many control steps; the first shows the torque at the start."""
+"""Each flight is checked after legs of so many control steps; the first shows the torque at the start."""
 SLACK = 1e-6
-"""Relative rise of V between looks that the held torque and the integration may cause."""
+"""The relative increase of V between checks that the held torque and the integration may cause."""
 TURN = 0.05
-"""Radians that a body, or its momentum in body axes, turns in a step at most."""
+"""The largest rotation (rad) of a body, or of its momentum in body axes, in a step."""
 
 NEAR, FAR = 1e-7, 10.0
-"""Turns (q) and rates (rad/s) near rest, where laws are linear, and beyond any boundary layer."""
+"""Rotations (q) and rates (rad/s) near rest, where laws are linear, and beyond any boundary layer."""
 
 Array: TypeAlias = NDArray[np.float64]
 Height: TypeAlias = Callable[[Array], Array]
-"""V of states, which are columns."""
+"""V of states, given as columns."""
 
 
 class BrokenClaimError(Exception):
@@ -46,8 +46,8 @@ class BrokenClaimError(Exception):
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial tells the flights flown from {V <= level}; the largest V at a look as a share of that at the look before, and
-    the largest torque, of a motor where the claim is about wheels, as a share of the limit (None: no limit is claimed)."""
+    """A trial: the flights flown from {V <= level}; the largest V at a check as a share of that at the previous one, and the
+    largest torque, of a motor where the claim is about wheels, as a share of the limit (None: no limit is claimed)."""
 
     flights: int
     level: float
@@ -56,11 +56,11 @@ class Trial:
 
 
 def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHTS, seed: int = 1) -> Trial | None:
-    """Fly the largest set in which a limit is claimed to be kept, else the first one from which motions are claimed to end
-    somewhere, or towards a sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises
+    """Fly from the largest set in which a limit is claimed to be kept, else from the first one with a claimed ultimate
+    bound, or towards a sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises
     BrokenClaimError."""
     found = [(c, proved_by(certificate, c, loop)) for c in certificate.claims if c.outcome == "proved"]
-    # A V with a mixed term is known of proofs alone.
+    # A V with a cross term is known only from proofs.
     found = [(c, p) for c, p in found if p.keys() & {"lyapunov", "surface"} and (c.proof or not c.witness["epsilon"])]
     claim, programs = next((one for one in found if _limited(one[0])), next(iter(found), (None, None)))
     if claim is None or programs is None:
@@ -73,7 +73,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     random = np.random.default_rng(seed)
     height = _height(free, programs)
     top = _highest(height)
-    # Where every rate is allowed, up to what a body spun as fast as three half turns' worth of V has.
+    # Where every rate is allowed, up to the V of a body that spins with three times the V of a half turn.
     level = min(4.0 * top, math.inf if level is None else level)
     free, states = _paced(free, certificate, draw(flights, height, level, random), random)
     highest, torque = 0.0, 0.0
@@ -87,15 +87,15 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
 
 
 def _limited(claim: Claim) -> bool:
-    """Tell whether a claim is about limits."""
+    """Return whether a claim is about limits."""
     return not claim.numbers.keys().isdisjoint(("motors", "limit"))
 
 
 def _falling(
     free: ClosedLoop, certificate: Certificate, claim: Claim, states: Array, value: Height, floor: float
 ) -> Generator[tuple[Batch, float]]:
-    """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one rises by
-    more than a little of it and `floor`."""
+    """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one
+    increases by more than a small part of it and `floor`."""
     before = value(states)
     for steps in LEGS:
         batch = simulate_many(free, states, steps)
@@ -125,7 +125,7 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     K = s_of(_at_rest(np.vstack([np.zeros(3), np.eye(3)])))
     reach, layer = _switching(free, K)
     free = replace(free, period=_sliding_period(free.period, K, reach, least, greatest))
-    # |s| falls by at least reach/J a second.
+    # |s| decreases by at least reach/J per second.
     level = 0.5 * least * (0.5 * sum(LEGS) * free.period * float(reach.min()) / greatest) ** 2
     level = min(level, math.inf if claim.numbers["start"] is None else claim.numbers["start"])
     height = _height(free, programs)
@@ -133,7 +133,8 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
         flights, height, level, np.random.default_rng(seed), 2.0 * math.pi if claim.numbers["everything"] else math.pi
     )
     s, highest, before = s_of(states), 0.0, height(states)
-    # Held torque lets s.Js/2 rise where reach.|s| is at most half a period times reach.J^-1 reach, and by a step from there.
+    # Held torque lets s.Js/2 increase where reach.|s| is at most half a period times reach.J^-1 reach, and by a step from
+    # there.
     size = float(np.linalg.norm(reach))
     step = free.period * size / least * (1.0 + 0.5 * size / float(reach.min()))
     chatter = math.sqrt(greatest / least) * (math.sqrt(3.0) * layer + step)
@@ -165,8 +166,8 @@ def _momentum_rate(loop: ClosedLoop, K: Array, rate: list[float]) -> Array:
 
 
 def _sliding_period(longest: float, K: Array, reach: Array, least: float, greatest: float) -> float:
-    """Return a period in which the body turns little at the rates of flights to a surface, and in which the torque that
-    holds it there changes by a little of the switching torque."""
+    """Return a period in which the body rotates little at the rates of flights to a surface, and in which the torque that
+    holds it there changes by a small part of the switching torque."""
     slope, most = float(np.linalg.norm(K, 2)), float(reach.max())
     period = min(longest, TURN / max(slope, 5.0 * math.sqrt(most / least)))
     while True:
@@ -177,8 +178,8 @@ def _sliding_period(longest: float, K: Array, reach: Array, least: float, greate
 
 
 def draw(count: int, height: Height, level: float, random: np.random.Generator, most: float = 2.0 * math.pi) -> Array:
-    """Return states (16, count) of {V <= level} that are turned by at most so much, half of them on its surface. V is of
-    second degree in the rate, with squares that do not depend on the attitude."""
+    """Return states (16, count) of {V <= level} rotated by at most so much, half of them on its surface. V is quadratic in
+    the rate, with quadratic terms that do not depend on the attitude."""
     P, units = _squares(height)
     axes, directions = random.normal(size=(2, 3, count))
     axes /= np.linalg.norm(axes, axis=0)
@@ -192,7 +193,7 @@ def draw(count: int, height: Height, level: float, random: np.random.Generator, 
         beyond = lowest > level
         if not beyond.any():
             break
-        # V is nearly a square of small turns.
+        # V is nearly quadratic in small rotations.
         closer = 0.99 * np.sqrt(level / np.where(beyond, lowest, level)) * random.uniform(size=count) ** 0.25
         turns = np.where(beyond, closer * turns, turns)
     inside = np.where(np.arange(count) % 2 == 0, 1.0 - 1e-9, random.uniform(size=count))
@@ -201,7 +202,7 @@ def draw(count: int, height: Height, level: float, random: np.random.Generator, 
 
 
 def _squares(height: Height) -> tuple[Array, Array]:
-    """Return P of w.Pw/2 in V, and rates about each axis at which V is about as large as it is at rest after half a turn."""
+    """Return P of w.Pw/2 in V, and rates about each axis at which V is about as large as at rest after a half turn."""
     rest, one = _at_rest(np.eye(4)[:, :1]), np.eye(3)
     squares = np.array([2.0 * float(height(_spun(rest, e))[0]) for e in one])
     pairs = [[2.0 * float(height(_spun(rest, e + f))[0]) for e in one] for f in one]
@@ -229,7 +230,7 @@ def _spun(states: Array, rate: Array) -> Array:
 
 
 def _height(loop: ClosedLoop, programs: Any) -> Height:
-    """Return V of states as they are, whatever the sign that the law is fed."""
+    """Return V of states, whatever quaternion sign the law receives."""
     return lambda states: value_of(programs, loop, _told(states))
 
 
@@ -240,8 +241,8 @@ def _told(states: Array) -> Measurement:
 
 
 def stable_period(loop: ClosedLoop) -> float | None:
-    """Return a period (s) near the longest that floats find stable, the loop's own if that is; None for a law that is not
-    linear near rest, and where there is none."""
+    """Return a period (s) near the longest that floats find stable, or the loop's own if it is stable; None for a law that
+    is not linear near rest, and where there is none."""
     slopes = [_slopes(loop, step) for step in (NEAR, 0.5 * NEAR)]
     if not np.allclose(*slopes, rtol=1e-3, atol=1e-9 * float(np.abs(slopes[0]).max())):
         return None
@@ -259,26 +260,26 @@ def _slopes(loop: ClosedLoop, step: float) -> Array:
 
 
 def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
-    """Return the law's torque after a small turn (q) and at a rate, without wheels."""
+    """Return the law's torque after a small rotation (q) and at a rate, without wheels."""
     told = Measurement((1.0, *turn), rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
     memory = loop.law.remember(loop.gains, loop.known, loop.period)
     return np.array(loop.law.command(told, loop.gains, loop.known, memory)[0])
 
 
 def _beyond_floats(loop: ClosedLoop, certificate: Certificate) -> bool:
-    """Tell whether the loop is linear around rest, but floats find no period of control that it is stable with."""
+    """Return whether the loop is linear around rest, but floats find no stable control period."""
     sampled = certificate.claim("sampling")
     unknown = sampled is not None and sampled.numbers["longest"] is None
     return unknown and stable_period(loop) is None
 
 
 def _undisturbed(loop: ClosedLoop, certificate: Certificate, bounded: bool = False) -> ClosedLoop:
-    """Return the loop as the claims assume it, with a torque that is renewed so often that it counts as continuous; bounded:
-    its wheels, if any, keep their limits."""
+    """Return the loop as the claims assume it, with a torque updated so often that it counts as continuous; bounded: its
+    wheels, if any, keep their limits."""
     sampled = certificate.claim("sampling")
     longest = None if sampled is None else sampled.numbers["longest"]
     if longest is None:
-        # The loop's own period may be one that the linear loop is unstable with.
+        # The linear loop may be unstable with the loop's own period.
         longest = stable_period(loop)
     period = loop.period if longest is None else min(loop.period, longest / 400.0)
     wheels = loop.find("wheels")
@@ -297,7 +298,7 @@ def _undisturbed(loop: ClosedLoop, certificate: Certificate, bounded: bool = Fal
 def _paced(
     loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator
 ) -> tuple[ClosedLoop, Array]:
-    """Return the loop with a period in which no flight turns far, and the states with the momenta of their rotors."""
+    """Return the loop with a period in which no flight rotates far, and the states with the momenta of their rotors."""
     fastest = float(np.linalg.norm(states[ROWS.rate], axis=0).max())
     if loop.wheels is not None:
         states = np.vstack([states, _rotors(loop, certificate, states, random)])
@@ -325,16 +326,16 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
 
 
 def _value(loop: ClosedLoop, programs: Any) -> Height:
-    """Return V of the states as the law is shown them."""
+    """Return V of the states as the law measures them."""
     return lambda states: value_of(programs, loop, shown_at(loop, unflatten(list(states[: ROWS.torque.stop]), loop.start)))
 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
-    """Return the largest torque, or of wheels torque and momentum, as a share of what is claimed."""
+    """Return the largest torque, or for wheels torque and momentum, as a share of the claimed bound."""
     torque = states[ROWS.torque]
     if loop.wheels is not None:
         needs = (("motors", np.array(loop.wheels.least) @ torque), ("wheel_momentum", states[ROWS.torque.stop :]))
-        # What a lost wheel is claimed to need is zero, and it needs that. What has no limit is not claimed.
+        # A lost wheel is claimed to need zero, and does. Where there is no limit, nothing is claimed.
         limits = [np.array([np.inf if x is None else x for x in claim.numbers.get(name, [None])]) for name, _ in needs]
         shares = [
             np.abs(found).max(axis=1) / np.maximum(most, 1e-300) for (_, found), most in zip(needs, limits, strict=True)

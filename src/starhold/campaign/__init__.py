@@ -9,7 +9,7 @@ from typing import Any
 
 class _Flying(ModuleType):
     def __call__(self, *args: Any, **keywords: Any) -> Any:
-        # The interface is above all layers; it alone is asked for by this name.
+        # The interface is above all layers; only the function is looked up by this name.
         return import_module("starhold.api").campaign(*args, **keywords)
 
 

@@ -18,12 +18,12 @@ from starhold.studies.compare import fly_law
 from starhold.studies.flight import Flight
 
 WORDS = ("name", "description", "type", "campaign")
-"""Keys whose texts name no file."""
+"""Keys whose texts never name a file."""
 
 
 class FlownAgain(NamedTuple):
-    """A run of a campaign, flown again: its scenario, its flight, and the columns whose bits differ from those that the
-    campaign holds, as another machine may compute them."""
+    """A run of a campaign, flown again: its scenario, its flight, and the columns whose bits differ from those of the
+    campaign, as they may on another machine."""
 
     scenario: Scenario
     flight: Flight
@@ -31,7 +31,7 @@ class FlownAgain(NamedTuple):
 
 
 def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
-    """Fly one run of a campaign again, by its own scenario, and record it. InputError where there is no such run."""
+    """Fly one run of a campaign again from its own scenario, and record it. InputError where there is no such run."""
     store = Store.open(folder)
     manifest = store.manifest
     name = manifest.laws[0] if law is None else law
@@ -42,7 +42,7 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
     now_there, then = hashes(manifest.text, str(folder), where), manifest.settings.get("files", {})
     for file in sorted({*now_there} & {*then}):
         if now_there[file] != then[file]:
-            raise InputError(str(where / file), "", "a file that was changed since the campaign", "the file that was flown")
+            raise InputError(str(where / file), "", "a file changed since the campaign", "the file that was flown")
     job = _job_of(Source(manifest.text, str(folder), where, manifest.allow_unstable))
     with ThreadPool(1) as pool:
         now = job(name, run, 1, pool)().rows
@@ -63,7 +63,7 @@ def _equal(a: Any, b: Any) -> bool:
 
 
 def hashes(text: str, where: str, folder: Path) -> dict[str, str]:
-    """SHA-256 of the files that a scenario's text names, as modules or as tables of numbers."""
+    """Return SHA-256 of the files that a scenario's text names as modules or as tables of numbers."""
     digests: dict[str, str] = {}
 
     def look(value: Any) -> None:

@@ -1,4 +1,4 @@
-"""Flies a campaign into a folder, or goes on with one."""
+"""Flies a campaign into a folder, or resumes one."""
 
 import hashlib
 import os
@@ -29,11 +29,11 @@ from starhold.scenario.checking import show
 from starhold.scenario.reading import Scenario
 
 CHUNK, SMALL = 16384, 512
-"""Runs of a block: where many runs' numbers are made at once, and where each is made by itself."""
+"""The number of runs in a block: where the numbers of many runs are computed at once, and where each run's by themselves."""
 LOOK = 1024
-"""Runs after which a campaign that ends when all is decided is looked at."""
+"""The numbers of runs at which the interim analyses of a sequential campaign are taken."""
 
-NO_TABLE = "one with [campaign.over] that says what is drawn, or a number of runs that differ by their noise alone"
+NO_TABLE = "a table with [campaign.over] for what is drawn, or a number of runs that differ in their noise alone"
 Notice = Callable[[str, int], None]
 """Called with a law and how many more of its runs were flown."""
 
@@ -47,13 +47,13 @@ class Options:
     force: bool = False
     until_decided: bool = False
     search: bool = True
-    """Whether the worst of what is required is looked for over the box of the dispersions."""
+    """Whether the worst cases of required metrics are sought over the box of the dispersions."""
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with other entries of its [campaign] table, or with such a table, and with other [[requirement]] tables,
-    whose method is "campaign" if they tell none; None leaves an entry as it is.
-    InputError where there is no such table and the entries lack distributions or the number of runs."""
+    """Return the scenario with other entries in its [campaign] table, or with such a table, and with other [[requirement]]
+    tables, whose method is "campaign" by default; None leaves an entry as it is. InputError where there is no such table and
+    the entries lack distributions or the number of runs."""
     given = {key: value for key, value in changes.items() if value is not None}
     if scenario.table.campaign is None and not given.keys() & {"runs", "over"}:
         raise InputError(scenario.where, "campaign", "no [campaign] table", NO_TABLE)
@@ -66,12 +66,12 @@ def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
 
 def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
-    """The job of a campaign. InputError for any mistake in it, before anything is flown."""
+    """Make the job of a campaign. InputError for any mistake in it, before anything is flown."""
     table = scenario.table.campaign
     job = Job(Source.of(scenario), table)
     reached: set[str] = set()
     for number, law in enumerate(laws):
-        # Names of columns hold those of laws, and SQL does not tell case apart.
+        # Names of columns contain those of laws, and SQL ignores case.
         if law.casefold() in {other.casefold() for other in laws[:number]}:
             raise InputError(scenario.where, "law", show(law), "names that differ by more than case")
         job.requirements(law)
@@ -89,10 +89,10 @@ def begin(scenario: Scenario, laws: Sequence[str]) -> Job:
 def fly_campaign(
     scenario: Scenario, folder: Path, law: str | None = None, options: Options = Options(), notice: Notice | None = None
 ) -> CampaignResult:
-    """Fly the campaign of a scenario's [campaign] table into a folder, for one law or all, and say what it comes to.
-
-    InputError for whatever is wrong with it, and where something stands in its way: what was flown until then is kept, and
-    `resume` goes on from there. The results are the same for any engine and any chunk."""
+    """Fly the campaign of a scenario's [campaign] table into a folder, for one law or all, and return its result. InputError
+    for any mistake in it, and where flying fails: what was flown until then is kept, and `resume` continues from there. The
+    results are the same for any engine and any chunk.
+    """
     laws = tuple(entry.name for entry in scenario.laws) if law is None else (scenario.pick(law).name,)
     job = begin(scenario, laws)
     table, engine = job.table, options.engine or Threads(os.cpu_count() or 1)
@@ -115,7 +115,7 @@ def fly_campaign(
     resuming = options.resume and (folder / FILE).exists()
     with ExitStack() as stack:
         begin_flying = flying(job, engine, -(-table.runs // manifest.chunk) * len(laws))
-        # Before anything is written or removed: workers that cannot be had leave everything as it is.
+        # Before anything is written or removed, so that everything stays as it is if workers are not available.
         fly = None if resuming else stack.enter_context(begin_flying)
         store = Store.open(folder).resume(manifest) if resuming else Store.create(folder, manifest, options.force)
         missing = [block for name in laws for block in store.missing(name)]
@@ -162,8 +162,8 @@ def fly_campaign(
 
 
 def _fly_until_decided(store: Store, job: Job, take: Callable[[Sequence[Block]], None]) -> int:
-    """Fly on until every requirement of every law is decided, and return the number of runs. Looks are taken at numbers of
-    runs that depend on nothing, so that every engine ends at the same one."""
+    """Fly on until every requirement of every law is decided, and return the number of runs. Interim analyses are taken at
+    numbers of runs fixed beforehand, so that every engine stops at the same one."""
     most, flown = job.table.runs, 0
     while flown < most:
         flown = min(most, max(flown + LOOK, -(-flown * 5 // (4 * LOOK)) * LOOK))
@@ -181,9 +181,7 @@ def _check_decidable(job: Job) -> None:
         raise InputError(where, "requirement", "none of a campaign", "at least one, to fly until it is decided")
     if job.table.sampling != "random":
         given = show(job.table.sampling)
-        raise InputError(
-            where, "campaign.sampling", given, '"random", for only independent runs can be stopped by what they show'
-        )
+        raise InputError(where, "campaign.sampling", given, '"random", because only independent runs allow an early stop')
 
 
 def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int]]:
@@ -196,7 +194,7 @@ def _blocks(store: Store, notice: Notice | None) -> Iterator[tuple[str, int, int
 
 
 def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
-    """Runs of a block: enough blocks that each worker has a few, and no more runs than memory has room for."""
+    """Return the number of runs in a block: each worker gets a few blocks, and each block fits into memory."""
     most = CHUNK if at_once else SMALL
     if isinstance(engine, Workers):
         most = min(most, -(-runs // (4 * engine.count)))
@@ -204,7 +202,7 @@ def _chunk(runs: int, engine: Engine, at_once: bool) -> int:
 
 
 def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
-    """A dispersion as the file has it, in one line."""
+    """Write a dispersion as in the file, in one line."""
     given = table.over[dispersion.places[0].table]
     options = {"judged_apart": "known before flight", "known_to_law": "known to the law"}
     numbers = given.model_dump(exclude_defaults=True, exclude={"distribution", *options})
@@ -218,9 +216,9 @@ def in_words(dispersion: Dispersion, table: CampaignTable) -> str:
 
 
 def digest(store: Store, runs: int | None = None) -> str:
-    """SHA-256, in hexadecimal, of the results: law by law in the manifest's order, column by column in the order of names,
-    run by run; numbers as little-endian bytes, text as lengths and UTF-8; then counts and extremes. runs: the number of runs
-    of each law, where fewer than planned are flown. InputError where a chunk is missing or one too many is stored."""
+    """Return SHA-256, in hexadecimal, of the results: law by law in the manifest's order, column by column in the order of
+    names, run by run; numbers as little-endian bytes, text as lengths and UTF-8; then counts and extremes. runs: the number
+    of runs of each law, where fewer than planned are flown. InputError where a chunk is missing or superfluous."""
     wanted = store.manifest.runs if runs is None else runs
     whole = hashlib.sha256(b"starhold campaign 1\n")
     for law in store.manifest.laws:
@@ -228,7 +226,7 @@ def digest(store: Store, runs: int | None = None) -> str:
         for file in store.files(law):
             covered = file.last + 1 if file.first == covered else -1
         if covered != wanted:
-            allowed = "all of them; --resume flies what is missing"
+            allowed = "all of them; --resume flies the missing ones"
             raise InputError(str(store.folder), "", f"not {wanted} runs of {law}", allowed)
         for part in chain([_named(law, np.array(wanted))], _columns(store, law), _envelopes(store, law)):
             whole.update(part)
@@ -247,7 +245,7 @@ def _envelopes(store: Store, law: str) -> Iterator[bytes]:
 
 
 def _named(name: str, values: NDArray[Any]) -> bytes:
-    """An array with its name, type and shape, so that no two different results give the same bytes."""
+    """Encode an array with its name, type and shape, so that different results never give the same bytes."""
     kind = values.dtype.kind
     if kind in "OU":
         kind = "text"

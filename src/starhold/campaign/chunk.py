@@ -1,4 +1,4 @@
-"""A chunk is a block of consecutive runs of one law: a row of numbers a run, and what adds up over runs."""
+"""A chunk is a block of consecutive runs of one law: a row of numbers for each run, and totals over the runs."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Counts: TypeAlias = dict[str, NDArray[np.int64]]
 Extremes: TypeAlias = dict[str, NDArray[np.float64]]
 LEAST, MOST = ".least", ".most"
-"""How names of extremes end: of those merged by the minimum, and of those merged by the maximum."""
+"""The suffixes of the names of extremes merged by the minimum, and of those merged by the maximum."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Chunk:
         if numbers is None or not np.array_equal(numbers, np.arange(self.first, self.first + len(numbers))):
             raise ValueError(f"a chunk's column 'run' must hold its runs in order, from {self.first}")
         if wrong := [name for name, values in self.rows.items() if values.shape != numbers.shape]:
-            raise ValueError(f"columns of other lengths than 'run': {', '.join(wrong)}")
+            raise ValueError(f"columns that differ in length from 'run': {', '.join(wrong)}")
         if wrong := [name for name in self.extremes if not name.endswith((LEAST, MOST))]:
-            raise ValueError(f"extremes that end neither in {LEAST} nor in {MOST}: {', '.join(wrong)}")
+            raise ValueError(f"names of extremes that end neither in {LEAST} nor in {MOST}: {', '.join(wrong)}")
 
     @property
     def count(self) -> int:
@@ -44,9 +44,9 @@ class Chunk:
 
 
 def merge(parts: Iterable[tuple[Counts, Extremes]]) -> tuple[Counts, Extremes]:
-    """The counts and extremes of several chunks as one: the same bits for any order and grouping of the parts.
-
-    Raises ValueError where two parts have different names or shapes."""
+    """Merge the counts and extremes of several chunks, with the same bits for any order and grouping of the parts.
+    ValueError where two parts have different names or shapes.
+    """
     counts: Counts = {}
     extremes: Extremes = {}
     for number, (more, others) in enumerate(parts):
@@ -65,7 +65,8 @@ def merge(parts: Iterable[tuple[Counts, Extremes]]) -> tuple[Counts, Extremes]:
 
 
 def _plain(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values with one NaN and one zero: which of several NaNs, or of 0 and -0, a minimum returns depends on the order."""
+    """Return values with one kind of NaN and of zero: which of several NaNs, or of 0 and -0, a minimum returns depends on
+    the order."""
     return np.where(np.isnan(values), np.nan, values + 0.0)
 
 

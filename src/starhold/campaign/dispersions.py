@@ -1,5 +1,4 @@
-"""Dispersions: the keys of a scenario that runs of a campaign differ in, with the distributions that their values are drawn
-from."""
+"""Dispersions: the keys of a scenario that differ between runs of a campaign, with the distributions of their values."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,26 +17,26 @@ from starhold.scenario.values import Place, locate
 
 @dataclass(frozen=True)
 class Dispersion:
-    """A distribution, and the key or the several keys whose values are drawn from it."""
+    """A distribution, and the key or keys whose values are drawn from it."""
 
     keys: tuple[str, ...]
     columns: tuple[str, ...]
-    """The names of the numbers that are drawn: a key, with its component from 1, "initial.rate[2]", or its row and column;
-    of a symmetric matrix those on and above the diagonal."""
+    """The names of the drawn numbers: a key, with its component from 1, "initial.rate[2]", or its row and column; for a
+    symmetric matrix those on and above the diagonal."""
     shape: tuple[int, ...]
     """The key has this shape: () a number or a word, (n,) a vector or a diagonal, (n, n) a matrix. Several keys hold a
     number each."""
     distribution: Distribution
     places: tuple[Place, ...]
-    """Each key is found there, with its bounds."""
+    """The place of each key, with its bounds."""
     scale: Numbers | None = None
-    """Numbers drawn as shares are shares of these, one for each column; None where they are no shares."""
+    """Numbers drawn as shares are shares of these, one for each column; None for absolute numbers."""
     nominal_tables: Mapping[str, Any] = field(default_factory=dict[str, Any])
-    """The tables that stand in [nominal] beside the values, as laws are to take the file's own for true."""
+    """The tables that go into [nominal], because laws assume the values of the file."""
 
     @property
     def dims(self) -> int:
-        """Uniforms that a draw takes."""
+        """The number of uniforms that a draw uses."""
         return self.distribution.dims
 
     @property
@@ -47,21 +46,21 @@ class Dispersion:
 
     @property
     def known(self) -> bool:
-        """Laws know the drawn values where this is true; else they suppose the nominal ones."""
+        """Whether laws know the drawn values; else they assume the nominal ones."""
         return self.distribution.known_to_law or not self.nominal_tables
 
     @property
     def wordy(self) -> bool:
-        """Whether a word is drawn, or a truth by its word."""
+        """Whether a text is drawn, or a boolean by its name."""
         return self.places[0].wordy
 
     def draw(self, u: Array) -> NDArray[Any]:
-        """Values (columns, n), numbers or words, for uniforms u (dims, n) strictly between 0 and 1. InputError where a key
-        refuses a number."""
+        """Values (columns, n), numbers or words, for uniforms u (dims, n) strictly between 0 and 1. InputError where a
+        number is outside a key's bounds."""
         drawn = self._drawn(u)
         if self.wordy or not drawn.size:
             return drawn
-        # Numbers beyond the bounds of a key are no craft's: a distribution that has them is no model of it.
+        # No craft has numbers beyond the bounds of a key: a distribution that contains them does not model it.
         for place, numbers in zip(self.places, np.split(drawn, len(self.places)), strict=True):
             for extreme in (float(numbers.min()), float(numbers.max())):
                 try:
@@ -72,12 +71,12 @@ class Dispersion:
         return drawn
 
     def _drawn(self, u: Array) -> NDArray[Any]:
-        # Contiguous, so that the same machine code computes every cut of the same numbers.
+        # Contiguous, so that the same machine code computes any slice of the same numbers.
         values = self.distribution.draw(np.ascontiguousarray(u, dtype=np.float64))
         return values if self.scale is None else np.array(self.scale)[:, None] * values
 
     def possible(self, u: Array) -> NDArray[np.bool_]:
-        """Which of the draws (n,) for uniforms u (dims, n) the keys take, judged by the bounds of each number alone."""
+        """Return which of the draws (n,) for uniforms u (dims, n) lie within the bounds of their keys, number by number."""
         kept = np.ones(u.shape[1], dtype=bool)
         if self.wordy:
             return kept
@@ -89,7 +88,7 @@ class Dispersion:
         return kept
 
     def arrays(self, columns: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-        """The values by key, each (n, *shape), of columns (n,): the whole of symmetric matrices."""
+        """Return the values by key, each (n, *shape), from columns (n,), with symmetric matrices complete."""
         if not self.shape:
             return {key: np.asarray(columns[key]) for key in self.keys}
         array = np.empty((len(columns[self.columns[0]]), *self.shape))
@@ -103,7 +102,7 @@ class Dispersion:
         return len(self.columns) < math.prod(self.shape)
 
     def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The change that gives the keys the values of one run, by column, for `Scenario.with_`."""
+        """Return the changes for `Scenario.with_` that give the keys the values of one run, by column."""
         arrays = self.arrays({name: np.asarray([values[name]]) for name in self.columns})
         changes: dict[str, Any] = {}
         for place in self.places:
@@ -113,14 +112,14 @@ class Dispersion:
 
 
 def _plain(place: Place, value: Any) -> Any:
-    """The value that a file holds in place of a drawn one."""
+    """Return a drawn value as a file would hold it."""
     if place.gain is None and isinstance(place.value, bool):
         return value == "true"
     return int(value) if place.whole else value
 
 
 def read_dispersions(scenario: Scenario, over: Mapping[str, Distribution]) -> tuple[Dispersion, ...]:
-    """The dispersions of a scenario's keys, from the tables of [campaign.over]. InputError for a table that makes none."""
+    """Make the dispersions of a scenario's keys from the tables of [campaign.over]. InputError for a bad table."""
     dispersions: list[Dispersion] = []
     taken: list[Place] = []
     for keys, table in over.items():
@@ -128,14 +127,14 @@ def read_dispersions(scenario: Scenario, over: Mapping[str, Distribution]) -> tu
         for place in places:
             same = next((other for other in taken if _overlap(place, other)), None)
             if same is not None:
-                raise place.refuse("", f"a second dispersion of {place.key}", f"one; there is that of {same.table}")
+                raise place.refuse("", f"a second dispersion of {place.key}", f"only one; another is {same.table}")
             taken.append(place)
         dispersions.append(_read(scenario, places, table))
     return tuple(dispersions)
 
 
 def _overlap(one: Place, other: Place) -> bool:
-    """Whether two keys are the same, or one is a component of the other, or takes the other away."""
+    """Return whether two keys are the same, or one is a component of the other or removes it."""
     size = min(len(one.path), len(other.path))
     return one.path[:size] == other.path[:size] or one.displaced == other.key or other.displaced == one.key
 
@@ -158,8 +157,8 @@ def _read(scenario: Scenario, places: list[Place], table: Any) -> Dispersion:
 
 
 def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
-    """The raw tables for [nominal]: those that laws take the craft's numbers from, or are designed with, whose drawn values
-    laws are not told. InputError where `known_to_law` claims what laws cannot know, or denies what they always do."""
+    """Return the raw tables for [nominal]: those that laws read or are designed with, whose drawn values laws do not know.
+    InputError where `known_to_law` claims what laws cannot know, or denies what they always know."""
     scenario, table = readings[0].scenario, readings[0].table
     tables, body = read_toml(scenario.text, scenario.where), scenario.hooks
     nominal: dict[str, Any] = {}
@@ -169,13 +168,17 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
         modelled = name in body.modelled or (name in body.designed and _designs(tables) and key not in scenario.table.shared)
         computed = name == "part" and scenario.parts[int(path[1])].part.is_known(str(path[2]))
         if computed and not table.known_to_law:
-            raise reading.place.refuse("known_to_law", "false", "true, for commands of laws are computed with this number")
+            raise reading.place.refuse("known_to_law", "false", "true, because laws compute their commands with this number")
         if name == "fault" and table.known_to_law:
-            raise reading.place.refuse("known_to_law", "true", "false, for the action on a fault says what laws learn of it")
+            raise reading.place.refuse(
+                "known_to_law", "true", "false, because the action on a fault says what laws learn about it"
+            )
         if name == body.marker and not modelled and not table.known_to_law:
-            raise reading.place.refuse("known_to_law", "false", "true, for laws of this body know the numbers of this table")
+            raise reading.place.refuse(
+                "known_to_law", "false", "true, because laws of this body know the numbers of this table"
+            )
         if table.known_to_law and not modelled and not computed and name != body.marker:
-            raise reading.place.refuse("known_to_law", "true", "false, for no law is told it or designed with it")
+            raise reading.place.refuse("known_to_law", "true", "false, because no law receives it or is designed with it")
         given = scenario.table.nominal
         if modelled and (name in given or not table.known_to_law):
             nominal[name] = given.get(name, tables.get(name, {}))
@@ -183,5 +186,5 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
 
 
 def _designs(tables: Mapping[str, Any]) -> bool:
-    """Whether a law, or that of a mode, has a design form."""
+    """Return whether a law, or a law of one of its modes, has a design form."""
     return any("form" in one for law in tables["law"] for one in (law, *law.get("mode", ())))

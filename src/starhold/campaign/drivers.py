@@ -1,24 +1,23 @@
-"""Which inputs, alone or two together, make runs fail and move their metrics; lost runs are welcome.
+"""Finds which inputs, alone or in pairs, make runs fail and drive their metrics; lost runs count too.
 
-Every test asks only for ranks or counts, so nothing is assumed about distributions, and a run without a metric merely has
-no say about that metric:
+Every test uses only ranks or counts, so nothing is assumed about distributions, and a run without a metric is simply left
+out for that metric:
 
 * an input and a metric: Spearman's rank correlation; of a choice between words the correlation ratio of the ranks
   (Kruskal and Wallis, 1952), which for two words is the same up to its sign;
-* an input and failure: how failed and passed runs differ in it, by Kolmogorov and Smirnov's distance and by Mann and
+* an input and failure: the difference of failed and passed runs in it, by Kolmogorov and Smirnov's distance and by Mann and
   Whitney's statistic as the probability that a failed run has the greater value (the area under the ROC curve); of a choice
   between words the total variation distance, with the likelihood ratio (G) test;
-* two inputs and failure: whether they fail a run *together*, beyond what each does by itself. Two causes that act
-  independently are survived independently, so the probability to pass is a product, 1 - p(x, y) = A(x) B(y) (the noisy-or
-  of J. Pearl, "Probabilistic reasoning in intelligent systems", 1988; for rare failures the additive risks of K. J.
-  Rothman, Am. J. Epidemiol. 99, 1974). The product is fitted to the failures on a grid of quantile bins by maximum
-  likelihood, and the likelihood ratio against a probability for each cell says how badly it fits. A cause by itself, or two
-  that do not know of each other, fit exactly, whatever their shape; failure where both are high does not, nor where just
-  one of them is.
+* two inputs and failure: whether they fail a run *together*, beyond what each does by itself. Runs survive two independent
+  causes independently, so the probability of passing is a product, 1 - p(x, y) = A(x) B(y) (the noisy-or of J. Pearl,
+  "Probabilistic reasoning in intelligent systems", 1988; for rare failures the additive risks of K. J. Rothman, Am. J.
+  Epidemiol. 99, 1974). The product is fitted to the failures on a grid of quantile bins by maximum likelihood, and the
+  likelihood ratio against a probability for each cell measures the misfit. A single cause, or two independent ones, fit
+  exactly, whatever their shape; failure only where both are high, or only where just one is, does not.
 
-All p-values are corrected together (S. Holm, Scand. J. Statist. 6, 1979): among all that was looked at, something is wrongly
+All p-values are corrected together (S. Holm, Scand. J. Statist. 6, 1979): among all that was tested, anything is wrongly
 called significant with probability `RISK` at most, for inputs that are drawn independently. Where two inputs were drawn
-together, each shows what the other does; such pairs are marked.
+together, each shows the effects of the other; such pairs are marked.
 """
 
 import math
@@ -32,11 +31,11 @@ from numpy.typing import NDArray
 from scipy import special
 
 ALMOST = 0.9
-"""A bin has at least this part of the share asked for; runs do not divide evenly."""
+"""A bin has at least this part of the requested share, because runs do not divide evenly."""
 
 
 class Column:
-    """An input: the order of its values, and for each value the number of the group of equal values it is in."""
+    """An input: the order of its values, and for each value the index of its group of equal values."""
 
     def __init__(self, name: str, values: NDArray) -> None:
         self.name, self.words = name, values.dtype.kind not in "fiub"
@@ -48,7 +47,7 @@ class Column:
         self.empty = bool(np.isnan(self.values).any() or not len(values) or self.values.min() == self.values.max())
         if self.empty:
             return
-        # Half the memory of the usual whole numbers: columns of a million runs are held all at once.
+        # Half the memory of the usual integers: columns of a million runs are in memory at once.
         self.order = np.argsort(self.values).astype(np.int32)
         rising = self.values[self.order]
         self.steps = np.concatenate([[False], rising[1:] != rising[:-1]]).cumsum(dtype=np.int32)
@@ -64,7 +63,7 @@ class Column:
         return ranks[there] - 0.5 * len(rows)
 
     def grid(self, bins: int, least: float) -> tuple[NDArray[np.int32], list[str]]:
-        """Put each run into a bin with about the share `least` of all or more; return numbers of bins and what they hold."""
+        """Put each run into a bin with at least about the share `least` of all; return indices and ranges of bins."""
         ranks = self.ranks(np.ones(len(self.values), bool))
         codes = np.minimum((ranks / len(ranks) + 0.5) * bins, bins - 1).astype(np.int32)
         # Many equal values leave bins uneven: neighbours are joined until each has its share.
@@ -96,19 +95,19 @@ class Column:
 Array: TypeAlias = NDArray[np.float64]
 RISK = 0.05
 LEAST = 5
-"""Failed runs, and passed runs, without which nothing is said about failure; and expected failures in a cell
-of a grid of two numbers."""
+"""The least number of failed runs, and of passed runs, for a statement about failure; and the least expected failures in a
+cell of a pair's grid."""
 BINS = 4
-"""At most as many bins of a number in a pair's grid."""
+"""The most bins of a number in a pair's grid."""
 RAREST = 0.05
-"""Values of a choice that are rarer than this are counted together with others in a pair's grid."""
+"""Values of a choice rarer than this share are counted together in a pair's grid."""
 TOGETHER = 1e-3
-"""Two inputs whose cells' counts are less likely than this, corrected, count as drawn together."""
+"""Two inputs count as drawn together if the corrected p-value of their cells' counts is below this."""
 FEWEST_RUNS = 10
-"""Runs that have a metric, without which nothing is said about it."""
+"""The least number of runs with a metric for a statement about it."""
 ROUNDS = 300
-"""The fit of independent causes takes so many; its likelihood grows in each, and what is missing makes a pair look the
-better by little."""
+"""The rounds of the fit of independent causes; the likelihood grows in each, and stopping early overstates a pair only a
+little."""
 
 
 @dataclass(frozen=True)
@@ -120,14 +119,14 @@ class _Driver:
 
     @property
     def significant(self) -> bool:
-        """Tell whether chance is ruled out as an explanation, given the number of tests."""
+        """Whether chance is ruled out as an explanation, given the number of tests."""
         return self.corrected <= RISK
 
 
 @dataclass(frozen=True)
 class MetricDriver(_Driver):
-    """How an input moves a metric over the `runs` that have it: rank correlation, or correlation ratio for a choice of
-    words."""
+    """How strongly an input drives a metric over the `runs` that have it: rank correlation, or correlation ratio for a
+    choice of words."""
 
     input: str
     metric: str
@@ -165,9 +164,9 @@ class PairDriver(_Driver):
 
 @dataclass(frozen=True)
 class Drivers:
-    """Drivers of failures and metrics, the strongest first in each list, everything that was looked at included.
-
-    `skipped` names inputs that are constant or lack values, `remark` says what was left out for too few runs."""
+    """Drivers of failures and metrics, the strongest first in each list, including everything that was tested. `skipped`
+    names inputs that are constant or lack values, `remark` says what was left out because of too few runs.
+    """
 
     runs: int
     failures: int
@@ -179,9 +178,9 @@ class Drivers:
 
 
 def find_drivers(inputs: Mapping[str, NDArray], failed: NDArray[np.bool_], metrics: Mapping[str, NDArray]) -> Drivers:
-    """Find what drives failures and metrics in columns (n,) with a number, or a word, for each run.
-
-    A column a component, for a vector; `failed` (n,) says which runs failed. NaN in a metric: the run does not have it."""
+    """Find what drives failures and metrics in columns (n,) with a number, or a word, for each run, one column for each
+    component of a vector; `failed` (n,) says which runs failed. NaN in a metric: the run does not have it.
+    """
     failed = np.asarray(failed, dtype=bool)
     failures, passed = int(failed.sum()), int((~failed).sum())
     columns = {name: Column(name, np.asarray(values)) for name, values in inputs.items()}
@@ -208,7 +207,7 @@ def find_drivers(inputs: Mapping[str, NDArray], failed: NDArray[np.bool_], metri
 
 
 def _between(column: Column, failed: NDArray[np.bool_]) -> FailureDriver:
-    """Compare failed with passed runs in a column, by two tests, or by one of words; the p-value is not yet corrected."""
+    """Compare failed with passed runs in a column, by two tests, for words by one; the p-value is not yet corrected."""
     total, bad = len(failed), int(failed.sum())
     good = total - bad
     if column.words:
@@ -227,14 +226,14 @@ def _between(column: Column, failed: NDArray[np.bool_]) -> FailureDriver:
     spread = math.sqrt(_product(ranks, ranks) / (total - 1) / (bad * good * total))
     by_distance = float(special.kolmogorov(distance * math.sqrt(bad * good / total)))
     by_order = float(2.0 * special.ndtr(-abs(above - 0.5) / spread))
-    # Either test may have been lucky.
+    # Either test may have succeeded by chance.
     p = min(1.0, 2.0 * by_distance, 2.0 * by_order)
     low_end, high_end = np.quantile(column.values[failed], (0.05, 0.95))
     return FailureDriver(p, p, column.name, distance, above, (float(low_end), float(high_end)))
 
 
 def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[PairDriver]:
-    """Test each two inputs for failing runs together; p-values are not yet corrected."""
+    """Test each pair of inputs for joint failures; p-values are not yet corrected."""
     least = max(RAREST, LEAST / min(failed.sum(), (~failed).sum()))
     grids = [(column.name, *(column.words_grid(least) if column.words else column.grid(bins, least))) for column in used]
     grids = [grid for grid in grids if len(grid[2]) > 1]
@@ -273,8 +272,8 @@ def _pairs(used: list[Column], failed: NDArray[np.bool_], bins: int) -> list[Pai
 
 
 def _misfit(counts: NDArray, expected: Array, axes: tuple[int, ...]) -> Array:
-    """Return how far counts are from those expected, chi-square by chance: the lesser of the likelihood ratio and Pearson's
-    statistic. They agree for many runs; for few, one or the other exaggerates."""
+    """Return the deviation of counts from those expected, chi-square distributed by chance: the lesser of the likelihood
+    ratio and Pearson's statistic. They agree for many runs; for few, one or the other exaggerates."""
     ratio = 2.0 * special.rel_entr(counts, expected).sum(axes)
     deviation = np.divide((counts - expected) ** 2, expected, out=np.zeros_like(expected), where=expected > 0.0)
     return np.minimum(ratio, deviation.sum(axes))
@@ -316,7 +315,7 @@ def _moved(used: list[Column], metrics: Mapping[str, NDArray]) -> list[MetricDri
         there = ~np.isnan(values)
         metric = Column(name, values[there])
         if there.sum() >= FEWEST_RUNS and not metric.empty:
-            # Runs that lack one metric mostly lack others too: inputs are ranked once for all of them.
+            # Runs that lack one metric mostly lack others too, so inputs are ranked once for all of these.
             groups.setdefault(there.tobytes(), []).append((name, metric.ranks(np.ones(len(metric.values), bool))))
     drivers = []
     for mask, ranked in groups.items():
@@ -332,7 +331,7 @@ def _moved(used: list[Column], metrics: Mapping[str, NDArray]) -> list[MetricDri
 
 
 Correlate: TypeAlias = Callable[[Array], tuple[float, float]]
-"""From a metric's ranks (n,), less their mean, to the strength of a dependence and its p-value."""
+"""Computes from a metric's ranks (n,), less their mean, the strength of a dependence and its p-value."""
 
 
 def _rank_correlation(values: Array) -> Correlate | None:
@@ -359,7 +358,7 @@ def _word_correlation(group: NDArray[np.intp]) -> Correlate | None:
 
 
 def _product(one: Array, other: Array) -> float:
-    """Return the inner product; BLAS would wake its threads for it, and add up in an order that depends on their number."""
+    """Return the inner product; BLAS would start threads, and its order of summation depends on their number."""
     return float(np.einsum("i,i", one, other))
 
 
@@ -372,12 +371,12 @@ def _holm(chances: Array) -> Array:
 
 
 def _remark(failures: int, passed: int, bins: int) -> str:
-    """Tell which tests are left out, for too few runs."""
+    """Name the tests that are left out because of too few runs."""
     if failures < LEAST:
-        return f"too few failures to say what drives them: {failures}, where {LEAST} are the least"
+        return f"too few failures to find their drivers: {failures}; at least {LEAST} are needed"
     if passed < LEAST:
-        return f"too few passed runs to tell failed ones from: {passed}, where {LEAST} are the least"
+        return f"too few passed runs to compare failed ones with: {passed}; at least {LEAST} are needed"
     if bins < 2:
         fewer = "failures" if failures < passed else "passed runs"
-        return f"too few {fewer} to say what pairs of inputs do: {min(failures, passed)}, where {4 * LEAST} are the least"
+        return f"too few {fewer} to test pairs of inputs: {min(failures, passed)}; at least {4 * LEAST} are needed"
     return ""

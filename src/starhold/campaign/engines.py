@@ -1,7 +1,6 @@
-"""Where the blocks of a campaign are flown: in this process, in processes of this machine, or on a Dask cluster.
-
-One task is one block of runs, never a single run. Results come back to this process, which alone writes them; a few blocks
-for each worker are under way at once, so that memory stays bounded for any number of runs.
+"""Engines fly the blocks of a campaign in this process, in processes of this machine, or on a Dask cluster. One task is one
+block of runs, never a single run. Results return to this process, which alone writes them; a few blocks for each worker are
+in flight at once, so that memory stays bounded for any number of runs.
 """
 
 from __future__ import annotations
@@ -35,41 +34,42 @@ from starhold.version import __version__
 Block: TypeAlias = tuple[str, int, int]
 """A law, the number of the first run, and the number of runs."""
 _AHEAD = 2
-"""Blocks under way in this process, or for each thread of a worker: one that is flown, and one at hand when it ends."""
+"""The number of blocks in flight in this process, or for each thread of a worker: one being flown, and one ready to follow.
+"""
 _LOOK = 1.0
-"""Seconds between two looks at whether a cluster that returns nothing still lives."""
+"""Seconds between two checks whether a cluster that returns nothing is still alive."""
 _CHECKED = 0.1
-"""The share of the time that may go into flying runs of workers again, beside one of each."""
-_KEPT = "what was flown is kept, --resume goes on from there"
+"""The share of the time that may be spent on checking runs of workers, beyond one run of each."""
+_KEPT = "what was flown is kept, --resume continues from there"
 
 
 class Job(Protocol):
-    """Begins to fly a block, and returns what waits for its results; pickled for engines of other processes, which keep it
-    from block to block."""
+    """Begins to fly a block, and returns a function that waits for its results; pickled for other processes, which keep it
+    between blocks."""
 
     def __call__(self, law: str, first: int, count: int, pool: ThreadPool, /) -> Callable[[], Chunk]: ...
 
 
 @dataclass(frozen=True)
 class Threads:
-    """Blocks one after the other in this process, each by `count` threads; this one makes the next ready and stores the one
-    before meanwhile."""
+    """Flies blocks one after the other in this process, each by `count` threads; meanwhile this thread prepares the next
+    block and stores the previous one."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Workers:
-    """`count` processes of this machine with one thread each, which nobody but this one can talk to."""
+    """`count` processes of this machine with one thread each, which only this process can reach."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Scheduler:
-    """A Dask cluster that runs already, by its scheduler's address such as `tcp://host:8786`.
-
-    patience: seconds to wait for a worker where there is none, at the start and after all were lost."""
+    """An existing Dask cluster, by its scheduler's address such as `tcp://host:8786`. patience: seconds to wait for a worker
+    at the start and after all were lost.
+    """
 
     address: str
     patience: float = 60.0
@@ -84,11 +84,11 @@ Fly: TypeAlias = Callable[[list[Block]], Iterator[Chunk]]
 
 @contextmanager
 def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
-    """Give what flies blocks of a job, `most` at a time or fewer; workers are started or reached before.
-
-    InputError where a job raises one or fails; where workers cannot be started or reached, have other versions of what
-    takes part, or compute other bits; and where all of them, or the scheduler, are lost: what was given is whole then, as
-    it is after KeyboardInterrupt."""
+    """Yield the function that flies blocks of a job, at most `most` at a time, once workers are started or reached.
+    InputError where a job raises one or fails; where workers cannot be started or reached, have other versions of the
+    packages, or compute other bits; and where all of them, or the scheduler, are lost: results returned by then are
+    complete, as they are after KeyboardInterrupt.
+    """
     if isinstance(engine, Threads):
         with ThreadPool(engine.count) as pool:
             yield lambda blocks: _fly_here(job, blocks, pool)
@@ -114,8 +114,8 @@ def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool) -> Iterator[Chunk
 
 
 def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> Iterator[Chunk]:
-    """Blocks whose results are found right. Of the first block of each worker, and of others as long as that takes little
-    time, the first run is flown here again and must give the same bits; else InputError."""
+    """Yield blocks whose results are checked. The first run of each worker's first block, and of further blocks while that
+    takes little time, is flown here again and must give the same bits; else InputError."""
     begun, spent, seen = time.monotonic(), 0.0, set[str]()
     columns: dict[str, dict[str, str]] = {}
     with ThreadPool(1) as pool:
@@ -141,19 +141,19 @@ def _is_chunk(result: Any, law: str, first: int, count: int) -> bool:
     if not isinstance(result, Chunk):
         return False
     try:
-        # What came through a pipe was not made by its class.
+        # An object from a pipe was not constructed by its class.
         return (replace(result).law, result.first, result.count) == (law, first, count)
     except (ValueError, TypeError, AttributeError):
         return False
 
 
 def _kinds(chunk: Chunk) -> dict[str, str]:
-    """Kinds of numbers or words by column."""
+    """Return the type of each column."""
     return {name: values.dtype.kind for name, values in chunk.rows.items()}
 
 
 def _differing(chunk: Chunk, again: Chunk) -> str:
-    """Columns whose first value differs from that of the same run flown here."""
+    """List the columns whose first value differs from that of the same run flown here."""
     if _kinds(chunk) != _kinds(again):
         return "which has other columns"
     pairs = {name: (chunk.rows[name][:1], values[:1]) for name, values in again.rows.items()}
@@ -162,7 +162,7 @@ def _differing(chunk: Chunk, again: Chunk) -> str:
 
 
 def _bits(values: NDArray[Any]) -> Any:
-    """Bytes that must be equal; NaN counts as one value, for machines need not agree on its bits."""
+    """Return the bytes that must be equal; NaN counts as one value, because machines may differ in its bits."""
     if values.dtype.kind == "f":
         values = np.where(np.isnan(values), np.nan, values)
     return values.tolist() if values.dtype.kind in "OU" else values.tobytes()
@@ -170,12 +170,12 @@ def _bits(values: NDArray[Any]) -> Any:
 
 @lru_cache(maxsize=1)
 def _unpacked(packed: bytes) -> Job:
-    """The job, kept between blocks together with what it has compiled."""
+    """Return the job, kept between blocks together with its compiled kernels."""
     return extra("cloudpickle").loads(packed)
 
 
 _Told: TypeAlias = tuple[str, Chunk | InputError]
-"""A worker's name, and what it returns for a block."""
+"""A worker's name, and its result for a block."""
 
 
 def _fly(packed: bytes, version: str, law: str, first: int, count: int) -> _Told:
@@ -205,14 +205,14 @@ def _in_a_line(error: BaseException) -> str:
 
 @dataclass(frozen=True)
 class _Cluster:
-    """A client of a cluster, and how errors call the cluster."""
+    """A client of a cluster, and the cluster's name in errors."""
 
     client: Any
     name: str
     patience: float
 
     def fly(self, packed: bytes, blocks: list[Block]) -> Iterator[tuple[Block, _Told]]:
-        """Blocks of a pickled job with their results as they arrive."""
+        """Yield blocks of a pickled job with their results as they arrive."""
         distributed = extra("distributed")
         waiting, under_way = iter(blocks), dict[Any, Block]()
         done: SimpleQueue[Any] = SimpleQueue()
@@ -229,12 +229,12 @@ class _Cluster:
                 yield under_way.pop(future), self._result(future, distributed)
                 future.release()
         finally:
-            # Whoever leaves early wants none of these any more.
+            # If the caller leaves early, these are no longer needed.
             for future in under_way:
                 future.release()
 
     def _threads(self) -> int:
-        """How many blocks the cluster flies at once at this moment."""
+        """Return how many blocks the cluster flies at once at this moment."""
         if self.client.status != "running":
             raise self._lost("the scheduler does not answer")
         try:
@@ -243,7 +243,7 @@ class _Cluster:
             raise self._lost("the scheduler does not answer") from None
 
     def _next(self, done: SimpleQueue[Any]) -> Any:
-        """A task that has ended; InputError once no worker is left to end one."""
+        """Return a task that has ended; InputError once no worker is left."""
         alone = 0.0
         while True:
             try:
@@ -252,14 +252,15 @@ class _Cluster:
                 alone = self._still_alone(alone)
 
     def _still_alone(self, alone: float) -> float:
-        """Seconds without any worker, counted on by one more look; InputError once there were enough."""
+        """Return the seconds without any worker after one more check; InputError once they exceed the patience."""
         alone = alone + _LOOK if self._threads() == 0 else 0.0
         if alone >= self.patience:
             raise self._lost(f"no worker for {self.patience:g} s")
         return alone
 
     def _result(self, future: Any, distributed: Any) -> _Told:
-        """The result of a task that has ended; it is flown again where its worker was lost before the result was fetched."""
+        """Return the result of a task that has ended; it is flown again if its worker was lost before the result was
+        fetched."""
         alone = 0.0
         try:
             while True:
@@ -282,7 +283,7 @@ class _Cluster:
 
 @contextmanager
 def _existing(engine: Scheduler) -> Generator[_Cluster]:
-    """A cluster that lives on after the block; InputError where it is out of reach, or of other versions."""
+    """Connect to a cluster that outlives this context; InputError where it cannot be reached or has other versions."""
     distributed = extra("distributed")
     with _quiet():
         failure = ""
@@ -292,7 +293,8 @@ def _existing(engine: Scheduler) -> Generator[_Cluster]:
             failure, client = f"{error}".partition("\n")[0] or type(error).__name__, None
             error.__traceback__ = None
         if client is None:
-            # What did not start ends as it is collected: now, for during the start of another both would wait for ever.
+            # A client that did not start closes when it is collected: now, because during the start of another both would
+            # deadlock.
             gc.collect()
             raise InputError(engine.address, "", "", f"no Dask scheduler answers: {failure}")
         with client:
@@ -302,7 +304,7 @@ def _existing(engine: Scheduler) -> Generator[_Cluster]:
 
 
 def _check_versions(cluster: _Cluster) -> None:
-    """InputError where a machine of the cluster has no starhold, or other versions of what must be the same everywhere."""
+    """Raise InputError where a machine of the cluster lacks starhold, or has other versions of packages that must agree."""
     end = time.monotonic() + cluster.patience
     while cluster._threads() == 0:
         if time.monotonic() > end:
@@ -322,7 +324,7 @@ def _check_versions(cluster: _Cluster) -> None:
 
 
 def _compared(versions: Any) -> dict[str, str]:
-    """Versions that must agree, of what pickles go through; of Python the two numbers on which pickled code depends."""
+    """Return the versions that must agree for pickles; for Python the two numbers on which pickled code depends."""
     packages = versions["packages"]
     python = ".".join(str(packages["python"]).split(".")[:2])
     return {"python": python, "dask": packages["dask"], "distributed": packages["distributed"]}
@@ -330,7 +332,7 @@ def _compared(versions: Any) -> dict[str, str]:
 
 @contextmanager
 def _quiet() -> Generator[None]:
-    """Without Dask's log and warnings, which errors of one line replace, or which are no news."""
+    """Silence Dask's log and warnings; errors of one line replace those that matter."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in ("distributed", "tornado")]
     handlers = {handler for name in ("distributed", *names) for handler in logging.getLogger(name).handlers}
     levels = [(handler, handler.level) for handler in handlers]
@@ -346,8 +348,7 @@ def _quiet() -> Generator[None]:
 
 
 def engine_of(threads: int | None, workers: int | None, scheduler: str | None) -> Engine | None:
-    """The engine that is asked for; None where none is. InputError for more than one, and for less than one thread or
-    process."""
+    """Return the requested engine, or None. InputError for more than one, and for less than one thread or process."""
     options = {"threads": threads, "workers": workers, "scheduler": scheduler}
     given = [name for name, value in options.items() if value is not None]
     if len(given) > 1:

@@ -1,4 +1,4 @@
-"""Envelopes over time: histograms of what was noted in each window, which add up over any blocks of runs."""
+"""Envelopes over time: histograms of the values in each window, which add up over any blocks of runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from starhold.analysis.meter import Array, Window
 FINE = 4
 """Binary digits of the mantissa that number the bins of an octave: sixteen bins."""
 LEAST, OCTAVES = -90, 110
-"""Notes are binned from 2^LEAST on, over so many octaves; what is less or more falls in the end bins."""
+"""Values are binned from 2^LEAST on, over so many octaves; smaller and larger ones go into the end bins."""
 BINS = OCTAVES << FINE
 _SHIFT = 52 - FINE
 _FIRST = (1023 + LEAST) << FINE
@@ -20,10 +20,10 @@ NAME = "envelope"
 
 @dataclass(frozen=True)
 class Envelope:
-    """How a quantity goes over time: in each window that ends at `times` (s), of the largest value in it of each run that
-    was not lost: the least, the 5 % quantile, the median, the 95 % quantile, the largest; all (windows,). The quantiles are
-    read off a histogram and right to within 3 %, of angles beyond 150 degrees to within 15 degrees; the extremes are
-    exact."""
+    """A quantity over time. For each window, which ends at `times` (s), statistics of the largest values in it of all runs
+    that were not lost: the least, the 5 % quantile, the median, the 95 % quantile, the largest; all (windows,). The
+    quantiles are read off a histogram and right to within 3 %, for angles beyond 150 degrees to within 15 degrees; the
+    extremes are exact."""
 
     name: str
     unit: str
@@ -37,7 +37,7 @@ class Envelope:
 
 
 def count(windows: Array) -> tuple[NDArray[np.int64], Array, Array]:
-    """The histogram (windows, quantities, BINS) and the extremes (windows, quantities) of noted numbers, none below zero,
+    """Return the histogram (windows, quantities, BINS) and the extremes (windows, quantities) of nonnegative numbers
     (windows, quantities, lanes)."""
     shape = windows.shape[:2]
     counts = np.zeros((*shape, BINS), dtype=np.int64)
@@ -58,7 +58,8 @@ def edges() -> Array:
 
 
 def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array) -> Array:
-    """A quantile of histograms (..., BINS), by a line through its bin and within the extremes (...); NaN of empty ones."""
+    """Return a quantile of histograms (..., BINS), interpolated linearly in its bin and within the extremes (...); NaN for
+    empty ones."""
     total = counts.sum(axis=-1)
     upto = np.cumsum(counts, axis=-1)
     wanted = share * np.maximum(total - 1, 0)
@@ -68,7 +69,7 @@ def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array)
     sides = edges()
     low, high = np.maximum(sides[place], least), np.minimum(sides[place + 1], most)
     part = ((wanted - before + 0.5) / np.maximum(inside, 1)).clip(0.0, 1.0)
-    # Not from the low end alone, for a bin that holds the infinite has no width.
+    # Not from the low end alone, because a bin that holds infinity has no width.
     values = np.where(low == high, low, low * (1.0 - part) + high * part)
     return np.where(total > 0, np.clip(values, least, most), np.nan)
 
@@ -76,8 +77,8 @@ def quantile(counts: NDArray[np.int64], share: float, least: Array, most: Array)
 def read(
     counts: NDArray[np.int64], least: Array, most: Array, windows: Mapping[str, Window], times: Array
 ) -> tuple[Envelope, ...]:
-    """The envelopes of quantities by name: histograms (windows, quantities, BINS) and extremes (windows, quantities) of
-    what was noted, and the times (s) at which windows end."""
+    """Return the envelopes of quantities by name from histograms (windows, quantities, BINS), extremes (windows, quantities)
+    and the times (s) at which windows end."""
     low, median, high = (quantile(counts, share, least, most) for share in (0.05, 0.5, 0.95))
     envelopes: list[Envelope] = []
     for place, (name, window) in enumerate(windows.items()):

@@ -1,4 +1,4 @@
-"""Flies blocks of runs: draws them, makes their lanes, measures them in the kernel's own pass, and tells their margins."""
+"""Flies blocks of runs: draws them, makes their lanes, measures them in the kernel itself, and computes their margins."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from starhold.studies.requirements import Requirement, cones_of, extras_of, orbi
 
 @dataclass(frozen=True)
 class Source:
-    """A scenario as any process can read it again."""
+    """A scenario in a form that any process can read again."""
 
     text: str
     where: str
@@ -52,7 +52,7 @@ class Source:
 
 @dataclass
 class Job:
-    """Flies the runs of a campaign; small when pickled: each process reads the scenario anew, once."""
+    """Flies the runs of a campaign; small when pickled, because each process reads the scenario once more."""
 
     source: Source
     table: CampaignTable
@@ -66,7 +66,7 @@ class Job:
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario that runs differ from."""
+        """The scenario before dispersions."""
         return self.source.read()
 
     @cached_property
@@ -77,30 +77,30 @@ class Job:
 
     @cached_property
     def required(self) -> Mapping[str, RequirementTable]:
-        """The tables of what runs must keep, by how errors call them."""
+        """The requirements on runs, by their names in errors."""
         return tables_of(self.scenario, "campaign")
 
     @cached_property
     def dispersions(self) -> tuple[Dispersion, ...]:
-        """The keys that runs differ in."""
+        """The keys that differ between runs."""
         return read_dispersions(self.scenario, self.table.over)
 
     def lanes(self, law: str) -> Lanes:
-        """The lanes of a law, made when they are first asked for."""
+        """Return the lanes of a law, made at the first request."""
         if law not in self._lanes:
             self._lanes[law] = Lanes(self.scenario, law, self.plan)
         return self._lanes[law]
 
     def meter(self, law: str) -> Meter:
-        """The meter of a law as the scenario has it, made when it is first asked for. InputError where a metric asked for
-        cannot be measured."""
+        """Return the meter of a law in the scenario, made at the first request. InputError where a requested metric cannot
+        be measured."""
         if law not in self._meters:
             loop = build(self.scenario, self.scenario.pick(law))
             self._meters[law] = self._meter_of(loop, loop.gains)
         return self._meters[law]
 
     def _meter_of(self, loop: ClosedLoop, gains: Any) -> Meter:
-        """The meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
+        """Return the meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
         required = self.required.values()
         extras, cones = extras_of(required, self.table.metrics), cones_of(required)
         key = "requirement" if cones else "campaign.metrics"
@@ -142,7 +142,7 @@ class Job:
         return finish
 
     def _telling(self, law: str) -> Progress | None:
-        """Return the function that reports how many runs of a block are flown, lot after lot."""
+        """Return the function that reports how many runs of a block are flown, lot by lot."""
         if self.progress is None:
             return None
         tell, reported, whole = self.progress, [0], [0]
@@ -168,7 +168,7 @@ class Job:
     ) -> Callable[[], Metrics]:
         """Begin to fly runs of a law; the function returned waits for their metrics and the numbers read back, (lanes,), by
         name. columns: the drawn values; runs: the runs' numbers, which also number their random draws; take: called with
-        metrics and windows of each lot; refused: as `Lanes.lots` takes it, lanes marked there having no numbers."""
+        metrics and windows of each lot; refused: as in `Lanes.lots`; lanes marked there have no numbers."""
         under_way = [
             (at, numbers, self._begin(lot, pool)) for lot, at, numbers in self.lanes(law).lots(columns, runs, refused)
         ]
@@ -185,8 +185,8 @@ class Job:
         return finish
 
     def _begin(self, lot: Lot, pool: ThreadPool) -> Callable[[Progress | None], tuple[Metrics, Any]]:
-        """Begin to fly a lot; the function returned waits for its metrics (lanes,), and for the notes of its windows
-        (windows, quantities, lanes)."""
+        """Begin to fly a lot; the function returned waits for its metrics (lanes,) and the values of its windows (windows,
+        quantities, lanes)."""
         meter = self._meter_of(lot.loop, lot.phases[0].gains)
         lanes, runs = len(lot.runs), lot.runs
         along = bool((np.diff(runs) == 1).all())
@@ -212,7 +212,7 @@ class Job:
 
 
 def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scenario:
-    """The scenario of one run as a file of its own: the drawn values, in columns (1,), in place of the distributions, the
+    """Return the scenario of one run by itself: with the drawn values, in columns (1,), in place of the distributions, the
     number of the run, and no campaign."""
     change = {**job.plan.change({name: values[0] for name, values in columns.items()}), "campaign": None}
     change |= {"requirement": None}

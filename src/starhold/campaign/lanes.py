@@ -1,7 +1,6 @@
-"""From drawn values to the numbers that kernels fly: of many runs at once where that gives the bits of each run's own
-scenario, else run by run.
-
-No list says which numbers of a loop a value moves: scenarios with other values are built, and compared.
+"""Turns drawn values into the numbers that kernels fly: for many runs at once where that gives the bits of each run's own
+scenario, else run by run. Which numbers of a loop a value changes is found by building scenarios with other values and
+comparing them.
 """
 
 import warnings
@@ -31,17 +30,17 @@ Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
 
 TRIES = 64
-"""Runs that are looked at for those whose value differs from the first run's."""
+"""The number of runs searched for one whose value differs from the first run's."""
 PROBES = 4
-"""Runs on which what many runs get is compared, first of all, with what each one gets."""
+"""The number of runs on which numbers made for many runs at once are first compared with each run's own."""
 _FORM = -1
-"""Stands for whatever is no number: the kernel itself."""
+"""Takes the place of all that is not a number: the kernel itself."""
 
 
 @dataclass(frozen=True)
 class Lot:
-    """Lanes that one kernel flies: run numbers (lanes,), a loop of their form, carries (numbers, lanes) and phases with an
-    array (lanes,) in place of each number that differs."""
+    """Lanes that one kernel flies: run numbers (lanes,), a loop of the same form, carries (numbers, lanes) and phases with
+    an array (lanes,) in place of each number that differs."""
 
     runs: NDArray[np.int64]
     loop: ClosedLoop
@@ -50,14 +49,14 @@ class Lot:
 
 
 class Lanes:
-    """The lanes of one law of a scenario under a plan of draws.
-
-    moved: places of the numbers that each dispersion moves among those of a loop; at_once: whether numbers of many runs are
-    made at once; flown: names of the numbers that are read back from what flies."""
+    """The lanes of one law of a scenario under a plan of draws. moved: indices of the loop's numbers that each dispersion
+    changes; at_once: whether numbers of many runs are made at once; flown: names of the numbers that are read back from the
+    loop.
+    """
 
     def __init__(self, scenario: Scenario, law: str, plan: Plan) -> None:
         self.scenario, self.law, self.plan = scenario, law, plan
-        # Of one run nothing else is read.
+        # For one run nothing else is read.
         self._bare = scenario.with_({"campaign": None, "requirement": None})
         self.steps = scenario.table.simulation.steps
         self.first = plan.columns(0, 1)
@@ -66,7 +65,7 @@ class Lanes:
         self.moved: dict[str, set[int]] = {}
         self._varied: list[Flat] = []
         more = plan.columns(0, min(TRIES, plan.runs))
-        # Of few values the first runs may all have the same, which shows nothing of what the others move.
+        # If there are few values, the first runs may all share one, which does not show what the others change.
         probes = {*range(min(plan.runs, PROBES))}
         for dispersion in plan.dispersions:
             others = self._others(dispersion, more)
@@ -77,11 +76,11 @@ class Lanes:
         self.flown = self._read_back()
 
     def exact(self, columns: Columns) -> Flat:
-        """The numbers of one run, from its own scenario; columns: (1,)."""
+        """Return the numbers of one run, from its own scenario; columns: (1,)."""
         return next(self._each(columns, [0]))
 
     def _each(self, columns: Columns, runs: Sequence[int]) -> Iterator[Flat]:
-        """The numbers of each run, one after the other, from its own scenario. InputError tells the run."""
+        """Yield the numbers of each run, from its own scenario. InputError names the run."""
         drawn = ({name: values[place] for name, values in columns.items()} for place in range(len(runs)))
         others = variants(self._bare, (self.plan.change(one) for one in drawn))
         for run in runs:
@@ -96,7 +95,7 @@ class Lanes:
                 raise InputError(where, error.key, error.given, error.allowed) from None
 
     def _tried(self, columns: Columns, place: int, run: int) -> Flat | None:
-        """The numbers of one of these runs; None where its scenario is refused."""
+        """Return the numbers of one of these runs; None where its scenario is refused."""
         try:
             return next(self._each(_one(columns, place), [run]))
         except InputError:
@@ -105,9 +104,9 @@ class Lanes:
     def lots(
         self, columns: Columns, runs: NDArray[np.int64], refused: NDArray[np.bool_] | None = None
     ) -> Iterator[tuple[Lot, NDArray[np.int64], dict[str, Array]]]:
-        """The lanes of runs of these numbers (lanes,), drawn as the columns say, in lots: with the place of each of their
-        lanes among all, and the numbers read back. InputError where a run's scenario is refused; where `refused` (lanes,) is
-        given such lanes are left out, and marked there."""
+        """Yield the lanes of these runs (lanes,), with the draws of the columns, in lots: with the index of each lane among
+        all, and the numbers read back. InputError where a run's scenario is refused; where `refused` (lanes,) is given such
+        lanes are left out and marked there."""
         impossible = self.scenario.hooks.refused(self.scenario, self.moving.by_key(columns))
         if impossible is not None and impossible.any():
             if refused is None:
@@ -118,7 +117,7 @@ class Lanes:
         left = np.arange(len(runs)) if refused is None else np.flatnonzero(~refused)
         if not len(left):
             return
-        # A look at two of them, for what no probe showed.
+        # Two of them are checked for changes that no probe showed.
         looked = left[sorted({0, len(left) // 2})]
         if self.at_once and self._agrees(_some(columns, looked), runs[looked], refused is None):
             lot = self._together(_some(columns, left), runs[left])
@@ -139,19 +138,19 @@ class Lanes:
             yield lot, np.array(places), self._readings(lot)
 
     def moves(self, name: str) -> bool:
-        """Whether a dispersion moves a number of this name, or more than numbers."""
+        """Return whether a dispersion changes a number of this name, or more than numbers."""
         places = set[int]().union(*self.moved.values())
         return _FORM in places or not places.isdisjoint(self.base.places(name))
 
     def _others(self, dispersion: Dispersion, more: Columns) -> list[int]:
-        """Two of the first runs at the most, of which `more` has the columns, in which a value of the dispersion is not that
-        of the very first."""
+        """Return at most two of the first runs, whose columns are in `more`, in which a value of the dispersion differs from
+        the very first."""
         names = dispersion.columns
         return [run for run in range(self.plan.runs)[:TRIES] if any(more[n][run] != self.first[n][0] for n in names)][:2]
 
     def _moved_by(self, dispersion: Dispersion, more: Columns, others: Sequence[int]) -> set[int]:
-        """The places of the numbers that change when the values of one dispersion alone change, as in these other runs;
-        more: columns of the first runs."""
+        """Return the indices of the numbers that change when only the values of one dispersion change, as in these other
+        runs; more: columns of the first runs."""
         names = dispersion.columns
         moved: set[int] = set()
         for run in others:
@@ -162,12 +161,12 @@ class Lanes:
             if flat.names == self.base.names:
                 apart = flat.numbers.view(np.int64) != self.base.numbers.view(np.int64)
                 moved |= set(np.flatnonzero(apart).tolist())
-        # What differs in none of them may differ in another.
+        # A number that differs in none of them may differ in another run.
         return moved if others else {_FORM}
 
     def _agrees(self, columns: Columns, runs: NDArray[np.int64], strict: bool = True) -> bool:
-        """Whether the numbers of these runs, made at once, are those of each one's own scenario. InputError where one is
-        refused; where that is not strict, they do not agree."""
+        """Return whether the numbers of these runs, made at once, are those of each run's own scenario. InputError where one
+        is refused; if not strict, that counts as a difference."""
         lot = self._together(columns, runs)
         if lot is None:
             return False
@@ -178,7 +177,7 @@ class Lanes:
 
     @cached_property
     def _follows(self) -> dict[int, str]:
-        """The columns that numbers are equal to, by the numbers' places, as far as the first run tells."""
+        """Return the columns that numbers are equal to, by the numbers' indices, judged by the first run."""
         followed: dict[int, str] = {}
         for dispersion in self.plan.dispersions:
             for place in self.moved[dispersion.called] - {_FORM}:
@@ -189,20 +188,20 @@ class Lanes:
         return followed
 
     def _together(self, columns: Columns, runs: NDArray[np.int64]) -> Lot | None:
-        """Lanes made at once; None where they cannot be."""
+        """Make lanes at once; None where that is impossible."""
         try:
             return self._made(columns, runs)
         except (ValueError, TypeError, RecordingError):
             return None
 
     def _made(self, columns: Columns, runs: NDArray[np.int64]) -> Lot:
-        """Lanes of numbers that are values, and of those that equations make of values."""
+        """Make lanes from numbers that are values, and from those that equations compute from values."""
         base, every = self.base, set[int]().union(*self.moved.values())
         rows: dict[int, Array] = {place: columns[name].astype(float) for place, name in self._follows.items()}
         like = base.loop.carry()
         carried, moving = len(numbers_of(like)), len(flatten((like.state, like.effectors)))
         numbers = self.moving.numbers(columns)
-        # The carry is not made by the equation where it begins with values themselves, or with a law's memory of them.
+        # The equation does not make the carry where it begins with values themselves, or with a law's memory of them.
         begun = any(place < len(flatten(like.state)) and base.names[place] not in numbers for place in rows)
         for name, row in numbers.items():
             rows |= {place: row for place in base.places(name) if place in every or base.names[place] == name}
@@ -221,14 +220,14 @@ class Lanes:
         return Lot(runs, base.loop, carries, phases)
 
     def _apart(self, flats: Sequence[Flat], runs: NDArray[np.int64]) -> Lot:
-        """Lanes of one form, each made by itself."""
+        """Make lanes of one form one by one."""
         loop, phases = flats[0].loop, stacked([flat.loop.phases(self.steps) for flat in flats])
         carries = np.array([flat.numbers[: len(numbers_of(loop.carry()))] for flat in flats]).T
         return Lot(runs, loop, np.ascontiguousarray(carries), tuple(phases))
 
     def _read_back(self) -> tuple[str, ...]:
-        """The names of numbers that show each dispersion: those that are its values, else all that it moves; where several
-        are always equal, one of them, of the flying craft rather than of the nominal model."""
+        """Return the names of numbers that show each dispersion: those that are its values, else all that it changes; where
+        several are always equal, one of them, preferably of the flying craft and not of the nominal model."""
         kept: list[int] = []
         alike = [flat for flat in self._varied if flat.names == self.base.names]
         for dispersion, places in zip(self.plan.dispersions, self.moved.values(), strict=True):
@@ -243,14 +242,15 @@ class Lanes:
         return tuple(self.base.names[place] for place in sorted(set(kept)))
 
     def _readings(self, lot: Lot) -> dict[str, Array]:
-        """The numbers of a lot that are read back, from the arrays that fly; NaN where its form has no such number."""
+        """Return the numbers of a lot that are read back from the flown arrays; NaN where its form has no such number."""
         numbers = _numbers(lot)
         missing = np.full(len(lot.runs), np.nan)
         return {f"flown.{shown_name(lot.loop, name)}": numbers.get(name, missing) for name in self.flown}
 
 
 def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> tuple[Phase, ...]:
-    """Phases with these rows (lanes,) by the places of the numbers that they replace; the first has the place `begin`."""
+    """Return phases with these rows (lanes,), by the indices of the numbers that they replace; the first has the index
+    `begin`."""
     changed: list[Phase] = []
     place = begin - 1
     before: Any = None
@@ -270,7 +270,7 @@ def _phases(phases: Sequence[Phase], begin: int, rows: Mapping[int, Array]) -> t
 
 
 def _numbers(lot: Lot) -> dict[str, Array]:
-    """The numbers of a lot, each (lanes,), by their names as `Flat` has them."""
+    """Return the numbers of a lot, each (lanes,), by their names in `Flat`."""
     numbers = named_numbers(lot.loop, [*lot.carries], lot.phases)
     return {name: np.broadcast_to(np.asarray(value, dtype=float), (len(lot.runs),)) for name, value in numbers.items()}
 

@@ -1,4 +1,4 @@
-"""A campaign's folder states what the campaign is; two such statements are compared here."""
+"""The manifest in a campaign's folder, which states what is flown, and the comparison of two manifests."""
 
 from __future__ import annotations
 
@@ -21,23 +21,19 @@ FILE = "manifest.json"
 _LONGEST_VALUE = 60
 _MISSING = object()
 _KEYS = {"version": "starhold_version", "settings": "campaign"}
-"""How the file calls fields that it does not call by their names."""
+"""The names in the file of fields whose names differ there."""
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """The statement of what a campaign flies.
-
-    scenario, text: name and whole text of the scenario file.
-    settings: all else that determines results, as a file would hold it: dispersions, requirements, sampling, and the hashes
-        of other files that the scenario reads. Not the number of runs.
-    laws: names of the laws in order; each flies all runs.
-    runs, chunk: numbers of runs, of a law and of a full chunk. Results do not depend on `chunk`.
-    seed: that of the draws.
-    extensible: whether the draws of a run are the same for any number of runs, which Latin hypercubes are not.
-    columns: names of the columns of each law, known once its first chunk is stored.
-    folder, allow_unstable: what file names in the text are relative to, and whether gains known to be unstable are taken;
-        results depend on neither."""
+    """A statement of what a campaign flies. scenario, text: name and whole text of the scenario file. settings: all else
+    that determines results, as in a file: dispersions, requirements, sampling, and the hashes of other files that the
+    scenario reads, but not the number of runs. laws: names of the laws in order; each flies all runs. runs, chunk: numbers
+    of runs, of a law and of a full chunk. Results do not depend on `chunk`. seed: that of the draws. extensible: whether the
+    draws of a run are the same for any number of runs, which Latin hypercubes are not. columns: names of the columns of each
+    law, known once its first chunk is stored. folder, allow_unstable: the folder to which file names in the text are
+    relative, and whether gains known to be unstable are accepted; results depend on neither.
+    """
 
     scenario: str
     text: str
@@ -74,12 +70,12 @@ class Manifest:
 
     @classmethod
     def from_json(cls, text: str, where: str) -> Manifest:
-        """The manifest in a text; InputError where the text is none, or was changed since it was written."""
+        """Read the manifest in a text; InputError where it holds none, or was changed since it was written."""
         try:
             data = json.loads(text)
-            # Whatever bears its seal has the types that were written.
+            # A text with a valid seal has the types that were written.
             if data.pop("seal") != _seal(data) or not isinstance(data["folder"], str):
-                raise InputError(where, "", "a file that was changed by hand", "the file as starhold wrote it")
+                raise InputError(where, "", "a file changed by hand", "the file as starhold wrote it")
             given = {one.name: data[_KEYS.get(one.name, one.name)] for one in fields(cls)}
             columns = {law: tuple(names) for law, names in given["columns"].items()}
             return cls(**given | {"laws": tuple(given["laws"]), "columns": columns})
@@ -87,7 +83,8 @@ class Manifest:
             raise InputError(where, "", "no manifest of a campaign", "the file as starhold wrote it") from None
 
     def difference(self, old: Manifest) -> str | None:
-        """The first difference from an older manifest that changes results, such as `campaign.seed: 2, was 1`; else None."""
+        """Return the first difference from an older manifest that changes results, such as `campaign.seed: 2, was 1`, or
+        None."""
         new, kept = self.determining(), old.determining()
         for key in dict.fromkeys((*new, *kept)):
             if sentence := difference(new.get(key, _MISSING), kept.get(key, _MISSING), key):
@@ -96,7 +93,7 @@ class Manifest:
 
 
 def plain(value: Any) -> Any:
-    """A value in the types that JSON has; numbers that are not finite become text, and so does anything unknown."""
+    """Return a value in the types of JSON; numbers that are not finite become text, as does any unknown type."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in cast(Mapping[Any, Any], value).items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -109,7 +106,7 @@ def plain(value: Any) -> Any:
 
 
 def difference(new: Any, old: Any, key: str) -> str | None:
-    """The first difference of two values of JSON, with the dotted key that leads to it; entries of lists count from 1."""
+    """Return the first difference of two JSON values, with its dotted key; entries of lists count from 1."""
     if isinstance(new, dict) and isinstance(old, dict):
         mine, theirs = cast(dict[str, Any], new), cast(dict[str, Any], old)
         for name in dict.fromkeys((*mine, *theirs)):
@@ -124,7 +121,7 @@ def difference(new: Any, old: Any, key: str) -> str | None:
     mine, theirs = _written(new), _written(old)
     if mine == theirs:
         return None
-    # Of two long values, the parts that differ.
+    # For two long values, only the parts that differ.
     pairs = zip(mine, theirs, strict=False)
     same = next((place for place, (a, b) in enumerate(pairs) if a != b), min(len(mine), len(theirs)))
     if same > _LONGEST_VALUE // 2:
@@ -133,13 +130,13 @@ def difference(new: Any, old: Any, key: str) -> str | None:
 
 
 def _seal(content: Mapping[str, Any]) -> str:
-    """SHA-256, in hexadecimal, of all that a manifest's file says but its folder, for a scenario may be moved."""
+    """Return SHA-256, in hexadecimal, of a manifest's file without its folder, because a scenario may be moved."""
     sealed = {key: value for key, value in content.items() if key != "folder"}
     return hashlib.sha256(json.dumps(sealed, sort_keys=True).encode()).hexdigest()
 
 
 def _tables(text: str) -> dict[str, Any]:
-    """The tables of a scenario's text: what it says without its comments. Lines, where it is not TOML."""
+    """Return the tables of a scenario's text, without its comments; lines, if it is not TOML."""
     try:
         tables = cast(dict[str, Any], plain(tomllib.loads(text)))
     except (ValueError, RecursionError):

@@ -1,5 +1,5 @@
-"""From drawn values to a loop's numbers by one equation, which is recorded once and evaluated for all lanes at once; and
-gains by their law's own formula, lane by lane."""
+"""Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once; gains by
+their law's own formula, lane by lane."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -32,7 +32,7 @@ class Moving:
         self._compiled: tuple[Compiled, list[str]] | None = None
 
     def by_key(self, columns: Columns, known: bool = False) -> dict[str, Array]:
-        """The values that are numbers, (components..., lanes), by key; `known`: only those that laws are told."""
+        """Return the values that are numbers, (components..., lanes), by key; `known`: only those known to laws."""
         return {
             key: np.moveaxis(values, 0, -1)
             for one in self.drawn
@@ -41,8 +41,8 @@ class Moving:
         }
 
     def numbers(self, columns: Columns) -> dict[str, Array]:
-        """The numbers that differ, (lanes,), by their names in a carry or in a phase. ValueError or RecordingError where
-        they follow from no equation."""
+        """Return the numbers that differ, (lanes,), by their names in a carry or a phase. ValueError or RecordingError where
+        no equation gives them."""
         arguments = self._arguments(columns)
         varying = [leaf for leaf in leaves(arguments) if isinstance(leaf, np.ndarray)]
         if not varying:
@@ -51,7 +51,7 @@ class Moving:
         return dict(zip(names, equation.over(np.array(varying)), strict=True))
 
     def _arguments(self, columns: Columns) -> tuple[Any, ...]:
-        """The arguments of the equation: what flies, what laws suppose, and the parameters of parts."""
+        """The arguments of the equation: the flying craft, the nominal model, and the parameters of parts."""
         hooks, every = self.scenario.hooks, self.by_key(columns)
         true = hooks.drawn(self.scenario, every)
         supposed = hooks.drawn(self.scenario.known, self.by_key(columns, known=True))
@@ -79,7 +79,7 @@ class Moving:
         return self._compiled
 
     def _named(self, true: Any, supposed: Any, params: Mapping[str, Any]) -> list[tuple[str, Any]]:
-        """The numbers of the loop with their names: the carry as it begins, and what phases have."""
+        """The numbers of the loop with their names: the initial carry, and the phases."""
         loop = self.base.loop
         moved = self.scenario.hooks.flown(self.scenario, loop, true, supposed)
         parts = tuple(replace(one, params=params[one.name]) if one.name in params else one for one in moved.parts)
@@ -92,8 +92,8 @@ class Moving:
         ]
 
     def gains(self, columns: Columns, nominal: Any) -> dict[str, Array]:
-        """The gains that the law's form gives each lane for the nominal craft, in which arrays (lanes,) stand where lanes
-        differ, by name; none of a law without a form. ValueError where a lane has none."""
+        """Return by name the gains of each lane from the law's form and the nominal craft, which has arrays (lanes,) where
+        lanes differ; none for a law without a form. ValueError where a lane has none."""
         spec, law = self.law.spec, self.law.law
         if self.law.form is None:
             return {}

@@ -1,7 +1,7 @@
 """One chunk as the bytes of one Parquet file: its rows as columns, its counts and extremes beside the schema.
 
-A missing number (NaN) is stored as null, so that every reader of Parquet leaves it out of its averages. Nothing is
-compressed but the counts: results are random in nearly all of their bits.
+A missing number (NaN) is stored as null, so that every reader of Parquet omits it from averages. Only the counts are
+compressed, because results are random in nearly all of their bits.
 """
 
 import json
@@ -37,7 +37,7 @@ def encode(chunk: Chunk, fingerprint: str) -> bytes:
 
 
 def belongs(path: Path, law: str, first: int, count: int, fingerprint: str) -> bool:
-    """Whether a file holds just these runs of this law in the campaign of this fingerprint."""
+    """Return whether a file holds exactly these runs of this law in the campaign of this fingerprint."""
     rows, metadata = extra("pyarrow.parquet").read_metadata(path).num_rows, _metadata(path)
     return (rows, metadata.get(LAW), metadata.get(FIRST), metadata.get(FINGERPRINT)) == (count, law, str(first), fingerprint)
 
@@ -48,7 +48,7 @@ def names(path: Path) -> tuple[str, ...]:
 
 
 def read(path: Path, columns: list[str]) -> dict[str, NDArray[Any]]:
-    """Some of the columns by name, as they were stored; reads nothing of the others."""
+    """Return some of the columns by name, as stored, without reading the others."""
     with extra("pyarrow.parquet").ParquetFile(path) as file:
         table = file.read(columns, use_threads=False)
         return {name: table.column(name).to_numpy() for name in columns}
@@ -80,7 +80,7 @@ def _pack(arrays: dict[str, NDArray[Any]]) -> str:
     shapes: dict[str, tuple[str, list[int]]] = {}
     parts: list[bytes] = []
     for name, values in sorted(arrays.items()):
-        # Counts of a chunk are small numbers: most of their 8 bytes are zeros, which cost time to compress and none to drop.
+        # Counts of a chunk are small: most of their 8 bytes are zeros, which are cheaper to drop than to compress.
         small = values.dtype.kind == "i" and values.min(initial=0) >= 0
         stored = values.astype((np.min_scalar_type(values.max(initial=0)) if small else values.dtype).newbyteorder("<"))
         shapes[name] = (stored.dtype.str, list(values.shape))

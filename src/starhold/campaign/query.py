@@ -1,4 +1,4 @@
-"""Questions in SQL to the rows of a campaign, answered by DuckDB."""
+"""SQL queries on the rows of a campaign, answered by DuckDB."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _CLOSED = {
     "autoload_known_extensions": False,
     "temp_directory": "",
 }
-"""A question reads the view and nothing else: no file, no network, no disk for what does not fit into memory."""
+"""A query reads only the view: no file, no network, no disk to spill to."""
 
 
 def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> DataFrame:
-    """The answer to one SELECT about `runs`: a row for each stored run of each law, with the campaign's columns and `law`.
-
-    Columns that a law does not have are null in its rows, as are numbers that a run does not have. Chunks that are unusable
-    are left out, with a line to `tell`; without it they are an InputError. InputError too for whatever DuckDB refuses."""
+    """Answer one SELECT about `runs`: a row for each stored run of each law, with the campaign's columns and `law`. Columns
+    that a law lacks are null in its rows, as are numbers that a run lacks. Unusable chunks are left out, with a line to
+    `tell`; without it they are an InputError, as is anything that DuckDB refuses.
+    """
     store = Store.open(folder)
     duckdb, dataset = extra("duckdb"), extra("pyarrow.dataset")
     files = {law: [str(file.path) for file in store.files(law)] for law in store.manifest.laws}
@@ -38,7 +38,7 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
     if not flown:
         raise InputError(str(folder), "", "no runs", "a folder with flown runs")
     with duckdb.connect(":memory:", config=_CLOSED) as connection:
-        # Through Arrow, so that DuckDB itself needs no access to files, not even to these, which it could write as well.
+        # Through Arrow, so that DuckDB needs no access to files, not even to these, which it could also write.
         for number, law in enumerate(flown):
             connection.register(f"chunks {number}", dataset.dataset(files[law], format="parquet"))
         quoted = [law.replace("'", "''") for law in flown]
@@ -53,7 +53,7 @@ def query(folder: Path, sql: str, tell: Callable[[str], None] | None = None) -> 
 
 
 def _check(connection: Any, sql: str, duckdb: Any) -> None:
-    """InputError where a text is not one question."""
+    """Raise InputError where a text is not a single query."""
     kinds = [statement.type for statement in connection.extract_statements(sql)]
     if len(kinds) != 1:
         raise InputError("query", "", f"{len(kinds)} statements", "one SELECT")
@@ -62,6 +62,6 @@ def _check(connection: Any, sql: str, duckdb: Any) -> None:
 
 
 def _short(message: str) -> str:
-    """DuckDB's message without the repetition of the question, as one line."""
+    """Return DuckDB's message as one line, without the repeated query."""
     reason = message.partition("\n\nLINE ")[0]
     return "; ".join(line.strip() for line in reason.splitlines() if line.strip())

@@ -28,7 +28,7 @@ QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Quantiles of a metric's distribution: least, 5 %, quarter, median, three quarters, 95 %, largest."""
 
 ROUNDING = 1e-12
-"""Share of a bound by which rounding may carry a flight beyond it."""
+"""The share of a bound by which rounding may take a flight beyond it."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ class Again:
 
 @dataclass(frozen=True)
 class Bracket:
-    """How bad a metric gets: *flown <= true <= proved*, or the other way round where `at_most` is false and less is worse.
-    flown: the worst that the runs and a search over the dispersions' box have flown, with the scenario file of that run
-    (NaN: a run without the metric, which is worse than any number); proved: a bound of the very same quantity in these very
-    flights, with what it rests on; None where nothing is proved of the metric."""
+    """The worst value of a metric: *flown <= true <= proved*, or the reverse where `at_most` is false and less is worse.
+    flown: the worst of the runs and of a search over the dispersions' box, with the scenario file of that run (NaN: a run
+    without the metric, which is worse than any number); proved: a bound of the same quantity for the same flights, with its
+    basis; None where nothing is proved of the metric."""
 
     metric: str
     unit: str
@@ -74,7 +74,7 @@ class Bracket:
 
     @property
     def contradicted(self) -> bool:
-        """Whether a flight is beyond what is proved, by more than rounding: a fault of starhold."""
+        """Whether a flight exceeds the proved bound by more than rounding: a fault of starhold."""
         if self.proved is None:
             return False
         room = ROUNDING * abs(self.proved)
@@ -94,7 +94,7 @@ class LawResult:
     verdicts: tuple[Verdict, ...]
     drivers: Drivers | None
     indices: Mapping[str, Morris | Sobol | Refused] = field(default_factory=dict[str, Any])
-    """Sensitivity of metrics, by their names, where the sampling is for that."""
+    """Sensitivity of metrics, by their names, if the sampling was designed for it."""
     again: tuple[Again, ...] = ()
     brackets: tuple[Bracket, ...] = ()
 
@@ -113,7 +113,7 @@ class CampaignResult:
     runs: int
     sampling: str
     over: Mapping[str, str]
-    """Each dispersed key, with its distribution in words."""
+    """Each dispersed key, with a description of its distribution."""
     laws: tuple[LawResult, ...]
     digest: str
     seconds: float
@@ -128,23 +128,23 @@ class CampaignResult:
 
     @property
     def contradicted(self) -> bool:
-        """Whether a flight contradicts what is proved, which is a fault of starhold."""
+        """Whether a flight contradicts a proof, which is a fault of starhold."""
         return any(bracket.contradicted for law in self.laws for bracket in law.brackets)
 
     def frame(self) -> DataFrame:
-        """A row for each run of each law: `law`, `run`, what was drawn and what flew, metrics, margins."""
+        """A row for each run of each law: `law`, `run`, drawn and flown values, metrics, margins."""
         return self.query("SELECT * FROM runs ORDER BY law, run")
 
     @shortly
     def query(self, sql: str) -> DataFrame:
-        """The answer to a SELECT about `runs`. InputError where it cannot be answered."""
+        """Answer a SELECT about `runs`. InputError where that is impossible."""
         from starhold.campaign.query import query
 
         return query(self.folder, sql)
 
     @shortly
     def again(self, run: int, law: str | None = None) -> FlownAgain:
-        """One run, flown again and recorded. InputError where there is no such run."""
+        """Fly one run again and record it. InputError where there is no such run."""
         from starhold.campaign.again import fly_again
 
         return fly_again(self.folder, run, law)

@@ -1,5 +1,4 @@
-"""Plans of a campaign: which numbers each run draws. They are the same however the runs are cut into chunks, and whoever
-draws them."""
+"""Plans of a campaign: the numbers that each run draws, which are the same for any chunks and on any machine."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -20,22 +19,23 @@ from starhold.scenario.making import path_of
 
 SAMPLINGS = ("random", "sobol", "latin-hypercube", "morris", "saltelli")
 LEVELS = 4
-"""Values that each uniform takes in Morris's design, the middles of as many equal parts."""
+"""The number of values of each uniform in Morris's design, the middles of as many equal parts."""
 INNERMOST = 2.0**-53
 """The least uniform, and the distance of the greatest from 1."""
 BITS = 52
-"""Of a random uniform: with half a unit added, as many as floats hold exactly."""
+"""The bits of a random uniform: with half a unit added, as many as floats hold exactly."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """The draws of all runs of a campaign: the dispersions, how their uniforms are placed, the seed, and the number of runs.
+    """The draws of all runs of a campaign: the dispersions, the placement of their uniforms, the seed, and the number of
+    runs.
 
     random: independent, by a counter-based generator of its own for each dispersion, keyed by the seed and its keys, so that
-    what is drawn for one key depends on no other. sobol: a scrambled Sobol sequence over all dispersions, best with a power
-    of 2 of runs. latin-hypercube: each uniform falls once into each of as many equal parts as there are runs. morris:
-    SALib's design for elementary effects (Morris 1991), of uniforms from 0 to 1 though `LEVELS` are within. saltelli:
-    crossings of pairs of points for Sobol indices (see `sensitivity.saltelli_design`).
+    the draws for one key do not depend on the others. sobol: a scrambled Sobol sequence over all dispersions, best with a
+    power of 2 of runs. latin-hypercube: each uniform falls once into each of as many equal parts as there are runs. morris:
+    SALib's design for elementary effects (Morris 1991), analysed with uniforms from 0 to 1 although `LEVELS` lie within.
+    saltelli: crossings of pairs of points for Sobol indices (see `sensitivity.saltelli_design`).
 
     InputError where there is no such sampling, or where the number of runs does not fit its design; `where` names the
     scenario in it."""
@@ -54,7 +54,7 @@ class Plan:
         if self.sampling not in ("morris", "saltelli"):
             return
         if not self.dims:
-            raise self._refuse("sampling", show(self.sampling), "random, for nothing is dispersed")
+            raise self._refuse("sampling", show(self.sampling), "random, because nothing is dispersed")
         self._check_design()
 
     def _refuse(self, key: str, given: str, allowed: str) -> InputError:
@@ -74,17 +74,17 @@ class Plan:
 
     @property
     def block(self) -> int:
-        """Runs that belong together in a design: D + 1 of Morris's, 2 D + 2 of Saltelli's, for D uniforms; else 1."""
+        """The runs of one group of a design: D + 1 for Morris, 2 D + 2 for Saltelli, with D uniforms; else 1."""
         return {"morris": self.dims + 1, "saltelli": 2 * self.dims + 2}.get(self.sampling, 1)
 
     @cached_property
     def dims(self) -> int:
-        """Uniforms that a run takes."""
+        """The number of uniforms that a run uses."""
         return sum(dispersion.dims for dispersion in self.dispersions)
 
     @property
     def factors(self) -> tuple[str, ...]:
-        """The names of the uniforms: that of the column if it moves only one, else the key and its place from 1."""
+        """The names of the uniforms: that of the column if it has only one, else the key and its index from 1."""
         names: list[str] = []
         for dispersion in self.dispersions:
             name, dims = dispersion.called, dispersion.dims
@@ -95,7 +95,7 @@ class Plan:
         return tuple(names)
 
     def unit(self, first: int, count: int) -> Array:
-        """Uniforms (dims, count), strictly between 0 and 1, of the runs from `first` on."""
+        """Return uniforms (dims, count), strictly between 0 and 1, of the runs from `first` on."""
         if not 0 <= first <= first + count <= self.runs:
             raise ValueError(f"runs {first} to {first + count - 1} of {self.runs}")
         if not self.dims or not count:
@@ -112,28 +112,29 @@ class Plan:
         return np.clip(np.ascontiguousarray(points.T), INNERMOST, 1.0 - INNERMOST)
 
     def points(self) -> Array:
-        """The points (runs, dims) of the whole design as its analysis takes them: of Morris's, its grid from 0 to 1."""
+        """Return the points (runs, dims) of the whole design for its analysis: for Morris, the grid from 0 to 1."""
         unit = self.unit(0, self.runs).T
         return (unit * LEVELS - 0.5) / (LEVELS - 1) if self.sampling == "morris" else unit
 
     def _key(self, dispersion: Dispersion) -> int:
-        """128 bits that no other seed or dispersion has."""
+        """Return 128 bits that no other seed or dispersion shares."""
         label = f"starhold campaign {self.seed} {dispersion.called}"
         return int.from_bytes(hashlib.sha256(label.encode()).digest()[:16], "little")
 
     def columns(self, first: int, count: int) -> dict[str, NDArray[Any]]:
-        """The drawn values, by column, each (count,), of the runs from `first` on. InputError where a key refuses one."""
+        """Return the drawn values, by column, each (count,), of the runs from `first` on. InputError where a key refuses
+        one."""
         return self.values(self.unit(first, count))
 
     def values(self, unit: Array) -> dict[str, NDArray[Any]]:
-        """The values by column, each (n,), for uniforms (dims, n). InputError where a key refuses one."""
+        """Return the values by column, each (n,), for uniforms (dims, n). InputError where a key refuses one."""
         columns: dict[str, NDArray[Any]] = {}
         for dispersion, numbers in self._each(unit):
             columns |= dict(zip(dispersion.columns, dispersion.draw(numbers), strict=True))
         return columns
 
     def possible(self, unit: Array) -> NDArray[np.bool_]:
-        """For which of the uniforms (dims, n) every key takes its value, judged by its bounds."""
+        """Return for which of the uniforms (dims, n) every key accepts its value, judged by its bounds."""
         return np.logical_and.reduce([dispersion.possible(numbers) for dispersion, numbers in self._each(unit)])
 
     def _each(self, unit: Array) -> Iterator[tuple[Dispersion, Array]]:
@@ -143,7 +144,7 @@ class Plan:
             begun += dispersion.dims
 
     def change(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The change by which `Scenario.with_` gives the scenario of one run, from its values by column."""
+        """Return the change with which `Scenario.with_` makes the scenario of one run, from its values by column."""
         nominal = {name: table for one in self.dispersions for name, table in one.nominal_tables.items()}
         changes: dict[str, Any] = {f"nominal.{name}": table for name, table in nominal.items()}
         for dispersion in self.dispersions:
@@ -155,7 +156,7 @@ class Plan:
 
 
 def _random(key: int, dims: int, first: int, count: int) -> Array:
-    """Uniforms (dims, count) of a generator that is a function of its key and of a counter; each run has its own counts."""
+    """Return uniforms (dims, count) of a generator, a function of its key and a counter; each run has its own counts."""
     # Philox gives four numbers for each value of its counter.
     each = -(-dims // 4)
     raw = np.random.Philox(key=key, counter=first * each).random_raw(count * each * 4).reshape(count, each * 4)
@@ -170,15 +171,16 @@ def _generator(seed: int) -> np.random.Generator:
 def _sobol(dims: int, seed: int, first: int, count: int) -> Array:
     from scipy.stats import qmc
 
-    # Untyped, for newer versions know `seed` only at run time, and older ones nothing else.
+    # Untyped, because newer versions have `seed` only at run time, and older ones only that.
     make: Any = qmc.Sobol
     sequence = make(dims, scramble=True, seed=_generator(seed))
-    # The first point is drawn alone: the library warns where a first draw is of no power of 2, but cuts are the caller's.
+    # The first point is drawn alone: the library warns unless the first draw is a power of 2, but the caller chooses the
+    # cuts.
     head = sequence.random(1)
     if first > 1:
         sequence.fast_forward(first - 1)
     rest = sequence.random(count - 1 if first == 0 else count)
-    # To the middle of what a point of its 30 bits stands for.
+    # To the middle of the interval that a point of 30 bits represents.
     return (np.vstack([head, rest]) if first == 0 else rest) + 2.0**-31
 
 

@@ -1,14 +1,13 @@
-"""Morris's screening and Sobol's indices tell how much each input moves a metric, from campaigns sampled for that.
+"""Morris's screening and Sobol's indices measure how much each input changes a metric, from campaigns sampled for that.
 
 Both need designs of their own, which `sampling` lays out in the unit cube: "morris" one step of one input at a time (M. D.
 Morris, Technometrics 33, 1991; mu* of F. Campolongo et al., Environ. Model. Softw. 22, 2007), "saltelli" two samples and
-their crossings (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), each taken both ways. A failed run leaves a hole: a
-Morris design loses the trajectory with it and no more; Sobol's estimators have no answer to it, and filling it in would be
-made up.
+their crossings (A. Saltelli et al., Comput. Phys. Commun. 181, 2010), each taken both ways. A failed run leaves a gap: a
+Morris design loses only its trajectory; Sobol's estimators fail, and any filled-in value would be invented.
 
 Points of one Sobol sequence are far from independent: indices from them are much better than a bootstrap over the points
-says. So a design is made of `SCRAMBLINGS` sequences that are scrambled independently, and how the indices change when one
-of them is left out gives the half-widths (the jackknife over groups; A. B. Owen, Monte Carlo theory, 2013, chapter 17).
+suggests. So a design consists of `SCRAMBLINGS` sequences that are scrambled independently, and how the indices change when
+one of them is left out gives the half-widths (the jackknife over groups; A. B. Owen, Monte Carlo theory, 2013, chapter 17).
 """
 
 import math
@@ -22,16 +21,16 @@ from scipy import special
 
 Array: TypeAlias = NDArray[np.float64]
 SCRAMBLINGS = 8
-"""Sobol sequences of a Saltelli design; one for each point where there are fewer points."""
+"""The number of Sobol sequences of a Saltelli design; one for each point where there are fewer points."""
 NO_SALTELLI = "the runs are no Saltelli design of two samples and their crossings"
 STEP_ERROR = 0.05
-"""By which a step of a Morris design, as a share of it, may differ from the grid's: ends of the unit interval may be drawn
-in."""
+"""The share by which a step of a Morris design may differ from the grid's, because ends of the unit interval may be moved
+inward."""
 
 
 @dataclass(frozen=True)
 class Refused:
-    """There are no indices, for a reason."""
+    """The reason why there are no indices."""
 
     reason: str
 
@@ -86,7 +85,7 @@ def morris(names: Sequence[str], unit: Array, values: Array, confidence: float =
     there = np.isfinite(values.reshape(-1, size)).all(axis=1)
     flown, kept = there.size, int(there.sum())
     if kept < 2:
-        return Refused(f"{kept} of {flown} trajectories have all their values, two are the least")
+        return Refused(f"{kept} of {flown} trajectories have all their values; at least two are needed")
     changes = np.diff(values.reshape(-1, size)[there], axis=1)
     effects = (changes[:, :, None] * (np.sign(steps) * moved)[there]).sum(1) / grid
     magnitudes = np.abs(effects)
@@ -122,7 +121,7 @@ def sobol(names: Sequence[str], unit: Array, values: Array, confidence: float = 
     size = len(values) // (2 * count + 2)
     groups = min(size, SCRAMBLINGS)
     if groups < 2:
-        return Refused(f"{size} pair of points, two are the least")
+        return Refused(f"{size} pair of points; at least two are needed")
     blocks = values.reshape(size, -1)
     first, total = _estimates(blocks)
     group_of = np.arange(size) // (size // groups)
@@ -149,7 +148,7 @@ def _estimates(blocks: Array) -> tuple[Array, Array]:
 
 
 def _crossed(unit: Array) -> bool:
-    """Tell whether runs are blocks of a point, the point with each coordinate in turn from another, the reverse, and the
+    """Return whether runs are blocks of a point, the point with each coordinate in turn from another, the reverse, and the
     other."""
     count = unit.shape[1]
     if not len(unit) or len(unit) % (2 * count + 2):

@@ -1,24 +1,24 @@
-"""Bounds of a failure probability hold at every number of runs at once, so that a campaign may stop as soon as it knows.
+"""Bounds of a failure probability that hold at every number of runs at once, so that a campaign may stop as soon as it is
+decided.
 
 Let k of n independent runs fail, each with probability p. For a rate q below p the likelihood ratio
 
     (q / p)^k ((1 - q) / (1 - p))^(n - k)
 
 is a nonnegative martingale in n with mean one, and a supermartingale where the true probability is above p. So is its mean
-over any weight of q on (0, p), fixed before the first run. We weigh by the arcsine law, Beta(1/2, 1/2), cut at p, for which
-the mean is closed in the incomplete beta function. By Ville's inequality it reaches 1/risk at *any* number of runs with a
-probability of at most `risk`: once it does, "the failure probability is below p" is right with confidence 1 - risk, however
-often one looked and for whatever reason one stopped. The mirrored mean over (p, 1) speaks for "above p". Each is thus a
-one-sided test of power one (H. Robbins, "Statistical methods related to the law of the iterated logarithm", Ann. Math.
-Statist. 41, 1970; J. Ville, "Étude critique de la notion de collectif", 1939).
+over any weight of q on (0, p), fixed before the first run. The weight is the arcsine law, Beta(1/2, 1/2), cut at p, for
+which the mean is closed in the incomplete beta function. By Ville's inequality it reaches 1/risk at *any* number of runs
+with a probability of at most `risk`: once it does, "the failure probability is below p" is right with confidence 1 - risk,
+however many interim analyses were taken and whatever the reason for stopping. The mirrored mean over (p, 1) is evidence for
+"above p". Each is thus a one-sided test of power one (H. Robbins, "Statistical methods related to the law of the iterated
+logarithm", Ann. Math. Statist. 41, 1970; J. Ville, "Étude critique de la notion de collectif", 1939).
 
 The mean grows with p from p = k/n up: with p = sin²θ its derivative vanishes only where the second one is positive, because
-(n p - k) 2θ / sin 2θ grows. So the rates that it does not rule out are an interval that holds k/n. It also falls with k, so
-that the bound is never inside the Clopper-Pearson bound of the same risk: that is the price of looking.
+(n p - k) 2θ / sin 2θ grows. So the rates that it does not rule out are an interval that holds k/n. It also decreases with k,
+so that the bound is never inside the Clopper-Pearson bound of the same risk: that is the price of interim analyses.
 
 A share of 99.73 % with 90 % confidence is decided by 1104 runs without a failure, where a number of runs fixed beforehand
-needs 852; by 2128, 2916, 4907 and 7793 runs with 1, 2, 5 and 10 failures, where it needs 1440, 1970, 3433 and 5704.
-"""
+needs 852; by 2128, 2916, 4907 and 7793 runs with 1, 2, 5 and 10 failures, where it needs 1440, 1970, 3433 and 5704."""
 
 import math
 from collections.abc import Callable
@@ -34,27 +34,26 @@ Outcome: TypeAlias = Literal["met", "missed", "not decided"]
 
 
 class Bounds(NamedTuple):
-    """Lower and upper bound of a probability."""
+    """The lower and the upper bound of a probability."""
 
     lower: float
     upper: float
 
 
 def require_share(name: str, value: float) -> None:
-    """Refuse a share, a risk or a confidence that is not between 0 and 1, both left out: no finite campaign shows those."""
+    """Refuse a share, a risk or a confidence that is not strictly between 0 and 1: no finite campaign shows the ends."""
     if not 0.0 < value < 1.0:
         raise InputError("verdict", name, f"{value:g}", "above 0 and below 1")
 
 
 def require_counts(failures: int, runs: int) -> None:
-    """Refuse counts that are no counts of failed runs among runs."""
+    """Refuse counts that cannot be counts of failed runs among runs."""
     if not 0 <= failures <= runs:
         raise InputError("verdict", "failures", f"{failures} of {runs} runs", "from 0 to the number of runs")
 
 
 def log_evidence_below(failures: ArrayLike, runs: ArrayLike, rate: float) -> NDArray[np.float64]:
-    """The logarithm of the evidence that the failure probability is below `rate`; see the module. Arrays of counts may be
-    given."""
+    """The logarithm of the evidence that the failure probability is below `rate`; see the module. Counts may be arrays."""
     return _log_evidence(failures, runs, rate, special.betainc, math.asin)
 
 
@@ -67,7 +66,7 @@ def _log_evidence(failures: ArrayLike, runs: ArrayLike, rate: float, tail: Any, 
     k, n = np.asarray(failures, float), np.asarray(runs, float)
     a, b = k + 0.5, n - k + 0.5
     with np.errstate(divide="ignore"):
-        # Where the weight of all rates on this side is less than the least float, there is no evidence.
+        # If the weight of all rates on this side underflows, there is no evidence.
         weighed = special.betaln(a, b) + np.log(tail(a, b, rate))
     return weighed - math.log(2.0 * angle(math.sqrt(rate))) - special.xlogy(k, rate) - special.xlog1py(n - k, -rate)
 
@@ -89,11 +88,10 @@ def bounds(failures: int, runs: int, confidence: float) -> Bounds:
 
 
 def decided(failures: int, runs: int, share: float, confidence: float) -> Literal["met", "missed"] | None:
-    """Tell whether so many failures decide that at least `share` of all flights keep a requirement ("met") or fewer
-    ("missed").
-
-    None: fly on. Asked after every run, and stopped at the first answer, each answer is wrong with probability 1 -
-    `confidence` at most."""
+    """Return whether so many failures decide that at least `share` of all flights keep a requirement ("met") or fewer
+    ("missed"). None: fly on. Even if called after every run and stopped at the first answer, each answer is wrong with
+    probability 1 - `confidence` at most.
+    """
     require_share("share", share)
     require_share("confidence", confidence)
     require_counts(failures, runs)

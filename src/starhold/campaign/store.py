@@ -4,7 +4,7 @@
     runs/LAW/000000000-000016383.0123456789abcdef.parquet    one chunk
     campaign.json                                            digest and totals, once all is flown
 
-Files appear under their names when they are whole and on the disk, so a folder is sound at any instant.
+Files appear under their names only when they are complete and on the disk, so a folder is sound at any instant.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ RUNS, TOTALS = "runs", "campaign.json"
 MARKS = (manifests.FILE, TOTALS, RUNS)
 """A folder with one of these holds a campaign."""
 BESIDE = ("worst-*.toml", "recorded/*.nc", "report.html")
-"""What is written beside it from what it comes to."""
+"""Files with results that are written beside it."""
 _MOST_BYTES = 2**25
-"""Columns of so many bytes are read at once where all are wanted, 8 a number: each reading of few opens all files anew."""
+"""Columns of so many bytes, 8 a number, are read at once where all are needed, because each read opens all files again."""
 _NAME = re.compile(r"(\d{9,})-(\d{9,})\.([0-9a-f]{16})\.parquet")
 
 
@@ -49,9 +49,9 @@ class ChunkFile:
 
 
 class Store:
-    """A campaign's folder, open for reading; made by `create`, or after `resume`, for writing too.
-
-    notices: one line for each chunk that was found unusable."""
+    """A campaign's folder, open for reading; after `create` or `resume` also for writing. notices: one line for each
+    unusable chunk.
+    """
 
     def __init__(self, folder: Path, manifest: Manifest, writing: bool = False) -> None:
         self.folder, self.manifest, self.notices = folder, manifest, list[str]()
@@ -60,7 +60,7 @@ class Store:
 
     @classmethod
     def create(cls, folder: Path, manifest: Manifest, force: bool = False) -> Store:
-        """A new campaign in a folder, which is made. InputError where it holds one already, unless `force`, which removes
+        """Create a campaign in a folder, which is made. InputError where it holds one already, unless `force`, which removes
         that one; where it cannot be written; and where another process writes."""
         extra("pyarrow")
         try:
@@ -70,7 +70,7 @@ class Store:
             if marks and not force:
                 allowed = "another folder with -o, --force, or --resume"
                 raise InputError(str(folder), "", f"a campaign already there ({marks[0]})", allowed)
-            # They may be of another command, or of the user.
+            # They may belong to another command, or to the user.
             beside = [path for pattern in BESIDE for path in folder.glob(pattern)]
             if beside and not force:
                 given = f"results already there ({beside[0].relative_to(folder)})"
@@ -84,20 +84,20 @@ class Store:
 
     @classmethod
     def open(cls, folder: Path) -> Store:
-        """The campaign in a folder, to be read; InputError where there is none."""
+        """Open the campaign in a folder for reading; InputError where there is none."""
         extra("pyarrow")
         path = folder / manifests.FILE
         try:
             text = read_text(path)
         except (OSError, UnicodeDecodeError):
-            raise InputError(str(folder), "", f"no {manifests.FILE}", "a folder that a campaign was flown into") from None
+            raise InputError(str(folder), "", f"no {manifests.FILE}", "the folder of a campaign") from None
         return cls(folder, Manifest.from_json(text, str(path)))
 
     def resume(self, manifest: Manifest) -> Store:
-        """This campaign, to be flown on, with the new manifest's numbers of runs and of runs a chunk.
-
-        InputError with the first difference where the new manifest would give other results or fewer runs, and where another
-        process writes into the folder."""
+        """Open this campaign for more runs, with the new manifest's numbers of runs and of runs in a chunk. InputError with
+        the first difference where the new manifest would give other results or fewer runs, and where another process writes
+        into the folder.
+        """
         try:
             _claim(self.folder)
         except OSError as error:
@@ -106,10 +106,13 @@ class Store:
         old = Store.open(self.folder).manifest
         if difference := manifest.difference(old):
             raise InputError(
-                str(self.folder), "", "", f"{difference}; resume what was begun, or begin again with another -o"
+                str(self.folder),
+                "",
+                "",
+                f"{difference}; resume the campaign unchanged, or start another one with another -o",
             )
         if manifest.runs < old.runs:
-            raise InputError(str(self.folder), "", "", f"campaign.runs: {manifest.runs}, was {old.runs}; as many, or more")
+            raise InputError(str(self.folder), "", "", f"campaign.runs: {manifest.runs}, was {old.runs}; at least as many")
         self.manifest = replace(manifest, columns=old.columns)
         self._writing = True
         self._files.clear()
@@ -117,7 +120,7 @@ class Store:
         return self
 
     def files(self, law: str) -> list[ChunkFile]:
-        """The sound chunks of a law in the order of their runs.
+        """Return the sound chunks of a law in the order of their runs.
 
         The first call reads all of them, to compare their bytes with their hashes, and adds a line to `notices` for each
         that is unusable; a store that writes removes those."""
@@ -132,12 +135,12 @@ class Store:
         return self._files[law]
 
     def missing(self, law: str) -> list[tuple[int, int]]:
-        """First number and count of the blocks of a law's runs that are to be flown, none longer than a chunk."""
+        """Return first number and count of the blocks of a law's runs still to be flown, none longer than a chunk."""
         blocks: list[tuple[int, int]] = []
         start, size, runs = 0, self.manifest.chunk, self.manifest.runs
         for first, last in [*((file.first, file.last) for file in self.files(law)), (runs, runs)]:
             while start < min(first, runs):
-                # Cut where chunks of this size begin, so that a repaired campaign has the same files as any other.
+                # Cut at multiples of the chunk size, so that a repaired campaign has the same files as any other.
                 end = min(start - start % size + size, first, runs)
                 blocks.append((start, end - start))
                 start = end
@@ -145,9 +148,9 @@ class Store:
         return blocks
 
     def put(self, chunk: Chunk) -> None:
-        """Write a chunk, so that it outlasts a crash from here on. InputError where the disk is full or fails.
-
-        Raises ValueError where its law, its runs or its columns are not those of the campaign."""
+        """Write a chunk so that it survives a crash from here on. InputError where the disk is full or fails. ValueError
+        where its law, its runs or its columns are not those of the campaign.
+        """
         if not self._writing:
             raise ValueError("this store is open for reading only")
         file = self._fit(chunk)
@@ -156,10 +159,10 @@ class Store:
         digest = hashlib.sha256(data).hexdigest()[:16]
         path = folder / f"{file.first:09}-{file.last:09}.{digest}.parquet"
         try:
-            # Totals of fewer runs would be wrong beside this one.
+            # Totals without this chunk would be wrong.
             (self.folder / TOTALS).unlink(missing_ok=True)
             folder.mkdir(parents=True, exist_ok=True)
-            # First the names, so that no chunk is stored whose columns the manifest does not know.
+            # The names first, so that no chunk is stored whose columns are not in the manifest.
             if chunk.law not in self.manifest.columns:
                 self.manifest = replace(self.manifest, columns={**self.manifest.columns, chunk.law: tuple(chunk.rows)})
                 self._write_manifest()
@@ -191,7 +194,7 @@ class Store:
         return whole or {name: np.empty(0) for name in names}
 
     def each_column(self, names: Sequence[str], law: str) -> Iterator[NDArray[Any]]:
-        """Columns one after the other, of which but a few are held in memory. InputError as of `columns`."""
+        """Yield columns one by one, with only a few in memory. InputError as in `columns`."""
         width = max(1, _MOST_BYTES // (8 * self.manifest.runs))
         for start in range(0, len(names), width):
             group = names[start : start + width]
@@ -200,7 +203,7 @@ class Store:
                 yield columns.pop(name)
 
     def row(self, law: str, run: int) -> dict[str, Any]:
-        """One run's values by column; InputError where this run of the law is not stored."""
+        """Return one run's values by column; InputError where this run of the law is not stored."""
         for file in self.files(law):
             if file.first <= run <= file.last:
                 stored = parquet.read(file.path, list(parquet.names(file.path)))
@@ -208,7 +211,7 @@ class Store:
         raise InputError(str(self.folder), "", f"no run {run} of {law}", f"0 to {self.manifest.runs - 1}, once flown")
 
     def envelopes(self, law: str) -> tuple[Counts, Extremes]:
-        """The counts and the extremes of all stored runs of a law, merged."""
+        """Merge the counts and the extremes of all stored runs of a law."""
         return merge(parquet.added_up(file.path) for file in self.files(law))
 
     def finish(self, digest: str, totals: Mapping[str, Any]) -> Path:
@@ -227,12 +230,12 @@ class Store:
         return [ChunkFile(path, int(match[1]), int(match[2])) for path, match in matches if match]
 
     def _fault(self, file: ChunkFile, law: str, kept: list[ChunkFile]) -> str:
-        """Why a chunk is unusable, or nothing."""
+        """Return why a chunk is unusable, or ""."""
         try:
             with file.path.open("rb") as source:
                 digest = hashlib.file_digest(source, "sha256").hexdigest()[:16]
             if digest != file.path.name.split(".")[1]:
-                return "its bytes are not those that were written"
+                return "its bytes were changed"
             if not parquet.belongs(file.path, law, file.first, file.last - file.first + 1, self._fingerprint):
                 return "it is of another campaign or of other runs"
         except (OSError, ValueError) as error:
@@ -251,7 +254,7 @@ class Store:
             raise InputError(str(file.path), "", "", f"cannot be removed: {error.strerror}") from None
 
     def _fit(self, chunk: Chunk) -> ChunkFile:
-        """The place of a chunk in this campaign; ValueError where it has none."""
+        """Return the place of a chunk in this campaign; ValueError where it has none."""
         last = chunk.first + chunk.count - 1
         if chunk.law not in self.manifest.laws or not 0 <= chunk.first <= last < self.manifest.runs:
             raise ValueError(f"no part of this campaign: {chunk.law}, runs {chunk.first} to {last}")
@@ -274,21 +277,21 @@ class Store:
         _write(self.folder / manifests.FILE, self.manifest.to_json().encode())
 
 
-_KEPT = "; what was computed is kept, --resume goes on from there"
+_KEPT = "; what was computed is kept, --resume continues from there"
 
 
 def _claim(folder: Path) -> None:
-    """Become the only process that writes there, and remove what killed ones left half written. OSError where that fails."""
+    """Become the only process that writes there, and remove half-written files of killed ones. OSError where that fails."""
     try:
         claim(folder)
     except BlockingIOError:
-        raise InputError(str(folder), "", "another starhold that writes there", "another folder with -o") from None
+        raise InputError(str(folder), "", "another starhold is writing there", "another folder with -o") from None
     clear_unfinished(folder)
     clear_unfinished(folder / RUNS)
 
 
 def _clear(folder: Path) -> None:
-    """Remove a campaign and nothing else, the manifest last: until then, what is left of it is known for what it is."""
+    """Remove a campaign and nothing else, the manifest last: until then, its remains can be recognized."""
     (folder / TOTALS).unlink(missing_ok=True)
     for pattern in BESIDE:
         for path in folder.glob(pattern):
@@ -303,7 +306,7 @@ def _clear(folder: Path) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Write a file that is whole, and on the disk, from the instant it has its name."""
+    """Write a file that is complete and on the disk from the instant it has its name."""
     with atomic_write(path) as hidden, hidden.open("wb") as sink:
         sink.write(data)
         sink.flush()
@@ -312,7 +315,7 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Put a folder's list of names on the disk, where the system can do that."""
+    """Flush a folder's directory entry to the disk, where the system can do that."""
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)

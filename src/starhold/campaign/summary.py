@@ -1,4 +1,4 @@
-"""From the stored runs of a campaign to what it says: column by column, for no memory holds all of many runs."""
+"""Summarizes the stored runs of a campaign, column by column, because many runs do not fit into memory."""
 
 import math
 import shlex
@@ -21,14 +21,13 @@ from starhold.scenario.bodies.rigid_body.faults import action_on
 from starhold.studies.requirements import Requirement
 
 BARS, WIDE = 60, 100.0
-"""A histogram has at most so many bars; a metric whose largest value is so many times its least is shown on a logarithmic
-scale."""
+"""The most bars of a histogram; and the ratio of largest to least value above which a metric has a logarithmic scale."""
 MOST_DRIVEN = 200_000
-"""Runs, the first ones, that drivers are looked for among."""
+"""Drivers are sought among the first so many runs."""
 KINDS: Mapping[str, Any] = {"morris": sensitivity.morris, "saltelli": sensitivity.sobol}
-"""What tells the indices of a metric, by the samplings that are designed for them."""
+"""The functions that compute sensitivity indices, by the samplings designed for them."""
 FAILURES = 3
-"""Failed runs that are worth flying again, beside the worst of each requirement."""
+"""The number of failed runs worth flying again, beside the worst of each requirement."""
 
 
 def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool = False) -> tuple[LawResult, ...]:
@@ -37,7 +36,7 @@ def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool =
     units = {name: unit for law in laws for name, unit in job.meter(law).units.items()}
     columns = {law: store.each_column([name for name in units if name in job.meter(law).units], law) for law in laws}
     for name, unit in units.items():
-        # All laws at once, for histograms that stand side by side.
+        # All laws at once, for histograms side by side.
         by_law = {law: next(columns[law]) for law in laws if name in job.meter(law).units}
         for law, spread in zip(by_law, spreads_of(name, unit, list(by_law.values())), strict=True):
             spreads[law][name] = spread
@@ -79,8 +78,8 @@ def _spread(name: str, unit: str, there: NDArray[np.float64], runs: int, edges: 
 
 
 def _edges(values: NDArray[np.float64], bars: int) -> NDArray[np.float64]:
-    """The edges of the bins, equal on a logarithmic scale where the values span decades; a single one about a value that all
-    have. What is far away from nearly all others is counted in the end bins, so that it does not squeeze them."""
+    """Return the edges of the bins, equal on a logarithmic scale where the values span decades; a single bin about a value
+    that all share. Outliers are counted in the end bins, so that they do not squeeze the others."""
     if not len(values):
         return np.zeros(0)
     least, low, high, most = np.quantile(values, [0.0, 0.005, 0.995, 1.0]).tolist()
@@ -123,8 +122,8 @@ def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_d
 
 
 def _knowledge(job: Job, law: str) -> str:
-    """A sentence on which drawn values the law is told; none where it is told no number of its craft in any case."""
-    clauses: dict[str, list[str]] = {"supposes the file's own": [], "is told each drawn": []}
+    """State which drawn values the law knows; empty where it never knows any number of its craft."""
+    clauses: dict[str, list[str]] = {"assumes the file's own": [], "is told each drawn": []}
     clauses |= {"learns at the diagnosis each drawn": [], "never learns": []}
     supposed, known, learnt, missed = clauses.values()
     for one in job.dispersions:
@@ -143,7 +142,7 @@ def _drivers(
 ) -> Drivers | None:
     names = [name for dispersion in job.dispersions for name in dispersion.columns]
     if not names or job.table.sampling in KINDS:
-        # Runs of those designs repeat one another's values: no test of theirs would be one.
+        # Runs of those designs repeat one another's values, so tests on them are not valid.
         return None
     inputs = {name: values[:MOST_DRIVEN] for name, values in store.columns(names, law).items()}
     inputs |= _sizes(job, inputs)
@@ -153,7 +152,7 @@ def _drivers(
 
 
 def _sizes(job: Job, inputs: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.float64]]:
-    """The angle of an attitude and the norm of a vector in any direction, which may matter more than their components."""
+    """Return the angle of an attitude and the norm of a vector in any direction, which may matter more than components."""
     sizes: dict[str, NDArray[np.float64]] = {}
     for dispersion in job.dispersions:
         if size := dispersion.distribution.size([inputs[name] for name in dispersion.columns]):
@@ -170,11 +169,11 @@ USUAL = (
     "deviation",
     "effort_per_year",
 )
-"""Metrics whose drivers are looked for where nothing is required."""
+"""The metrics whose drivers are sought where nothing is required."""
 
 
 def _of_interest(job: Job, law: str, requirements: tuple[Requirement, ...]) -> list[str]:
-    """The metrics whose causes are looked for: those that are bounded, else the usual ones."""
+    """Return the metrics whose drivers are sought: those with a requirement, else the usual ones."""
     bounded = [requirement.column for requirement in requirements if not np.isnan(requirement.bound)]
     return list(dict.fromkeys(bounded or [name for name in job.meter(law).units if name in USUAL]))
 
@@ -189,7 +188,7 @@ def _indices(store: Store, job: Job, law: str, requirements: tuple[Requirement, 
 
 
 def _again(folder: Path, law: str, verdicts: tuple[Verdict, ...], failed: NDArray[np.bool_], seed: int) -> tuple[Again, ...]:
-    """The worst run of each requirement, the first ones that failed, and one for comparison."""
+    """List the worst run of each requirement, the first ones that failed, and one for comparison."""
     why: dict[int, list[str]] = {}
     for verdict in verdicts:
         why.setdefault(verdict.worst_run, []).append(f"worst {verdict.name}")

@@ -1,13 +1,11 @@
-"""Whether a campaign shows that a requirement is kept by the share of flights that it asks for.
+"""Decides whether a campaign shows that the required share of flights keeps a requirement.
 
 A number of runs that is fixed beforehand is judged by the binomial law: exact bounds of the failure probability (C. J.
-Clopper, E. S. Pearson, Biometrika 26, 1934) and, which is the same test told otherwise, the greatest number of failures
-with which the requirement is accepted at a consumer's risk of at most 1 - confidence (J. M. Hanson, B. B. Beard, "Applying
-Monte Carlo Simulation to Launch Vehicle Design and Requirements Verification", NASA/TP-2010-216447). A campaign that stops
-when it knows enough is judged by `sequence` instead.
-
-A margin is kept where it is 0 or more. A margin that is NaN or minus infinity, as of a lost run, is missed and worse than
-any other.
+Clopper, E. S. Pearson, Biometrika 26, 1934) and, equivalently, the greatest number of failures with which the requirement is
+accepted at a consumer's risk of at most 1 - confidence (J. M. Hanson, B. B. Beard, "Applying Monte Carlo Simulation to
+Launch Vehicle Design and Requirements Verification", NASA/TP-2010-216447). A campaign that stops early is judged by
+`sequence` instead. A requirement is kept where its margin is 0 or more. A margin of NaN or minus infinity, as of a lost run,
+is a miss and worse than any other.
 """
 
 import math
@@ -25,7 +23,7 @@ from starhold.errors import InputError
 
 SEVERITY: tuple[Outcome, ...] = ("met", "not decided", "missed")
 PARTS = 4
-"""Known inputs with more values than this are cut into this many parts, each with about as many runs."""
+"""Known inputs with more values than this are cut into this many parts with about equal numbers of runs."""
 
 
 def failure_bounds(failures: int, runs: int, confidence: float, sides: int = 2) -> Bounds:
@@ -70,9 +68,9 @@ def allowed_failures(share: float, risk: float, runs: int) -> int | None:
 def quantile_bound(values: ArrayLike, share: float, confidence: float) -> float | None:
     """Return a value that at least `share` of all flights reach or exceed, with the confidence; None where runs are too few.
 
-    It is an order statistic of the values (n,), whatever their distribution: the one above as many as may fail by
-    `allowed_failures`. Less is worse; NaN is worst and counts as minus infinity. Give the negative of a metric of which
-    more is worse. A requirement is met by a fixed number of runs just where this bound of its margin is 0 or more."""
+    It is an order statistic of the values (n,), valid for any distribution: the one just above the values that may fail by
+    `allowed_failures`. Less is worse; NaN is worst and counts as minus infinity. Pass the negative of a metric if more is
+    worse. A fixed number of runs meets a requirement exactly where this bound of its margin is 0 or more."""
     values = _worst_first(values)
     allowed = allowed_failures(share, 1.0 - confidence, len(values))
     return None if allowed is None else float(np.partition(values, allowed)[allowed])
@@ -81,9 +79,9 @@ def quantile_bound(values: ArrayLike, share: float, confidence: float) -> float 
 @dataclass(frozen=True)
 class Part:
     """A part of the runs, of one condition that is known before flight, judged by itself. `lower` and `upper` bound the
-    failure probability, each by itself with the confidence: Clopper-Pearson's bounds, or those of `sequence` where the
-    campaign stopped when it knew enough; None where the draws are not independent. `more` runs without another failure would
-    make the outcome "met" (None: nothing would, or it cannot be told)."""
+    failure probability, each by itself with the confidence: Clopper-Pearson's bounds, or those of `sequence` for a
+    sequential campaign; None where the draws are not independent. `more` runs without another failure would make the outcome
+    "met" (None: impossible or unknown)."""
 
     name: str
     runs: int
@@ -104,10 +102,10 @@ class Verdict(Part):
     """A campaign's answer whether a requirement is kept by at least `share` of all flights, with `confidence`.
 
     `allowed` failures are accepted with these runs (None: none are, there are too few runs); `more` is about, where there
-    are parts, as the runs that fall in a part are not chosen. `worst_margin` is flown by the run numbered `worst_run`;
+    are parts, as the runs that fall in a part are not chosen. The run numbered `worst_run` has the `worst_margin`;
     `margin_bound` is a margin that at least `share` of all flights keep, with the confidence, by order statistics (None: too
-    few runs, or no fixed number of them). `parts` are the conditions known before flight, `worst_part` the one that speaks
-    most against the requirement."""
+    few runs, or their number was not fixed). `parts` are the conditions known before flight, `worst_part` the one with the
+    strongest evidence against the requirement."""
 
     share: float
     confidence: float
@@ -120,10 +118,10 @@ class Verdict(Part):
     independent: bool
     until_decided: bool
     knowledge: str = ""
-    """A sentence on what laws know of the draws."""
+    """A sentence that states what laws know about the draws."""
 
     def sentence(self) -> str:
-        """Tell the verdict and what it rests on."""
+        """State the verdict and its basis."""
         flown = f"{self.failures} of {self.runs} runs miss it ({percent(self.observed)} keep it, {percent(self.share)} must)"
         if self.lower is None or self.upper is None:
             text = f"{self.name}: {flown}. The draws are not independent of each other, so no confidence can be given"
@@ -159,17 +157,17 @@ def judge(
 ) -> Verdict:
     """Judge a requirement by its margins (n,), n > 0, of the runs numbered `run` (n,), or else 0 to n - 1.
 
-    What is known before flight must not be averaged over: a launch on a bad day has a bad day's failure probability. So
-    each column (n,) of `known` is cut into its quarters, or its values if they are words or no more than four numbers, and
-    each such part is judged by itself with the same share and confidence. The outcome is "met" only if the runs together
-    and each of the parts are. That needs no correction for the number of parts: if any condition misses its share, its own
-    test has to fail for that (the risk of an intersection-union test is that of its tests; R. L. Berger, Technometrics 24,
-    1982). The reverse does: for "missed" the parts share one risk 1 - `confidence` evenly (Bonferroni), beside that of the
-    runs together. Conditions are known one at a time: what two of them do together is not judged.
+    What is known before flight must not be averaged over: a launch on a bad day has a bad day's failure probability. So each
+    column (n,) of `known` is cut into its quarters, or its values if they are words or no more than four numbers, and each
+    such part is judged by itself with the same share and confidence. The outcome is "met" only if the runs together and each
+    of the parts are. No correction for the number of parts is needed: if any condition misses its share, its own test must
+    fail to show it (the risk of an intersection-union test is that of its tests; R. L. Berger, Technometrics 24, 1982). The
+    reverse does: for "missed" the parts share one risk 1 - `confidence` evenly (Bonferroni), beside that of the runs
+    together. Conditions are judged one at a time, not in combination.
 
     `independent` says whether runs are drawn independently; with Sobol' points or a Latin hypercube the binomial law does
-    not hold, and only the observed share is told. `until_decided` says that the number of runs was not fixed beforehand; the
-    verdict then rests on `sequence` and may be taken any number of times."""
+    not hold, and only the observed share is returned. `until_decided` says that the number of runs was not fixed beforehand;
+    the verdict then uses `sequence` and may be taken any number of times."""
     require_share("share", share)
     require_share("confidence", confidence)
     margins = _worst_first(margins)
@@ -215,7 +213,7 @@ def _judge(
     until_decided: bool,
     missed_confidence: float,
 ) -> Part:
-    """Judge runs of one condition; "missed" is said with a confidence of its own."""
+    """Judge runs of one condition; "missed" has its own confidence."""
     runs, failures = len(missed), int(missed.sum())
     if not independent:
         return Part(name, runs, failures, None, None, "not decided", None)
@@ -234,8 +232,7 @@ def _judge(
 
 
 def _parts(known: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Name the conditions that are known before flight, and tell which runs (n,) belong to each; a constant is no
-    condition."""
+    """Return the names of the conditions known before flight, with the runs (n,) of each; a constant is no condition."""
     for name, column in known.items():
         column = np.asarray(column)
         values = np.unique(column)
@@ -243,7 +240,7 @@ def _parts(known: Mapping[str, NDArray]) -> Iterator[tuple[str, NDArray[np.bool_
             continue
         if column.dtype.kind not in "fiu" or len(values) <= PARTS:
             for value in values:
-                # Not a number is equal to nothing, itself included.
+                # NaN equals nothing, not even itself.
                 yield f"{name} = {_shown(value)}", np.isnan(column) if value != value else column == value
             continue
         there = ~np.isnan(column)
@@ -261,7 +258,7 @@ def _badness(part: Part) -> tuple[int, float, float]:
 
 
 def _worst_first(values: ArrayLike) -> NDArray[np.float64]:
-    """Return values (n,) with minus infinity for NaN, so that nothing is worse."""
+    """Return values (n,) with minus infinity, the worst value, for NaN."""
     values = np.asarray(values, dtype=np.float64)
     return np.where(np.isnan(values), -np.inf, values)
 

@@ -1,5 +1,5 @@
-"""Whether a law keeps the requirements of its scenario: each method is used once, and only those that are wanted for; and
-all that a review of it shows, by the same flights."""
+"""Decides whether a law keeps the requirements of its scenario; each method runs at most once, and only if a requirement
+needs it. A review uses the same flights."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ OTHER_BODY = "it is known of attitudes alone"
 
 @dataclass(frozen=True)
 class Evidence:
-    """All evidence about a law of a scenario, each piece computed when it is first asked for, and only then. A text stands
-    in place of what there is none of, and tells why."""
+    """All evidence about a law of a scenario, each piece computed at its first use. Where there is none, a text gives the
+    reason."""
 
     scenario: Scenario
     entry: LawEntry
@@ -93,19 +93,20 @@ class Evidence:
 
     @cached_property
     def issued(self) -> Sequence[Issued] | str:
-        """The certificates, each with the loop that it speaks of."""
+        """The certificates, each with the loop that it is about."""
         if self.scenario.supposed is not None:
-            return "the law takes the craft for another one"
+            return "the law's nominal model is not the craft that flies"
         return study_of(self.scenario.body).certify(self.scenario, self.entry, self.loop, pointing=True)
 
     @cached_property
     def campaign(self) -> CampaignResult:
-        """The campaign of the scenario's [campaign] table, whose folder is gone. InputError where there is none."""
+        """The campaign of the scenario's [campaign] table, whose folder is removed. InputError where there is none."""
         with TemporaryDirectory(prefix="starhold-verify-") as folder:
             return fly_campaign(self.scenario, Path(folder) / "campaign", self.entry.name, Options(search=False))
 
     def verdicts(self, notice: Notice, more: Collection[str] = ()) -> tuple[RequirementVerdict, ...]:
-        """The verdicts on all requirements, by the methods that they ask for; and more methods whose evidence is wanted."""
+        """Return the verdicts on all requirements, by the methods that they name; also run further methods whose evidence is
+        needed."""
         scenario, entry = self.scenario, self.entry
         methods: dict[str, Callable[[], Verdicts]] = {
             "inspection": lambda: by_inspection(scenario),
@@ -125,14 +126,14 @@ class Evidence:
 
 
 class Review(NamedTuple):
-    """The verdicts on what is required of a law, and the evidence that they and a review rest on."""
+    """The verdicts on the requirements of a law, and the evidence for them and for a review."""
 
     verdicts: tuple[RequirementVerdict, ...]
     evidence: Evidence
 
     @property
     def has_budget(self) -> bool:
-        """Whether a pointing budget is asked for: by a [budget] table, or by a requirement."""
+        """Return whether a [budget] table or a requirement calls for a pointing budget."""
         return _asks_budget(self.evidence.scenario)
 
     @property
@@ -142,9 +143,9 @@ class Review(NamedTuple):
 
 
 def study(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> tuple[RequirementVerdict, ...]:
-    """Decide the requirements of a scenario for one of its laws, by the methods that they ask for: one flight, one campaign,
-    one certificate, one budget and one linear loop do for all of them. `notice` hears the number of methods done, that of
-    all and the next one. InputError for any mistake in a requirement, before anything is flown or proved."""
+    """Decide the requirements of a scenario for one of its laws by the methods that they name; one flight, one campaign, one
+    certificate, one budget and one linear loop serve all of them. `notice` is called with the number of methods done, the
+    total and the next one. InputError for any mistake in a requirement, before anything is flown or proved."""
     if not scenario.table.requirement:
         raise InputError(scenario.where, "requirement", "none", "at least one [[requirement]] table")
     check(scenario, entry)
@@ -152,9 +153,9 @@ def study(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> tuple
 
 
 def examine(scenario: Scenario, entry: LawEntry, notice: Notice = SILENT) -> Review:
-    """Gather what a review of a law shows: the verdicts, if anything is required, a flight, the linear loop, certificates,
-    and the budget and the campaign that the scenario asks for; each is computed once. InputError as `study` has it, and for
-    any mistake in the [campaign] table."""
+    """Collect what a review of a law shows: the verdicts, if anything is required, a flight, the linear loop, certificates,
+    and the budget and the campaign that the scenario defines; each is computed once. InputError as in `study`, and for any
+    mistake in the [campaign] table."""
     check(scenario, entry)
     more = ["margin", "flight", "proof", *(["budget"] if _asks_budget(scenario) else [])]
     if scenario.table.campaign is not None:
@@ -169,8 +170,8 @@ def _asks_budget(scenario: Scenario) -> bool:
 
 
 def check(scenario: Scenario, entry: LawEntry) -> None:
-    """InputError for whatever is wrong with a requirement: a metric that its method does not measure, a limit in another
-    unit, a mode that the law does not have, a campaign that the scenario lacks."""
+    """Raise InputError for any mistake in a requirement: a metric that its method does not measure, a limit in another unit,
+    a mode that the law lacks, a campaign that the scenario lacks."""
     refuse_other_bodies(scenario)
     if scenario.body == "rigid-body":
         check_proofs(scenario, entry)

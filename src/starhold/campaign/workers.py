@@ -1,5 +1,5 @@
-"""Processes of this machine that fly blocks. Each talks to this one alone, through a pipe that nobody else can open, and
-ends when this one does."""
+"""Processes of this machine that fly blocks. Each communicates with this one alone, through a private pipe, and ends when
+this one does."""
 
 import multiprocessing
 import os
@@ -17,16 +17,16 @@ from typing import Any
 from starhold.errors import InputError
 
 TRIES = 3
-"""Processes that a block may end before it counts as the cause."""
+"""The number of processes that may die with a block before the block counts as the cause."""
 AHEAD = 2
-"""Blocks that a process has: one that it flies, and one at hand when that ends."""
+"""The number of blocks that a process has: one being flown, and one ready to follow."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Variables that keep libraries of a process from starting a thread for each core."""
 
 
 @dataclass
 class _Worker:
-    """A process, this end of its pipe, and the blocks that it was given, in order."""
+    """A process, this end of its pipe, and the blocks sent to it, in order."""
 
     process: BaseProcess
     pipe: Any
@@ -34,7 +34,7 @@ class _Worker:
 
 
 class Team:
-    """A number of processes that call `work` for blocks, all of them with what it begins with."""
+    """A number of processes that call `work` for blocks, all with the same first argument."""
 
     def __init__(self, work: Callable[..., Any], begun: tuple[Any, ...], count: int) -> None:
         self._work, self._begun, self._name = work, begun, f"{count} workers"
@@ -57,7 +57,7 @@ class Team:
                 raise self._cannot_start(f"one ended with code {worker.process.exitcode}") from None
 
     def _begin(self) -> _Worker:
-        # Spawned: what a fork would copy are threads in the middle of what they do.
+        # Spawned, because a fork would copy threads in the middle of their work.
         context = multiprocessing.get_context("spawn")
         pipe, other = context.Pipe()
         process = context.Process(target=_serve, args=(other, self._work, self._begun), daemon=True)
@@ -70,14 +70,14 @@ class Team:
         finally:
             for name, value in kept.items():
                 os.environ.pop(name) if value is None else os.environ.update({name: value})
-            # Held by the process alone, so that its end is seen here.
+            # Only the process keeps its end, so that its death is seen here.
             other.close()
         self._workers.append(_Worker(process, pipe))
         return self._workers[-1]
 
     def fly(self, blocks: Iterable[Any]) -> Iterator[tuple[Any, Any]]:
-        """Each block with its result, as they arrive. InputError where processes cannot be started, or where a block ends
-        all that try it."""
+        """Yield each block with its result, as they arrive. InputError where processes cannot be started, or where all that
+        try a block die."""
         waiting, deaths = deque(blocks), Counter[Any]()
         while waiting or any(worker.blocks for worker in self._workers):
             for worker in self._workers:
@@ -101,7 +101,7 @@ class Team:
         try:
             worker.pipe.send(worker.blocks[-1])
         except OSError:
-            # It has ended, which is seen where its results are waited for.
+            # It has ended, which the wait for its results will show.
             return
 
     def _replace(self, worker: _Worker, deaths: Counter[Any]) -> None:
@@ -149,10 +149,9 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def _undisturbed() -> Generator[None]:
-    """Hold requests to end back until processes are started, for one that is half started would complain.
-
-    What is started takes no notice of interrupts from the keyboard: they reach all processes of a terminal, of which this
-    one ends the others."""
+    """Defer termination signals until processes are started, because a half-started one would print a traceback. Started
+    processes ignore keyboard interrupts, which reach all processes of a terminal; this one ends the others.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -160,7 +159,8 @@ def _undisturbed() -> Generator[None]:
     handlers = {
         number: signal.signal(number, lambda *call: signals.append(call)) for number in (signal.SIGINT, signal.SIGTERM)
     }
-    # Threads and processes begin with what the thread blocks that starts them; the start of Python's tracker unblocks all.
+    # Threads and processes inherit the signal mask of the thread that starts them; the start of Python's tracker unblocks
+    # all.
     resource_tracker.ensure_running()
     masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if hasattr(signal, "pthread_sigmask") else None
     try:

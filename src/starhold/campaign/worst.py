@@ -1,4 +1,4 @@
-"""The worst of a metric over the box of the dispersions: looked for by flights side by side, from many starts."""
+"""Searches for the worst value of a metric over the box of the dispersions by batches of flights, from many starts."""
 
 import math
 import re
@@ -17,14 +17,15 @@ from starhold.studies.requirements import LOST, Requirement
 
 Array = NDArray[np.float64]
 TAIL = 0.00135
-"""What the box leaves out on each side of a distribution without bounds: what lies beyond three sigma of a normal one."""
+"""The probability that the box leaves out on each side of an unbounded distribution: that beyond three sigma of a normal
+one."""
 EDGE = 1e-12
-"""What it leaves out of one with bounds, whose ends are not drawn."""
+"""The probability that it leaves out of a bounded one, whose ends are not drawn."""
 
 
 class Effort(NamedTuple):
-    """How much the search flies: points that are spread over the box, the best of them that it goes on from, flights side by
-    side in a round, and rounds."""
+    """The size of the search: points spread over the box, the number of starts chosen from them, flights in a batch, and
+    rounds."""
 
     spread: int
     starts: int
@@ -34,25 +35,25 @@ class Effort(NamedTuple):
 
 MANY = Effort(2048, 16, 512, 30)
 FEW = Effort(256, 4, 64, 9)
-"""Where the numbers of many runs are made at once, and where each lane's are made by themselves."""
+"""The size where the numbers of many runs are made at once, and where each lane's are made by themselves."""
 CORNERS = 0.25
-"""Share of the points that are spread which lie in corners of the box."""
+"""The share of the spread points that lie in corners of the box."""
 APART = 0.1
-"""Starts differ by so much of the box along one of its sides at least."""
+"""Starts differ by at least this share of the box along one of its sides."""
 FIRST, LONGEST, WIDER, CLOSER = 0.15, 0.3, 1.2, 0.7
-"""Sizes of steps as shares of the box: at first, at the most, and by what they are multiplied after a round that found a
-worse point, and after one that found none."""
+"""Step sizes as shares of the box: the first, the largest, and the factors after a round that found a worse point and after
+one that found none."""
 
 
 _ODD = re.compile(r"[^\w.-]+")
-"""What names of files are kept free of."""
+"""Characters that are replaced in file names."""
 _LONGEST = 200
-"""Bytes of a file's name, without what tells it from others; systems take 255."""
+"""The most bytes of a file's name, without the number that makes it unique; systems allow 255."""
 
 
 class Found(NamedTuple):
-    """The worst that a search has flown: the point of the unit cube (dims,), what was drawn there by column, the metric
-    (NaN: the run has none), and the flights it took."""
+    """The worst run of a search: the point of the unit cube (dims,), the values drawn there by column, the metric (NaN: the
+    run has none), and the number of flights."""
 
     point: Array
     columns: dict[str, NDArray[Any]]
@@ -61,7 +62,7 @@ class Found(NamedTuple):
 
 
 def box(job: Job) -> list[tuple[float, float]]:
-    """The bounds of each uniform: all of a distribution that has bounds, else all but its tails."""
+    """Return the bounds of each uniform: all of a bounded distribution, else all but its tails."""
     bounds: list[tuple[float, float]] = []
     for dispersion in job.dispersions:
         tail = EDGE if dispersion.distribution.bounded else TAIL
@@ -72,12 +73,12 @@ def box(job: Job) -> list[tuple[float, float]]:
 def search(
     job: Job, law: str, requirement: Requirement, threads: int, begin: Array | None = None, seed: int = 0
 ) -> Found | None:
-    """Look for the worst of a requirement's metric over the box, with the random numbers of run 0 in all flights. begin: a
-    point (dims,) to look around, too. Ends early where a run has no such value, which is as bad as can be; None where no
-    scenario within the box can be flown.
-
-    An evolution strategy from many starts: random steps are flown from each side by side, and the worst of them is kept;
-    the steps adapt their size, and the half of the starts that is less bad is given up after each third of the rounds."""
+    """Search for the worst value of a requirement's metric over the box, with the random numbers of run 0 in all flights.
+    begin: a point (dims,) to search around as well. The search ends early where a run has no such value, the worst case;
+    None where no scenario within the box can be flown. It is an evolution strategy from many starts: a batch of random steps
+    is flown from each, and the worst is kept; step sizes adapt, and the less bad half of the starts is dropped after each
+    third of the rounds.
+    """
     side = 1.0 if requirement.at_most else -1.0
     evaluations = 0
     sought = np.random.default_rng(seed)
@@ -85,7 +86,8 @@ def search(
     low, high = np.array(box(job)).T
 
     def badness(points: Array) -> Array:
-        """The badness of points (n, dims): infinite where a run has no value, minus infinity where no such craft is."""
+        """Return the badness of points (n, dims): infinity where a run has no value, minus infinity where the craft is
+        refused."""
         nonlocal evaluations
         unit = np.ascontiguousarray(points.T)
         result = np.full(len(points), -np.inf)
@@ -130,7 +132,8 @@ def search(
 
 
 def _apart(points: Array, values: Array, least: Array, most: int) -> list[int]:
-    """The places of the worst points (n, dims) that differ from each other by the least along some side."""
+    """Return the indices of the worst points (n, dims) that differ from each other by at least the least distance along some
+    side."""
     apart: list[int] = []
     for place in np.argsort(-values, kind="stable").tolist():
         if all((np.abs(points[place] - points[other]) > least).any() for other in apart):
@@ -141,7 +144,7 @@ def _apart(points: Array, values: Array, least: Array, most: int) -> list[int]:
 
 
 def _stepped(points: Array, sizes: Array, count: int, low: Array, high: Array, sought: np.random.Generator) -> Array:
-    """Points (n, count, dims) that are a random step away from each of these (n, dims), along some sides of the box."""
+    """Return points (n, count, dims) a random step away from each of these (n, dims), along some sides of the box."""
     each = (len(points), count, 1)
     step = sought.normal(size=(len(points), count, len(low))) * sizes[:, None, None] * sought.lognormal(0.0, 0.7, each)
     step *= sought.random(step.shape) < sought.random(each)
@@ -149,8 +152,8 @@ def _stepped(points: Array, sizes: Array, count: int, low: Array, high: Array, s
 
 
 def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set[str]) -> tuple[Bracket, ...]:
-    """How bad what is required of a law gets: by its campaign, by a search, and at most by proof. The worst run of each is
-    kept as a scenario file in the campaign's folder; taken: the names of such files so far."""
+    """Bracket the worst value of each required metric of a law: by its campaign, by a search, and by proof. The worst run of
+    each is kept as a scenario file in the campaign's folder; taken: the names of such files so far."""
     gathered: list[Bracket] = []
     law, worst_runs = result.law, {verdict.name: verdict.worst_run for verdict in result.verdicts}
     for requirement in job.requirements(law):
@@ -171,7 +174,7 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set
 
 
 def _file_name(law: str, requirement: str, taken: set[str]) -> str:
-    """The name of the file of the worst run, which is added to those taken."""
+    """Return the file name of the worst run, which is added to those taken."""
     stem = f"worst-{law}-{_ODD.sub('-', requirement)}".encode()[:_LONGEST].decode(errors="ignore")
     names = (f"{stem}{'' if number == 1 else f'-{number}'}.toml" for number in count(1))
     name = next(name for name in names if name.casefold() not in taken)
@@ -180,15 +183,15 @@ def _file_name(law: str, requirement: str, taken: set[str]) -> str:
 
 
 _FOLLOWING = ("lag", "rate-limit")
-"""Actuators whose output lies between its own and the command."""
+"""Actuators whose output lies between their previous output and the command."""
 
 
 def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | None, str]:
-    """The bound that holds of a metric over everything that is drawn, and what it rests on; None where nothing is proved.
-
-    The torque on the body is bounded by where its command is cut off, where no effector makes the torque from that, no
-    actuator more of it, and no draw moves the limit. The claims of certificates bound no metric: they speak of motions in
-    the end and of torque applied continuously, while flights end and hold their torque for a control period."""
+    """Return the bound of a metric that holds over all draws, and its basis; None where nothing is proved. The saturation
+    limit of the command bounds the torque on the body, if no effector produces the torque, no actuator amplifies it, and no
+    draw changes the limit. The claims of certificates bound no metric: they are about ultimate bounds and continuous torque,
+    while flights end and hold their torque for a control period.
+    """
     lanes = job.lanes(law)
     loop = lanes.base.loop
     axes = {"peak_torque": 1.0, "peak_torque_norm": math.sqrt(3.0)}.get(requirement.metric)
@@ -201,4 +204,4 @@ def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | Non
     limit = max(phase.setup.limit for phase in loop.phases(lanes.steps))
     bound = limit * (axes if loop.limit == "axis" else 1.0)
     cut = "each component" if loop.limit == "axis" else "the norm"
-    return bound, f"the actuators cut {cut} of the torque off at {limit:.6g} N m"
+    return bound, f"the actuators limit {cut} of the torque off at {limit:.6g} N m"

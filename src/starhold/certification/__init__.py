@@ -1,2 +1,2 @@
-"""Claims about a closed loop with their proofs: each module makes claims of one kind, `certify` asks for all of them, and
-`certificate` says what a file of proofs holds."""
+"""Claims about a closed loop with their proofs: each module makes claims of one kind, `certify` collects all of them, and
+`certificate` defines the file of proofs."""

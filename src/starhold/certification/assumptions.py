@@ -1,5 +1,5 @@
-"""Assumptions of claims, by the identifiers of the kernel, are told in words, and looked for in flights; and what numbers of
-its loop a claim stands on."""
+"""States assumptions of claims, by the kernel's identifiers, in words, tests them on flights, and finds the numbers of its
+loop on which a claim depends."""
 
 import math
 from collections.abc import Callable, Iterable, Set
@@ -18,19 +18,20 @@ from starhold.parts.effectors.wheel_motion import has_friction
 from starhold.parts.effectors.wheels import BAND
 
 Unmet: TypeAlias = list[tuple[Any, str]]
-"""At which samples of a flight (n,), or whether at all, something is not met, each with a sentence without its end."""
+"""At which samples of a flight (n,), or whether at all, an assumption is violated, each with a sentence without its full
+stop."""
 
 
 class Assumption(NamedTuple):
-    """How an assumption is told, and where a flight (a `Span` of analysis) does not meet it; None of what every simulation
-    meets, of what a claim's set says, and of claims that are not about motions."""
+    """The text of an assumption, and where a flight (a `Span` of analysis) violates it; None for what every simulation
+    meets, for a claim's set, and for claims that are not about motions."""
 
     text: str
     unmet: Callable[[Any], Unmet] | None = None
 
 
 def assumption(identifier: str) -> Assumption:
-    """Return what an identifier stands for."""
+    """Return the assumption of an identifier."""
     if identifier.startswith(WITHOUT):
         part = identifier.removeprefix(WITHOUT)
 
@@ -45,17 +46,17 @@ def assumption(identifier: str) -> Assumption:
 
 
 def texts(identifiers: Iterable[str]) -> tuple[str, ...]:
-    """Return how assumptions are told, each text once."""
+    """Return the texts of assumptions, each once."""
     return tuple(dict.fromkeys(assumption(name).text for name in identifiers))
 
 
 def cancels(loop: ClosedLoop) -> bool:
-    """Tell whether the law takes the torque that the models know from what it commands: at the start, whatever that is."""
+    """Return whether the law subtracts the modelled torque from its command, as tested at an arbitrary start."""
     loop = loop.without("sensor", "estimator")
     measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
     memory = loop.law.remember(loop.gains, loop.craft, loop.period)
     more = 0.01 * loop.craft.torque_limit if math.isfinite(loop.craft.torque_limit) else 1.0
-    # From rest on target, where clipped and switching laws are farthest from their limits.
+    # From rest on target, where clipped and switching laws are farthest from saturation.
     measurement = measurement._replace(attitude=(1.0, 0.0, 0.0, 0.0), rate=ZERO)
     torques = [
         np.array(loop.law.command(measurement._replace(external_torque=(x, x, x)), loop.gains, loop.craft, memory)[0])
@@ -114,10 +115,10 @@ def _turning(span: Any) -> Unmet:
 UNLIMITED, WHEELS, FRICTIONLESS = "unlimited-torque", "unlimited-wheels", "frictionless-wheels"
 UNLIMITED_CONTROL, IN_THE_PLANE, LINEAR = "unlimited-control", "in-the-plane", "linear-motion"
 HAS = "the loop has the "
-"""Begins the words for a part that a claim leaves out, role and name."""
-# What keeps measurement and actuators from being ideal is a part, which is left out by name.
+"""The beginning of the text about a part that a claim leaves out, role and name."""
+# Imperfect measurement and actuators are parts, which are left out by name.
 _IDEAL = Assumption("exact measurement and ideal actuators")
-# How long the torque is held, and what changes, every departure looks at.
+# Every departure checks how long the torque is held, and what changes.
 ASSUMPTIONS = {
     "rigid-body": Assumption("rigid body"),
     "inertia-as-given": Assumption("inertia exactly as given"),
@@ -149,7 +150,7 @@ ASSUMPTIONS = {
     for name in (
         "bounded-push",
         "held-torque",
-        # Of one flight nobody knows of what distribution its noise is.
+        # The distribution of noise cannot be told from one flight.
         "gaussian-noise",
         "linear-estimate",
         "settled-estimate",
@@ -162,17 +163,17 @@ ASSUMPTIONS = {
         "off-the-bodies",
     )
 }
-"""The assumptions of claims, but for parts that these leave out by name."""
+"""The assumptions of claims, except for parts left out by name."""
 
 
 @dataclass(frozen=True)
 class Standing:
-    """A claim stands with the gains it was made for, and with other numbers where this says so.
-
-    known: whether with any inertia that the law takes the craft for; true: "given" with the true one it was made for,
-    "any", or "box" with those whose entries differ by at most `tolerance` sqrt(J_ii J_jj); limit: "given", "any" or
-    "above", which is that limit or a larger one; momentum: whether with any angular momentum at the start; start: the
-    level of V that the start is to be below, None for any start."""
+    """A claim stands with the gains it was made for, and with other numbers as stated here. known: whether with any inertia
+    of the law's nominal model; true: "given" with the true one it was made for, "any", or "box" with those whose entries
+    differ by at most `tolerance` sqrt(J_ii J_jj); limit: "given", "any" or "above", which is that limit or a larger one;
+    momentum: whether with any angular momentum at the start; start: the level of V below which the start must be, None for
+    any start.
+    """
 
     known: bool
     true: str
@@ -183,11 +184,12 @@ class Standing:
 
 
 def standing(claim: Claim, reads: Set[str]) -> Standing:
-    """Tell what a claim stands on, of a law that reads these numbers of its nominal model: "inertia", "torque_limit"."""
+    """Return the numbers with which a claim stands, for a law that reads these of its nominal model: "inertia",
+    "torque_limit"."""
     free = not {UNLIMITED, WHEELS, LINEAR}.isdisjoint(claim.assumptions)
     limit = "given"
     if "torque_limit" not in reads:
-        # A set on which the torque is within its limit is one for every larger limit.
+        # A set on which the torque is within its limit also serves every larger limit.
         limit = "any" if free else "above" if "limit" in claim.numbers else "given"
     tolerance: float | None = claim.numbers.get("tolerance")
     true = "given" if "tolerance" not in claim.numbers else "any" if tolerance is None else "box"

@@ -1,7 +1,6 @@
-"""A certificate holds the loop it speaks of, claims as numbers, and for each claim what had to be shown and how.
-
-Sentences are made from the numbers when they are shown (`wording`), so that nothing in the file can say more than what
-the independent checker verifies.
+"""A certificate holds its loop, claims as numbers, and for each claim the obligations and their proofs. Sentences are made
+from the numbers when they are displayed (`wording`), so that nothing in the file can say more than the independent checker
+verifies.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ from starhold.version import __version__
 FORMAT = "starhold certificate 3"
 FILE, KERNEL = "certificate.json", "kernel.pyz"
 NOTE = (
-    "A claim with a number under 'proof' is that of the claims below, counted from 0, which kernel.pyz checks by itself. "
-    "Any other claim carries no proof, and is undecided."
+    "A number under 'proof' is the index, from 0, of a claim below, which kernel.pyz checks by itself. Any other claim "
+    "carries no proof, and is undecided."
 )
 Outcome = Literal["proved", "refuted", "undecided"]
 EXACT, BALLS = "exact identity", "ball arithmetic"
@@ -34,8 +33,8 @@ SQUARES, LYAPUNOV = "sum of squares", "Lyapunov's inequality"
 
 @dataclass(frozen=True)
 class Obligation:
-    """One thing that had to be shown. `how`: by which kind of rule; `evidence`: where it is refuted, the state (or inertia,
-    or eigenvalue) that refutes it, else why it is undecided."""
+    """One condition to be shown. `how`: the kind of rule; `evidence`: where it is refuted, the state (or inertia, or
+    eigenvalue) that refutes it, else why it is undecided."""
 
     name: str
     how: str
@@ -45,7 +44,7 @@ class Obligation:
 
 @dataclass(frozen=True)
 class Proof:
-    """A proof as the kernel checks it: the claim with its evidence, and the programs that it is about by their digests."""
+    """A proof as the kernel checks it: the claim with its evidence, and its programs by their digests."""
 
     claim: dict[str, Any]
     programs: dict[str, Any]
@@ -58,9 +57,9 @@ class Proof:
 
 @dataclass(frozen=True, repr=False)
 class Claim:
-    """`kind` says what is claimed, `numbers` how much, in SI units; None among them means without bound. `witness`:
-    numbers that make the proof, and that a checker needs. `proof`: what the kernel has checked; without one nothing
-    is decided."""
+    """`kind` names the claim, `numbers` quantify it, in SI units; None means unbounded. `witness`: numbers of the proof that
+    a checker needs. `proof`: the proof that the kernel has checked; without one nothing is decided.
+    """
 
     kind: str
     numbers: dict[str, Any]
@@ -82,7 +81,7 @@ class Claim:
 
     @property
     def left_out(self) -> list[str]:
-        """The parts of the loop that it is not about, each as role and name."""
+        """The parts of the loop that it leaves out, each as role and name."""
         return [name.removeprefix(WITHOUT) for name in self.assumptions if name.startswith(WITHOUT)]
 
     def refutation(self) -> Obligation | None:
@@ -94,13 +93,13 @@ WITHOUT, ORBIT = "without:", "orbit-within:"
 """Begin the identifiers of the assumptions that a part is not there, role and name, and that forces move the orbit by no
 more than a share."""
 BESIDE = ("sampling", "control-limit", "saturated-axis")
-"""Kinds of claims about a control loop that say nothing of where its motion ends, and go with one that does."""
+"""Kinds of claims about a control loop that state no ultimate bound, and accompany one that does."""
 
 
 @dataclass(frozen=True, repr=False)
 class Certificate:
-    """Claims about one closed loop; `subject` holds all that the claims speak of, as plain numbers and names. `proof`: what
-    the kernel is given, of claims that it decides."""
+    """Claims about one closed loop; `subject` holds the loop, as plain numbers and names. `proof`: the kernel's input, for
+    claims that it decides."""
 
     name: str
     subject: dict[str, Any]
@@ -113,8 +112,8 @@ class Certificate:
 
     @property
     def outcome(self) -> Outcome:
-        """Refuted if a claim is, undecided if one is or none is made of where the motion ends; but where it is proved how
-        near to its target the loop comes as it flies, what is undecided of an ideal one does not count."""
+        """Refuted if a claim is; undecided if one is, or if none states an ultimate bound. Where the pointing bound of the
+        loop as it flies is proved, undecided claims about an ideal loop do not count."""
         flown = any(claim.kind == "pointing" and claim.outcome == "proved" for claim in self.claims)
         decided = [claim for claim in self.claims if claim.outcome != "undecided" or not flown]
         found = {claim.outcome for claim in decided}
@@ -125,7 +124,7 @@ class Certificate:
 
     @property
     def proofs(self) -> list[Proof]:
-        """Return the proofs in the order in which a file holds them: those of the claims, and those told for all of them."""
+        """Return the proofs in the order of the file: those of the claims, and those common to all of them."""
         whole = self.proof or {"claims": [], "programs": {}}
         found = [claim.proof for claim in self.claims if claim.proof is not None]
         roles = [(claim, claim["programs"].values()) for claim in whole["claims"]]
@@ -137,22 +136,22 @@ class Certificate:
         return next((proof.claim["programs"]["law"] for proof in self.proofs if "law" in proof.claim["programs"]), "")
 
     def programs(self, claim: Claim) -> dict[str, Any]:
-        """Return the programs that the proof of a claim is about, by their roles; none of a claim without a proof."""
+        """Return the programs of a claim's proof, by their roles; none for a claim without a proof."""
         proof = claim.proof
         if proof is None and self.proof is not None and claim.outcome != "undecided":
-            # The proof that is told for all claims has those that are decided, in their order.
+            # The common proof has the decided claims, in order.
             place = [one for one in self.claims if one.outcome != "undecided"].index(claim)
             proof = Proof(self.proof["claims"][place], self.proof["programs"])
         return {} if proof is None else proof.roles
 
     def claim(self, kind: str) -> Claim | None:
-        """The claim of a kind, where one is made."""
+        """Return the claim of this kind, or None."""
         return next((claim for claim in self.claims if claim.kind == kind), None)
 
 
 def write(certificates: Sequence[Certificate], scenario: str, path: Path) -> None:
-    """The certificates of a scenario's laws as one JSON file; every number reads back as the same float. Claims with proofs
-    stand there as the kernel reads them; what it does not read stands beside them."""
+    """Write the certificates of a scenario's laws as one JSON file; every number reads back as the same float. Claims with
+    proofs are in the kernel's format, next to entries that it does not read."""
     versions = {"starhold": __version__, "python": platform.python_version()}
     versions |= {name: metadata.version(name) for name in ("python-flint", "numpy", "scipy")}
     proofs = [proof for certificate in certificates for proof in certificate.proofs]

@@ -14,9 +14,9 @@ from starhold.certification.certificate import EXACT, Certificate, Claim, Obliga
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.evidence.pointing import POINTS
-from starhold.certification.openness import named
 from starhold.certification.proofs import HELD_AND_PUSHED, pointed, proved_claims
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
+from starhold.certification.unmodelled import named
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import CLOCK
@@ -28,10 +28,10 @@ class Wanted:
     """The claims to be made; by default the most that can be proved.
 
     rate: convergence from every attitude and rates up to this (rad/s; inf for any); turn: torque within its limit on every
-    turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of a torque nobody models (N m);
-    momentum: norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; pointing: how
-    near to the target the loop comes as it flies, which takes seconds, and is wanted with a disturbance in any case; alone:
-    nothing but that; like: that as the claim of another loop starts, within the same limits."""
+    turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of an unmodelled torque (N m); momentum:
+    norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; pointing: the pointing
+    bound of the loop as it flies, which takes seconds, and is always claimed with a disturbance; alone: only that; like:
+    that claim, with the start set and the limits of another loop's claim."""
 
     rate: float | None = None
     slew_angle: float | None = None
@@ -46,7 +46,7 @@ class Wanted:
 BEST = Wanted()
 APART = "inertia, gains and period are too far apart in size"
 ASSUMPTIONS = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
-"""What all claims assume of which nothing is proved."""
+"""Assumptions of all claims without a proof."""
 INSTEAD = {
     "sliding": ("continuous-torque", UNLIMITED, "bounded-outside-torque"),
     "torque-limit": ("continuous-torque", "known-outside-torque"),
@@ -54,22 +54,22 @@ INSTEAD = {
     "inertia": ("continuous-torque", UNLIMITED, "no-outside-torque", "target-at-rest"),
     "sampling": (LINEAR, UNLIMITED, "no-outside-torque"),
 }
-"""What claims of a kind assume besides."""
+"""Further assumptions of claims, by kind."""
 EVERYWHERE = {"rate_everywhere": None, "everything": True}
 
 
 def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certificate:
-    """The certificate of a closed loop as it starts, whatever happens to it later. A law that keeps a memory or declares
-    neither V nor a surface nor a single root gets one without claims, which is undecided; so does a surface with wheels, and
-    a loop that counts on a lost wheel. Of a law that polynomials cannot follow the one claim is undecided, and names the
-    operation and its line; so it is where numbers are too far apart in size for floats to guess with."""
+    """Certify a closed loop as it starts, whatever happens later. A law that keeps a memory or declares neither V nor a
+    surface nor a single root gets a certificate without claims, which is undecided; so does a surface with wheels, and a
+    loop that relies on a lost wheel. For a law that polynomials cannot follow the only claim is undecided, and names the
+    operation and its line; likewise where numbers are too far apart in size for floating-point guesses."""
     subject = make_subject(loop, wanted.disturbance, wanted.momentum)
     try:
         # What overflows in a guess is caught where the guess is verified.
         with np.errstate(all="ignore"):
             claims = _claims(subject, wanted)
     except UnreadableError as reason:
-        # Nothing is known of such a law, whatever else was asked for.
+        # Nothing is known of such a law, whatever else was requested.
         claims = [undecided("convergence", EVERYWHERE, subject, str(reason))]
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
         claims = [undecided("convergence", EVERYWHERE, subject, f"{APART}: {reason}")]
@@ -108,7 +108,7 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
 
 
 def between_samples(subject: Subject, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:
-    """The claim about torque held between samples, proved or not."""
+    """Return the claim about torque held between samples, proved or not."""
     if "sampling" not in proved:
         read(subject.loop)
     numbers = {"period": subject.loop.period, "longest": None, "every_shorter": False}
@@ -121,7 +121,7 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim], 
     if main is not None and main.outcome == "proved" and rate is not None and not main.numbers["everything"]:
         reached = main.numbers["rate_everywhere"]
         if reached is None or reached < rate:
-            shown = "on a set that does not hold every attitude" if reached is None else f"up to {reached:g} rad/s"
+            shown = "on a set that does not contain every attitude" if reached is None else f"up to {reached:g} rad/s"
             main, reason = None, f"it is proved {shown} only"
     if main is None:
         read(subject.loop)
@@ -136,7 +136,7 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim], 
 def _unshown(
     subject: Subject, wanted: Wanted, proved: Mapping[str, Claim], reason: str, uncertain: str | None = None
 ) -> list[Claim]:
-    """Claims that are asked for and not proved."""
+    """Yield requested claims that are not proved."""
     rate, turn, tolerance, loop = wanted.rate, wanted.slew_angle, wanted.inertia_tolerance, subject.loop
     asked: list[tuple[str, dict[str, Any], str]] = []
     if rate is not None and loop.law.lyapunov is None:
@@ -154,7 +154,7 @@ def _unshown(
 
 
 def undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:
-    """A claim of which it is not known whether it holds, with the reason."""
+    """Return a claim that is undecided, with the reason."""
     besides = INSTEAD.get(kind, ("continuous-torque", UNLIMITED, "known-outside-torque"))
     assumptions = [*ASSUMPTIONS, *besides] + ["no-wheels"] * (kind == "sampling" and subject.loop.wheels is not None)
     if subject.loop.wheels is not None:

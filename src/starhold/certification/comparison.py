@@ -1,4 +1,4 @@
-"""Compares a proof with a loop: whether its programs and numbers are those that fly."""
+"""Compares the programs and numbers of a proof with those of a loop that flies."""
 
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
@@ -12,8 +12,8 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
-from starhold.certification.openness import Pushes, driven_errors, pushes, samples_of
 from starhold.certification.subject import above, make_subject
+from starhold.certification.unmodelled import Pushes, driven_errors, pushes, samples_of
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
 from starhold.kernel.theorems.noise import BESIDE
@@ -23,27 +23,27 @@ from starhold.parts.effectors.wheels import BAND
 
 
 def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = None) -> list[str]:
-    """Return how a claim, which the kernel has checked, is about another loop than this one, or about less than another mode
-    hands over, up to its ends; nothing where it is not."""
+    """Return how a claim, which the kernel has checked, differs from this loop, or covers less than another mode hands over,
+    up to its ends; empty where it does not."""
     own = Loop(make_subject(loop))
     apart = [*_programs(claim, own.roles, own.subject), *_numbers(claim, own)]
     return [*apart, *_words(claim, own), *_handed_over(claim, ends)]
 
 
 def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
-    """Return the same of a claim about keeping a craft near a libration point."""
+    """Return the same for a claim about keeping a craft near a libration point."""
     own, limit = Station(loop).claim(claim["theorem"]), loop.saturation_limit()
     kinds = {"limit.axis": "axis", "limit.norm": "norm", "limit": "axis"}
     told = {kinds[name]: rational(x) for name, x in claim["numbers"].items() if name in kinds}
     other = any(kind != loop.limit or not isfinite(limit) or x != Fraction(limit) for kind, x in told.items())
-    return [*_programs(claim, own["programs"], own["subject"]), *["the limit is another one"] * other]
+    return [*_programs(claim, own["programs"], own["subject"]), *["the limit differs"] * other]
 
 
 def _programs(claim: Mapping[str, Any], programs: Mapping[str, str], subject: Mapping[str, str]) -> Iterator[str]:
     # A theorem refuses a claim that lacks a program which it is about.
     for role, digest in programs.items():
         if claim["programs"].get(role, digest) != digest:
-            yield f"the program of the {role} is another one"
+            yield f"the program of the {role} differs"
     for name, x in claim["subject"].items():
         if name not in subject or rational(subject[name]) != rational(x):
             yield f"{name} is another number"
@@ -52,7 +52,7 @@ def _programs(claim: Mapping[str, Any], programs: Mapping[str, str], subject: Ma
 def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     loop, known, wheels = own.loop, own.known, own.loop.wheels
     told = {name: rational(x) for name, x in claim["numbers"].items()}
-    # A larger limit than the loop's refutes more, a torque from outside is what was asked for.
+    # A larger limit than the loop's refutes more; an external torque is the requested one.
     side = -1 if claim["theorem"] in REFUTING else 1
     exactly = {"period": loop.period, "hysteresis": loop.hysteresis_width}
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
@@ -63,7 +63,7 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
         envelope = known.envelope(BESIDE in told)._replace(momentum=above(exact(told.get("momentum", 0))))
         least |= {name: exact(x) for name, x in pushes(loop, envelope).numbers.items()}
         least["outside"] += 0 if OUTSIDE in claim["taken"] else known.modelled_norm
-        # What is not told of is none.
+        # What is not stated is zero.
         told = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | told
     most = {"limit": float(loop.craft.torque_limit), "limit.norm": float(loop.craft.torque_limit)}
     if wheels is not None:
@@ -71,7 +71,7 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
         most |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit)}
     for name, x in told.items():
         if name in exactly and x != Fraction(exactly[name]):
-            yield f"the {name} is another number"
+            yield f"the {name} differs"
         if name in least and side > 0 and x < Fraction(int(least[name].p), int(least[name].q)):
             yield f"{name} is exceeded"
         if name in most and isfinite(most[name]) and side * x > side * Fraction(most[name]):
@@ -91,13 +91,13 @@ def _handed_over(claim: Mapping[str, Any], ends: Ends | None) -> Iterator[str]:
         yield "no mode hands over to it"
         return
     rate, angle = ends
-    # Which of its quaternions tells an attitude matters but for these.
+    # The sign of the quaternion matters except for these.
     either = SHORTEST in claim["taken"] or "both" in claim["theorem"]
     least = {"rate": inf if rate is None else rate, "angle": angle if angle is not None and either else ANY_ANGLE}
     for name, most in least.items():
         told = claim["numbers"].get(f"start.{name}")
         if told is not None and rational(told) < most:
-            yield f"the mode before may end with a larger {name}"
+            yield f"the previous mode may end with a larger {name}"
 
 
 def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
@@ -108,4 +108,4 @@ def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     if taken & {SHORTEST, HYSTERESIS} != set(sign_words(own.loop) if signed else []):
         yield "the sign of the quaternion is chosen in another way"
     if theorem != SAMPLED and (WHEELS in taken) != (own.loop.wheels is not None):
-        yield "wheels are there, or are not"
+        yield "only one of the two has wheels"

@@ -1,29 +1,29 @@
-"""The claim that a law takes over every motion that another one hands to it: where that one ends, by the condition of the
-switch, lies in the set from which this one brings the body to rest on target."""
+"""The claim that a law takes over every motion that another one hands to it: the states at the switch, by its condition, lie
+in the region from which this law brings the body to rest on target."""
 
 from collections.abc import Mapping
 from typing import TypeAlias
 
 from starhold.certification.certificate import Certificate
 from starhold.certification.certify import between_samples, undecided
-from starhold.certification.openness import READ, named
 from starhold.certification.proofs import taken_over
 from starhold.certification.subject import described, described_target, make_subject
+from starhold.certification.unmodelled import READ, named
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
 Ends: TypeAlias = tuple[float | None, float | None]
 """Rate (rad/s) and angle (rad) up to which a switch hands over; None for no bound."""
 ROUNDING = 2.0**-45
-"""Share by which a rate or an angle that a law computes is off at most, for angles up to `WIDEST`."""
+"""The largest relative error of a rate or an angle that a law computes, for angles up to `WIDEST`."""
 WIDEST = 3.0
-"""Angles (rad) up to which sines tell them apart."""
+"""The largest angle (rad) that its sine determines."""
 
 
 def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[str, float]) -> Certificate | None:
-    """The certificate of the loop of the law that takes over from the loop before. levels: the tests of the switch, in
-    rad/s and rad. None where no V shows from where the motions of this loop end on target, or where that is not everywhere
-    and nothing bounds the rate."""
+    """Return the certificate of the loop that takes over from the previous loop. levels: the tests of the switch, in rad/s
+    and rad. None where no V gives a region of attraction of this loop, or where that is bounded and nothing bounds the rate.
+    """
     if loop.remembers or loop.law.lyapunov is None or not (loop.wheels is None or gives_allocated_torque(loop.wheels)):
         return None
     subject, (rate, angle) = make_subject(loop), ends(levels, before, loop)
@@ -37,10 +37,10 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
 
 
 def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> Ends:
-    """Rate and angle, relative to the target of the next mode, up to which the tests of a switch hold, as rounding may pass
-    them; None for no bound."""
+    """Return the rate and angle, relative to the target of the next mode, up to which the tests of a switch hold, allowing
+    for rounding; None for no bound."""
     last, target = described_target(before), described_target(after)
-    # Of other targets the description does not hold all.
+    # For other targets the description is incomplete.
     same = last == target and target["target"] in READ["target"]
     still = target["target"] == "inertial"
     rates = [levels.get("rate_below")] if same or (still and last["target"] == "inertial") else []

@@ -51,7 +51,7 @@ def inverse(a: Rows) -> Rows:
 
 
 def definite(a: Rows) -> bool:
-    """Whether a symmetric matrix is positive definite, by its pivots."""
+    """Return whether a symmetric matrix is positive definite, by its pivots."""
     rest = [list(row) for row in a]
     for k in range(len(rest)):
         pivot = rest[k][k]

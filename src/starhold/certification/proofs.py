@@ -1,4 +1,4 @@
-"""Claims that the kernel has proved, as sentences, departures, trials and pages read them."""
+"""Claims that the kernel has proved, in the form that sentences, departures, trials and pages use."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -37,13 +37,14 @@ HOW = {
     **dict.fromkeys(("Squares", "Sum"), SQUARES),
     **dict.fromkeys(("Contracts", "Persists"), LYAPUNOV),
 }
-"""How each rule of the kernel shows what it shows."""
+"""The method of each rule of the kernel, in words."""
 IN_THE_LOOP = {"known-target", "quaternion-as-fed", "sign-at-once"}
-"""What every loop meets as it is composed: its law is told how the target moves, and how the quaternion's sign is chosen."""
+"""Assumptions that every loop meets by composition: its law knows the target's motion, and how the quaternion's sign is
+chosen."""
 
 
 HELD_AND_PUSHED = ("rigid-body", "inertia-as-given", "bounded-push", "held-torque")
-"""What a claim of how near to its target a loop comes assumes that nothing is known of."""
+"""The assumptions of a pointing claim about unknown quantities."""
 
 
 def proved_claims(
@@ -53,38 +54,39 @@ def proved_claims(
     tolerance: float | None = None,
     pointing: bool = False,
 ) -> tuple[dict[str, Claim], dict[str, str]]:
-    """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: what is proved,
-    and of what is not what is refuted; and why no evidence was found for other theorems. turn: what the set within limits
-    is to hold (rad); rate: up to which motions are to end on target from every attitude (rad/s, inf for any); tolerance: of
-    the inertia, the largest unless told; pointing: whether to find how near to the target the loop comes as it flies."""
+    """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: proved ones,
+    and refuted ones among the others; and why no evidence was found for other theorems. turn: the rotation that the set
+    within limits must contain (rad); rate: up to which motions should converge from every attitude (rad/s, inf for any);
+    tolerance: of the inertia, by default the largest; pointing: whether to find the pointing bound of the loop as it flies.
+    """
     found = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
         find_pointed(found)
     find_refuted(found, turn, rate)
     claims = met(checked(found))
-    # What is refuted is what was asked for, where less may be proved.
+    # The refuted claim is the requested one; a weaker one may be proved.
     against = [claim for claim in claims if claim.outcome == "refuted"]
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
 
 
 def pointed(subject: Subject, like: Claim | None = None) -> tuple[Claim | None, str]:
-    """Return the claim of how near to the target a loop comes as it flies, or why no evidence was found. like: the claim of
-    another loop, to start as that one does, within the same limits."""
+    """Return the pointing claim of a loop as it flies, or why no evidence was found. like: the claim of another loop, for
+    the same start set and limits."""
     found = Loop(subject)
     find_pointed(found, None if like is None or like.proof is None else like.proof.claim["numbers"])
     return next(iter(checked(found)), None), found.failed.get(POINTS, "no proof was found")
 
 
 def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tuple[dict[str, Claim], dict[str, str]] | None:
-    """Return the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) end on
-    target, where it is proved, and the one about torque held between samples, by their kinds, and why others were not found;
-    None where it is not known from where motions end, or where that is not everywhere and nothing bounds the rate."""
+    """Return the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) converge to
+    the target, if proved, and the one about torque held between samples, by their kinds, and why others were not found; None
+    where no region of attraction is known, or where it is bounded and nothing bounds the rate."""
     found = find_taken_over(subject, rate, angle)
     return None if found is None else ({claim.kind: claim for claim in checked(found)}, found.failed)
 
 
 def checked(found: Loop) -> list[Claim]:
-    """Return claims that were found, as the kernel tells of them, but those whose check takes more work than it does."""
+    """Return the claims found, as the kernel reports them, except those whose check exceeds its work limit."""
     claims = list[Claim]()
     for given in found.claims:
         try:
@@ -99,8 +101,8 @@ def checked(found: Loop) -> list[Claim]:
 
 
 def met(claims: list[Claim]) -> list[Claim]:
-    """Return claims without the assumption that the torque has no limit, where one of them shows that the law keeps within
-    it in every state; what that one assumes of pushes they assume then."""
+    """Return claims without the assumption of unlimited torque, where one of them shows that the law keeps within its limit
+    in every state; they then share its assumptions about disturbances."""
     kept = next((c for c in claims if c.kind == "torque-limit" and c.outcome == "proved" and c.numbers["everything"]), None)
     if kept is None:
         return claims
@@ -113,7 +115,7 @@ def met(claims: list[Claim]) -> list[Claim]:
 
 
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
-    """Return a claim with the numbers, assumptions and obligations that the kernel tells of it."""
+    """Return a claim with the numbers, assumptions and obligations that the kernel reports."""
     label, numbers = proved.statement.label, proved.claim.numbers.content
     witness = loop.written_by.get(given["programs"].get("lyapunov", ""), {})
     steps = {(name.rstrip("+-0123456789 "), HOW[rule]): None for name, rule in proved.shown}
@@ -130,7 +132,7 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
         label,
         told,
         dict(witness),
-        # Limits that a claim about wheels does not tell they do not have.
+        # Wheels have no limits other than those that the claim states.
         tuple(x for x in assumed(proved.statement.assumptions, loop) if (x, label) != (WHEELS, "wheels")),
         tuple(shown),
         Proof(dict(given), programs),
@@ -138,7 +140,7 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
 
 
 def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
-    """Return what a claim assumes beyond what its loop meets as it is composed."""
+    """Return the assumptions of a claim beyond those that its loop meets by composition."""
     wheeled = loop.loop.wheels is not None
     own = {"target-at-rest": loop.known.moving, "no-wheels": wheeled} | dict.fromkeys(IN_THE_LOOP, False)
     named = [name for name in identifiers if own.get(name, True)]
@@ -149,7 +151,7 @@ def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
 
 
 def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
-    """Return the numbers of the set that motions start from."""
+    """Return the numbers of the start set."""
     if "level" not in numbers:
         return {
             "level": None,
@@ -159,7 +161,7 @@ def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
             "rate": None,
             "rate_everywhere": None,
         }
-    # Of an inertia that is not known no rate is told.
+    # For an unknown inertia no rate is stated.
     level, angle, rate = (below(_exact(numbers[n])) if n in numbers else None for n in ("level", "angle", "rate"))
     whole = numbers.get("start.angle") == ANY_ANGLE
     everywhere = below(_exact(numbers["start.rate"])) if whole else None
@@ -245,8 +247,8 @@ def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 
 def _funnel(within: Sequence[tuple[Fraction, Fraction]], settling: float, angle: float) -> list[tuple[float, float]]:
-    """Return times (s), each with the angle (rad) that motions do not exceed from then on, and the end last."""
-    # A little more, for floats tell the angle.
+    """Return times (s), each with the angle (rad) that motions do not exceed from then on; the ultimate bound is last."""
+    # A margin, because the angle is computed in floats.
     told = [(above(_exact(time)), 2.0 * asin(min(float(sine), 1.0)) * (1.0 + 1e-9)) for time, sine in within]
     return [*((time, most) for time, most in told if time < settling and most > angle), (settling, angle)]
 
@@ -269,7 +271,7 @@ _NUMBERS = {
 
 
 def refutation(proved: Proved, given: Mapping[str, Any], loop: Loop) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """Return which obligation does not hold, the numbers of the claim that needs it, and what shows that."""
+    """Return the obligation that fails, the numbers of the claim that needs it, and the counterexample."""
     numbers, theorem = proved.claim.numbers.content, proved.claim.theorem
     found = {name: o for name, o in obligations(given, loop.by_digest)[0].items() if isinstance(o, Exceeds)}
 

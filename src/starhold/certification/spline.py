@@ -118,7 +118,7 @@ BITS = 192
 POINTS = 17
 """At which peaks are guessed on each stretch."""
 MOST = 4_000_000
-"""Parts of stretches that one proof may take."""
+"""The most parts of stretches in one proof."""
 MARGINS = (1.01, 1.1, 2.0, 10.0)
 BESIDE = 1e-3
 """The bound of the acceleration has this much room beside a share of the peak, in squares of the rate: an even turn has
@@ -173,7 +173,7 @@ def _enclosing(balls: list[Any]) -> Intervals:
     zero = np.array([bool(ball.is_zero()) for ball in balls])
     low, high = (np.where(zero, 0.0, np.nextafter(middles, end)) for end in (-np.inf, np.inf))
     if not all(arb(a) <= ball <= arb(b) for a, b, ball in zip(low.tolist(), high.tolist(), balls, strict=True)):
-        raise ArithmeticError("the target's motion is known too badly")
+        raise ArithmeticError("the target's motion is known too imprecisely")
     return Intervals(low, high)
 
 

@@ -1,5 +1,5 @@
-"""Certificates of station-keeping loops: what they speak of, and which claims are made. What a law declares to make
-attractive decides that: errors that vanish there, with their V, or a place of rest."""
+"""Certificates of station-keeping loops: their subjects and their claims. These depend on the set that a law declares to
+make attractive: errors that vanish there, with their V, or an equilibrium."""
 
 import json
 import math
@@ -11,14 +11,14 @@ import numpy as np
 from starhold.certification.certificate import BALLS, EXACT, Certificate, Claim, Obligation
 from starhold.certification.evidence.finding import certificate
 from starhold.certification.evidence.station import UNSHOWN, Station, full_problem
-from starhold.certification.openness import assumed_away, named
 from starhold.certification.subject import described_gains
+from starhold.certification.unmodelled import assumed_away, named
 from starhold.kernel.check import check
 from starhold.laws.point_programs import claim_of
 from starhold.loop.closed_loop import ClosedLoop
 
 SURE = ("circling-bodies", "exact-place", "continuous-control")
-"""What is assumed of every loop."""
+"""The assumptions about every loop."""
 WEAK, ASIDE = "the feedback is too weak", "the other axes cannot be held with so little control"
 
 
@@ -66,7 +66,7 @@ def _rest(station: Station) -> list[Claim | None]:
 
 
 def _tried(show: Callable[[], None]) -> str:
-    """Return why nothing was found; empty where it was."""
+    """Return why nothing was found; empty where something was."""
     try:
         show()
     except UNSHOWN as reason:
@@ -86,13 +86,13 @@ def _undecided(loop: ClosedLoop, kind: str, obligation: str, why: str, told: Any
 
 
 def _mismatch(loop: ClosedLoop) -> str:
-    """Return the fault of a law that undoes another model than the one that is flown; empty where it undoes that."""
+    """Return the mismatch of a law that cancels another model than the one that flies; empty where it cancels that."""
     undoes = bool(getattr(loop.gains, "model", full_problem(loop)))
     if undoes == full_problem(loop):
         return ""
     if undoes:
-        return "the law undoes what the linear model does not have"
-    return "the law undoes the linear model, and the full problem is flown"
+        return "the law cancels terms that the linear model lacks"
+    return "the law cancels the linear model, but the full problem is flown"
 
 
 def _as_told(told: Any) -> Claim:

@@ -1,4 +1,4 @@
-"""The loop a certificate speaks of, and bounds on what acts on it from outside."""
+"""The loop of a certificate, and bounds of external effects on it."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from starhold.certification.matrices import Rows, greatest, inverse, least, matr
 from starhold.certification.openness import READ, assumed_away, envelope_of
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
+from starhold.certification.unmodelled import READ, assumed_away, envelope_of
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
@@ -53,7 +54,7 @@ class Subject:
         return rows(tensor(self.loop.craft.inertia))
 
     def envelope(self, noisy: bool) -> Envelope:
-        """Tell what its motions do not leave, for the bounds of parts; noisy: but for a share of times."""
+        """Return the envelope of its motions, for the bounds of parts; noisy: except for a share of times."""
         return envelope_of(self.loop, above(self.total_momentum), noisy)
 
     @property

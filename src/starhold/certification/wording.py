@@ -30,11 +30,11 @@ HEADINGS = {
 
 
 def shown(value: float, unit: str = "", up: bool = False) -> str:
-    """A number as it was written, where that takes no more than seven digits; else with four, rounded down, or up where it
-    bounds from above, so as not to say more than is proved."""
+    """Show a number as it was written, if that takes at most seven digits; else with four, rounded down, or up where it
+    bounds from above, so that no more is said than is proved."""
     written = Decimal(f"{value:.15g}")
     if len(written.normalize().as_tuple().digits) <= 7:
-        # A unit that was changed costs the last bits.
+        # Converting a unit loses the last bits.
         return f"{float(written):.7g}{unit}"
     rounding = ROUND_CEILING if up else ROUND_FLOOR
     return f"{float(Context(prec=4, rounding=rounding).create_decimal(Decimal(value))):g}{unit}"
@@ -51,9 +51,9 @@ def speed(rate: float, up: bool = False) -> str:
 
 
 def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """The claim in a sentence, whether or not it is proved, with the assumption about the loop's limits that decides it.
-    Numbers that are refuted are rounded to say no less."""
-    # What a loop has and a claim leaves out decides what the claim is worth.
+    """Return the claim as a sentence, whether or not it is proved, with its decisive assumption about the loop's limits.
+    Refuted numbers are rounded so that the sentence says no less."""
+    # The parts that a claim leaves out decide its value.
     absent = claim.left_out
     return (f"without {enumerated(absent)}, " if absent else "") + statement(claim, subject)
 
@@ -86,7 +86,7 @@ def grouped(certificate: Certificate) -> dict[str, list[Claim]]:
 
 
 def coverage(claim: Claim, subject: Mapping[str, Any]) -> str:
-    """How many of the loop's parts a claim takes in; empty where that is not told of the loop."""
+    """State how many of the loop's parts a claim includes; empty where the loop's parts are not known."""
     count, absent = subject.get("parts"), len(claim.left_out)
     if not count:
         return ""
@@ -104,7 +104,7 @@ def enumerated(names: Sequence[str]) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Some things in a row, as a sentence has them."""
+    """List items for a sentence."""
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
@@ -144,7 +144,8 @@ def place(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
-    """States at rest turned up to an angle; an attitude has two quaternions, of which the other is turned by 360° less."""
+    """Describe states at rest rotated up to an angle; an attitude has two quaternions, and the angle of the other is 360°
+    less."""
     if turn < math.pi:
         return f"rest at up to {angle(turn, more)}"
     most = {"shortest": math.pi}
@@ -158,14 +159,14 @@ def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
 
 
 def unclaimed(subject: Mapping[str, Any]) -> str:
-    """Why a certificate claims nothing."""
+    """Return why a certificate claims nothing."""
     if "body" in subject:
-        return f"nothing is known of the body {subject['body']} that a proof could be built on"
+        return f"no theorem is about the body {subject['body']}"
     return "proofs are for laws with a Lyapunov function, one root, or a surface and no wheels"
 
 
 def _even(subject: Mapping[str, Any]) -> bool:
-    """Whether the law takes both quaternions of an attitude for the same."""
+    """Return whether the law treats both quaternions of an attitude alike."""
     law = known_law(subject.get("law", ""))
     return law is not None and law.card.quaternion_sign == "even"
 
@@ -185,7 +186,7 @@ def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _followed(subject: Mapping[str, Any]) -> str:
-    """The assumption on the target's motion, between the rows of its history, of a bound that depends on it."""
+    """State the assumption on the target's motion, between the rows of its history, for a bound that depends on it."""
     followed = subject.get("target") == "history" and subject["target_rate"]
     return ", while the target follows the rotation spline through its history" if followed else ""
 
@@ -349,7 +350,7 @@ def eigenvalues(claim: Claim) -> str:
 
 
 def _telling(z: complex) -> int:
-    """So many digits of an eigenvalue that it is seen on which side of the unit circle it lies."""
+    """Show enough digits of an eigenvalue to tell on which side of the unit circle it lies."""
     cut = (abs(complex(float(f"{z.real:.{n}g}"), float(f"{z.imag:.{n}g}"))) >= 1.0 for n in range(6, 17))
     return next((n for n, outside in enumerate(cut, 6) if outside == (abs(z) >= 1.0)), 17)
 
@@ -385,8 +386,8 @@ def _numbers(value: Any) -> str:
 
 
 def recheck(certificates: Sequence[Certificate], path: Path | None = None) -> str:
-    """The command that checks a file of certificates again, with the files of the laws that it speaks of; without a path
-    all files by their names alone, for a page or a header that is moved."""
+    """Return the command that checks a file of certificates again, with the files of its laws; without a path all files by
+    name alone, for a page or a header that may be moved."""
     files = dict.fromkeys(file_of(str(one.subject.get("law"))) for one in certificates)
     named = [(file if path else file.name) for file in files if file is not None]
     return shlex.join(
@@ -395,5 +396,5 @@ def recheck(certificates: Sequence[Certificate], path: Path | None = None) -> st
 
 
 def methods(claim: Claim) -> str:
-    """How a claim was shown."""
+    """State how a claim was shown."""
     return ", ".join(dict.fromkeys(obligation.how for obligation in claim.obligations))

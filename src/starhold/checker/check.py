@@ -1,5 +1,5 @@
-"""The check of a certificate file: the kernel decides every proof, and of what stands in the file beside the proofs nothing
-says more than they do."""
+"""The check of a certificate file: the kernel decides every proof, and the rest of the file must not say more than the
+proofs."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -34,11 +34,11 @@ from starhold.kernel.reading import FORMAT
 from starhold.kernel.sentences import ASSUMPTIONS
 
 BYTES, DEEPEST, DIGITS = 2**26, 32, 1_000
-"""The largest file; how deep its objects and lists may be in one another; digits of a number."""
+"""The largest file (bytes); the deepest nesting of its objects and lists; the most digits of a number."""
 
 
 def read_file(path: Path | str) -> tuple[Any, list[str]]:
-    """The content of a JSON file, and faults that its reading goes over; InputError where there is none that can be read."""
+    """Return the content of a JSON file, and faults that parsing ignores; InputError where it cannot be read."""
     faults: list[str] = []
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def read_file(path: Path | str) -> tuple[Any, list[str]]:
 
 
 def shallow(content: Any) -> None:
-    """A CheckError where objects and lists are in one another deeper than they may."""
+    """Raise a CheckError where objects and lists are nested too deeply."""
     inner: list[Any] = [content]
     for _ in range(DEEPEST):
         inner = [x for part in inner for x in _within(part)]
@@ -104,7 +104,7 @@ ENDS = (
     "equilibrium",
     "hand-over",
 )
-"""Kinds of claims about where the motion ends, one of which a certificate that counts as proved must hold."""
+"""Kinds of claims with an ultimate bound, one of which a certificate must contain to count as proved."""
 BY_THE_KERNEL = "proved by the kernel"
 """The reason of findings about claims with a proof."""
 
@@ -121,12 +121,12 @@ class Finding:
 
 
 def passed(findings: Sequence[Finding]) -> bool:
-    """Whether all that is claimed to be proved was shown again. What is not claimed is not proved either."""
+    """Whether all that is claimed to be proved was verified. A file without claims is not proved."""
     return all(finding.verdict != "fails" for finding in findings)
 
 
 def check_file(path: Path | str) -> list[Finding]:
-    """The findings about a certificate file; InputError where there is none that can be read."""
+    """Return the findings about a certificate file; InputError where it cannot be read."""
     content, faults = read_file(path)
     if isinstance(content, dict) and content.get("format") == FORMAT and "certificates" not in content:  # pyright: ignore
         try:
@@ -138,7 +138,7 @@ def check_file(path: Path | str) -> list[Finding]:
 
 
 def check(content: Any) -> list[Finding]:
-    """The findings about the content of a certificate file."""
+    """Return the findings about the content of a certificate file."""
     try:
         shallow(content)
         _known(content)
@@ -159,7 +159,7 @@ def _known(content: Any) -> None:
 
 
 def _proofs(content: Any) -> list[Proved]:
-    """Return what the kernel proves of a file, each claim of which has to be told of once, in order."""
+    """Return what the kernel proves of a file, in which each claim must occur once, in order."""
     told: list[Any] = []
     for given in content["certificates"]:
         parts: list[Any] = [given.get(key) if isinstance(given.get(key), list) else [] for key in ("claims", "proof")]
@@ -208,7 +208,7 @@ def _certificate(given: Mapping[str, Any], proofs: Sequence[Proved]) -> Iterator
 
 
 def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
-    """Do a piece of work: its result, or None and why it fails, for whatever goes wrong in a check fails it."""
+    """Run a piece of work: return its result, or None and why it fails, because any error in a check fails it."""
     try:
         return work(), ""
     except CheckError as fault:
@@ -220,7 +220,7 @@ def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
 def _of_unknown_body(given: Any) -> None:
     certificate_shaped(given)
     shaped(given["subject"], UNKNOWN_BODY, "the subject")
-    demand(not given["claims"] and given["outcome"] == "undecided", "it claims what is not known of this body")
+    demand(not given["claims"] and given["outcome"] == "undecided", "it makes claims that are not available for this body")
 
 
 def _of_station(name: str, subject: StationSubject, given: Any, proofs: Sequence[Proved]) -> list[Finding]:
@@ -242,18 +242,18 @@ def _subject(given: Any) -> StationSubject | Mapping[str, Any]:
     outcomes = [claim.get("outcome") for claim in given["claims"]]
     kinds = [str(claim.get("kind")) for claim in given["claims"]]
     if ("pointing", "proved") in zip(kinds, outcomes, strict=True):
-        # What is undecided of an ideal loop does not count beside the loop that flies.
+        # Undecided claims about an ideal loop do not count beside the loop that flies.
         outcomes = [outcome for outcome in outcomes if outcome != "undecided"]
     follows = outcome_of(outcomes)
     if follows == "proved" and not set(kinds) & set(ENDS):
         follows = "undecided"
     demand(given["outcome"] == follows, "the outcome does not follow from the claims")
-    demand(len(set(kinds)) == len(kinds), "two claims are of one kind")
+    demand(len(set(kinds)) == len(kinds), "two claims are of the same kind")
     return read_station(given["subject"]) if station else given["subject"]
 
 
 def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, str]]:
-    """Return what the kernel found of a claim with a proof; numbers and assumptions are those of the proof alone."""
+    """Return the kernel's findings about a claim with a proof; numbers and assumptions are only those of the proof."""
     shaped(claim, PROVED, "the claim")
     proved = proofs[int(claim["proof"])]
     demand(proved.statement.label == claim["kind"], f"the proof is of another kind of claim: {proved.statement.label}")
@@ -270,9 +270,9 @@ def _unproved(about: Mapping[str, Any], claim: Any) -> list[tuple[str, Verdict, 
     shaped(claim, CLAIM, "the claim")
     for obligation in claim["obligations"]:
         shaped(obligation, OBLIGATION, "an obligation")
-    demand(claim["outcome"] == "undecided", "such a claim comes with a proof, or is undecided")
+    demand(claim["outcome"] == "undecided", "such a claim needs a proof, or is undecided")
     outcomes = {obligation["outcome"] for obligation in claim["obligations"]}
-    demand(outcomes == {"undecided"} and not claim["witness"], "what is undecided has a reason, and no proof")
+    demand(outcomes == {"undecided"} and not claim["witness"], "an undecided claim needs a reason, and has no proof")
     absent = [f"without:{name}" for name in about["assumed_away"]]
     demand({*absent} <= {*claim["assumptions"]}, "a part that the claim leaves out is not named")
     named = [name for name in claim["assumptions"] if not name.startswith("without:")]

@@ -1,5 +1,5 @@
-"""The shape of a certificate file: the keys of each object, and what each may hold. Of a craft near a libration point the
-proof is compared with the law and with what the certificate tells."""
+"""The shape of a certificate file: the keys of each object, and their allowed values. For a craft near a libration point the
+proof is compared with the law and with the certificate."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ Verdict: TypeAlias = Literal["holds", "fails", "not claimed"]
 
 
 class CheckError(Exception):
-    """Why something in a certificate does not hold, or cannot be verified."""
+    """Something in a certificate does not hold, or cannot be verified."""
 
 
 def demand(holds: bool, otherwise: str) -> None:
@@ -29,22 +29,22 @@ def demand(holds: bool, otherwise: str) -> None:
 
 
 def shaped(given: Any, shape: Mapping[str, Test], where: str) -> None:
-    """That an object has exactly the keys of a shape, and under each what its test allows."""
+    """Check that an object has exactly the keys of a shape, and values that their tests allow."""
     demand(isinstance(given, Mapping), f"{where} is not an object")
-    demand(set(given) == set(shape), f"{where} has not the keys {', '.join(shape) or '(none)'}")
+    demand(set(given) == set(shape), f"{where} must have the keys {', '.join(shape) or '(none)'}")
     for key, test in shape.items():
-        demand(test(given[key]), f"{where} has something else than it may under {key}")
+        demand(test(given[key]), f"{where} has a value that is not allowed under {key}")
 
 
 def certificate_shaped(given: Any) -> None:
-    """That a certificate has the keys of one, and exactly the claims whose kinds it lists."""
+    """Check that a certificate has its keys, and exactly the claims whose kinds it lists."""
     shaped({key: part for key, part in given.items() if key != "proof"}, CERTIFICATE, "the certificate")
     kinds = [claim.get("kind") for claim in given["claims"]]
     demand(given["kinds"] == kinds, f"the claims are not those listed: {', '.join(given['kinds']) or '(none)'}")
 
 
 def outcome_of(parts: Sequence[Any]) -> str:
-    """The outcome of a whole whose parts have these: refuted if one is, proved if there are some and all are."""
+    """Return the outcome of a whole from its parts: refuted if one is, proved if there are some and all are."""
     if "refuted" in parts:
         return "refuted"
     return "proved" if parts and all(outcome == "proved" for outcome in parts) else "undecided"
@@ -60,7 +60,7 @@ def _number(x: Any) -> bool:
 
 
 def _text(x: Any) -> bool:
-    """Text of characters that can be written: no lone surrogates, none that steer a terminal."""
+    """Return whether a text is printable: no lone surrogates, no terminal control characters."""
     return isinstance(x, str) and x.isprintable()
 
 
@@ -73,7 +73,7 @@ def _object(x: Any) -> bool:
 
 
 def _plain(x: Any) -> bool:
-    """Numbers, texts, lists and objects without an infinity in them."""
+    """Return whether a value consists of finite numbers, texts, lists and objects."""
     if isinstance(x, Mapping):
         return all(isinstance(key, str) and _plain(value) for key, value in x.items())  # pyright: ignore
     return all(map(_plain, x)) if isinstance(x, list) else x is None or _flag(x) or _text(x) or _number(x)  # pyright: ignore
@@ -189,12 +189,12 @@ STATION: dict[str, Test] = {
 
 
 CLOSE = Fraction(1, 10**9)
-"""How far the numbers of a libration point may be from what they tell of one another, as a share of their size."""
+"""The relative tolerance of the relations between the numbers of a libration point."""
 
 
 @dataclass(frozen=True)
 class StationSubject:
-    """The subject of a certificate: the law and its gains, the plant and what the law takes it to be, and the limit."""
+    """Check the subject of a certificate: the law and its gains, the plant and the law's model of it, and the limit."""
 
     law: Law
     gains: Any
@@ -211,7 +211,7 @@ class StationSubject:
 
 
 def read_station(given: Mapping[str, Any]) -> StationSubject:
-    """The subject in a certificate whose keys and types are in order; a CheckError where it says what cannot be."""
+    """Check the subject of a certificate whose keys and types are in order; a CheckError where it is impossible."""
     law = catalogue("libration-point").get(given["law"])
     if law is None:
         raise CheckError(f"there is no law {given['law']} for libration points")

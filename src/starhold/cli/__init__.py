@@ -1,1 +1,1 @@
-"""The commands: each reads its arguments, calls the library and prints. `main` knows them all."""
+"""The commands: each reads its arguments, calls the library and prints. `main` registers them all."""

@@ -23,20 +23,20 @@ CampaignOutput = Annotated[Path | None, results_in("SCENARIO-campaign")]
 ReproductionOutput = Annotated[Path | None, results_in("reproduce-PAPER")]
 ExportOutput = Annotated[Path | None, results_in("SCENARIO-LAW-c")]
 Force = Annotated[bool, typer.Option("--force", help="replace results that are already there")]
-Rocq = Annotated[bool, typer.Option("--rocq", help="write what is proved as lemmas that Rocq checks, too: coqc NAME.v")]
-Why = Annotated[bool, typer.Option("--why", help="tell how each claim was shown, and all that it assumes, too")]
-Unstable = Annotated[bool, typer.Option("--allow-unstable", help="take gains that are known to be unstable")]
-Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or fly alone")]
-CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with half the integration step: how much changes?")]
+Rocq = Annotated[bool, typer.Option("--rocq", help="also write the proofs as lemmas for Rocq: coqc NAME.v")]
+Why = Annotated[bool, typer.Option("--why", help="state how each claim was shown and what it assumes")]
+Unstable = Annotated[bool, typer.Option("--allow-unstable", help="accept gains that are known to be unstable")]
+Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or only fly")]
+CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with half the step: what changes?")]
 
 
 class Drawn(StrEnum):
-    """A choice of what is drawn once the table is printed."""
+    """The choice of what is drawn once the table is printed."""
 
     NONE = "none"
     PAGE = "page"
     ALL = "all"
 
 
-Pictures = Annotated[Drawn, typer.Option("--pictures", help="draw nothing, report.html alone, or PNG files too")]
+Pictures = Annotated[Drawn, typer.Option("--pictures", help="draw nothing, report.html only, or PNG files too")]
 OneLaw = Annotated[str | None, typer.Option(help="which law of the file; all if not given")]

@@ -26,27 +26,27 @@ CampaignFolder = Annotated[Path, typer.Argument(metavar="DIR", help="the folder 
 
 def campaign(
     file: ScenarioFile,
-    runs: Annotated[int | None, typer.Option(help="of each law; else what the file says")] = None,
+    runs: Annotated[int | None, typer.Option(help="of each law; by default as the file says")] = None,
     law: OneLaw = None,
-    seed: Annotated[int | None, typer.Option(help="of the draws; else what the file says")] = None,
+    seed: Annotated[int | None, typer.Option(help="of the draws; by default as the file says")] = None,
     sampling: Annotated[
-        str | None, typer.Option(help="random, sobol, latin-hypercube, morris or saltelli; else what the file says")
+        str | None, typer.Option(help="random, sobol, latin-hypercube, morris or saltelli; by default as the file says")
     ] = None,
     until_decided: Annotated[
-        bool, typer.Option("--until-decided", help="end once every requirement is met or missed; runs are the most")
+        bool, typer.Option("--until-decided", help="stop once every requirement is decided; runs are the most")
     ] = False,
-    search: Annotated[bool, typer.Option("--search/--no-search", help="look for the worst of what is required")] = True,
-    threads: Annotated[int | None, typer.Option(help="of this process; all cores if nothing is said")] = None,
+    search: Annotated[bool, typer.Option("--search/--no-search", help="search for worst cases of required metrics")] = True,
+    threads: Annotated[int | None, typer.Option(help="of this process; all cores by default")] = None,
     workers: Annotated[int | None, typer.Option(help="processes of this machine in place of threads")] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://HOST:PORT", help="an existing Dask cluster in place of threads")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="fly what is missing in a folder that holds a part")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="fly the runs that are missing from a folder")] = False,
     output: CampaignOutput = None,
     force: Force = False,
     allow_unstable: Unstable = False,
 ) -> None:
-    """Fly many runs with numbers drawn from distributions: verdicts, what drives failures, the worst runs, report.html."""
+    """Fly many runs with numbers drawn from distributions: verdicts, drivers of failures, the worst runs, report.html."""
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
     from starhold.campaign.engines import engine_of
     from starhold.cli.console import console
@@ -97,7 +97,7 @@ def query(
 
 
 MOST_ROWS = 60
-"""That are printed as a table."""
+"""The most rows that are printed as a table."""
 
 
 def _shown(value: Any) -> str:
@@ -114,7 +114,7 @@ def rerun(
     force: Force = False,
     pictures: Pictures = Drawn.ALL,
 ) -> None:
-    """Fly one run of a campaign again, bit for bit: run.nc, its scenario file, pictures and report.html."""
+    """Fly one run of a campaign again, bit for bit: run.nc, its scenario file, figures and report.html."""
     from starhold.campaign.again import fly_again
     from starhold.cli.console import console
     from starhold.cli.show import print_outcome, print_results
@@ -134,7 +134,9 @@ def rerun(
         unpainted = painter.finish()
     if again.differs:
         names = ", ".join(again.differs[:4])
-        console.print(f"[red]Other bits than in the campaign, as another machine may compute: {names}[/red]", soft_wrap=True)
+        console.print(
+            f"[red]Other bits than in the campaign; another machine may have flown it: {names}[/red]", soft_wrap=True
+        )
     else:
         console.print("The same bits as in the campaign.")
     print_results(page)

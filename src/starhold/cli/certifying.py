@@ -30,7 +30,7 @@ def certify(
 ) -> None:
     """Prove what each law guarantees on this spacecraft: a table and certificate.json.
 
-    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided."""
+    Exit code 0: every claim is proved; 3: one is refuted, with the state that refutes it; 4: one is undecided."""
     from starhold.certification.wording import recheck
     from starhold.cli.console import console
     from starhold.cli.show_certificates import print_certificate
@@ -56,17 +56,18 @@ def certify(
 def check(
     path: Annotated[Path, typer.Argument(metavar="CERT", help="a certificate.json")],
     law_file: Annotated[
-        list[Path] | None,
-        typer.Option("--law-file", metavar="FILE", help="a law it speaks of that a file holds; repeatable"),
+        list[Path] | None, typer.Option("--law-file", metavar="FILE", help="a file with a law that it names; repeatable")
     ] = None,
     scenario: Annotated[
         str | None,
-        typer.Option("--scenario", metavar="SCENARIO", help="record its loops again and compare them with the proofs"),
+        typer.Option(
+            "--scenario", metavar="SCENARIO", help="record the scenario's loops again and compare them with the proofs"
+        ),
     ] = None,
 ) -> None:
-    """Check a certificate independently of the program that made it: trusts nothing in the file but what it claims.
-
-    Proofs are checked by the kernel, which kernel.pyz beside the file holds too; other claims are derived again."""
+    """Check a certificate independently of the program that made it: it takes from the file only what is claimed. The
+    kernel, which is also in kernel.pyz beside the file, checks the proofs; other claims are derived again.
+    """
     import hashlib
     from contextlib import ExitStack
 
@@ -81,7 +82,7 @@ def check(
     from starhold.studies.certificates import compare_programs
 
     with ExitStack() as laws:
-        # Only what the user names is run: a certificate comes from elsewhere.
+        # A certificate may come from anywhere, so only files that the user names are run.
         for file in law_file or []:
             law = find_law(str(file))
             laws.enter_context(adopted(law))

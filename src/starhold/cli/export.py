@@ -1,4 +1,4 @@
-"""The command `export`: laws as they leave for flight."""
+"""The command `export`: laws as flight code, runs and requirements for other tools."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ def c(
     law: Annotated[str | None, typer.Option(help="which law of the file; the first if not given")] = None,
     output: ExportOutput = None,
     name: Annotated[
-        str | None, typer.Option(metavar="NAME", help="what functions and files begin with; else the law's name")
+        str | None, typer.Option(metavar="NAME", help="prefix of functions and files; by default the law's name")
     ] = None,
     shell: Annotated[
-        list[str] | None,
-        typer.Option(metavar="SHELL", help="basilisk, fmu, cfs, fprime or process: what else is to call it; repeatable"),
+        list[str] | None, typer.Option(metavar="SHELL", help="wrap it for basilisk, fmu, cfs, fprime or process; repeatable")
     ] = None,
     force: Force = False,
     certify: Certified = True,
@@ -48,13 +47,12 @@ def aem(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="a run.nc, or the folder of one")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the message, such as run.aem")],
     epoch: Annotated[
-        str | None,
-        typer.Option(help="UTC at the start of the run; that of the scenario if absent, else 2000-01-01T12:00:00"),
+        str | None, typer.Option(help="UTC at the start of the run; else the scenario's, else 2000-01-01T12:00:00")
     ] = None,
     object_name: Annotated[str, typer.Option("--object", help="name of the spacecraft")] = "SPACECRAFT",
     object_id: Annotated[str, typer.Option("--id", help="its international designator")] = "0000-000A",
     frame: Annotated[
-        str, typer.Option(help="EME2000, into which axes of date are turned, or what the inertial axes are called")
+        str, typer.Option(help="EME2000 (axes of date are rotated to it), or the inertial axes' name")
     ] = "EME2000",
     version: Annotated[str, typer.Option(help="of the message, 1.0 or 2.0")] = "2.0",
     force: Force = False,
@@ -72,10 +70,10 @@ def aem(
 def link(
     file: ScenarioFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the header, such as starhold_link.h")],
-    law: Annotated[str | None, typer.Option(help="whose measurement readings have; the first law if not given")] = None,
+    law: Annotated[str | None, typer.Option(help="the law whose measurements are sent; by default the first")] = None,
     force: Force = False,
 ) -> None:
-    """Write the messages of `starhold serve` and the places of a scenario's readings as a header in C."""
+    """Write a C header with the messages of `starhold serve` and the layout of a scenario's measurements."""
     from starhold.cli.console import console
     from starhold.files import atomic_write
     from starhold.link.header import header
@@ -101,7 +99,7 @@ def requirements(
     file: ScenarioFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="a .csv or .reqif file to write")],
     original: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="a .reqif file whose content is kept, but for what differs")
+        Path | None, typer.Option(metavar="FILE", help="a .reqif file to update: what did not change is kept")
     ] = None,
     force: Force = False,
 ) -> None:
@@ -114,7 +112,7 @@ def requirements(
 
 
 def print_exported(exported: Exported, folder: Path) -> None:
-    """The files, what a step costs, what is proved, and how to test them."""
+    """Print the files, the cost of a step, what is proved, and how to test the code."""
     from rich.markup import escape
 
     from starhold.cli.console import console
@@ -122,7 +120,7 @@ def print_exported(exported: Exported, folder: Path) -> None:
     code, work = exported.code, exported.code.work
     console.print(f"[bold]{code.name}[/bold]: {', '.join(exported.files)} in {folder}", soft_wrap=True)
     shown = f"{work.arithmetic} + - * / and roots, {work.comparisons} comparisons"
-    console.print(f"  a step at the most: {shown}, every {code.flight.loop.period:g} {code.time_unit}")
+    console.print(f"  a step at most: {shown}, every {code.flight.loop.period:g} {code.time_unit}")
     for cost in exported.costs:
         console.print(f"  {cost.target}: {cost.flash} bytes of flash, {cost.stack} of stack ({cost.compiler} -O2)")
     if exported.proof.warning:

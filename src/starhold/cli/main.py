@@ -58,10 +58,10 @@ def run(
     pictures: Pictures = Drawn.ALL,
     law_process: Annotated[
         str | None,
-        typer.Option(metavar="PROGRAM", help="a program that commands in the law's place: see `export c --shell process`"),
+        typer.Option(metavar="PROGRAM", help="a program that commands in place of the law: see `export c --shell process`"),
     ] = None,
 ) -> None:
-    """Fly one law: run.nc, summary.json, pictures and report.html."""
+    """Fly one law: run.nc, summary.json, figures and report.html."""
     if law_process is not None and check_step:
         raise InputError("run", "--check-step", "--law-process too", "one of the two")
     flights = _fly(
@@ -81,7 +81,7 @@ def compare(
     check_step: CheckStep = False,
     pictures: Pictures = Drawn.ALL,
 ) -> None:
-    """Fly every law of a file on the same problem: ranked table, pictures and report.html."""
+    """Fly every law of a file on the same problem: ranked table, figures and report.html."""
     flights = _fly(file, None, output, force, allow_unstable, certify, check_step, pictures, nested=True)
     if all(flight.lost is not None for flight in flights):
         raise typer.Exit(DIVERGED)
@@ -99,11 +99,11 @@ def _fly(
     nested: bool,
     process: str | None = None,
 ) -> list[Flight]:
-    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Of a
-    process that commands, if there is one, nothing is known that could be proved or timed."""
+    """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Where a
+    process gives the commands, nothing is proved or timed."""
     from starhold.scenario.reading import load
 
-    # Before what flies and prints is loaded, so that what is wrong with it is said at once.
+    # Read before the modules that fly and print are loaded, so that its errors are reported at once.
     scenario = load(file, allow_unstable)
     from starhold.cli.console import console
     from starhold.cli.show import flying, print_outcome, print_results
@@ -113,7 +113,7 @@ def _fly(
     from starhold.studies.timing import Stopwatch
 
     entries = list(scenario.laws) if nested else [scenario.pick(law)]
-    # All of them before the first flight, so that what is wrong with the last is said at once.
+    # All are built before the first flight, so that an error in the last is reported at once.
     loops = [studies.build(scenario, entry) for entry in entries]
     name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
     folder = open_folder(output or Path("results") / name, force)
@@ -152,7 +152,7 @@ def _fly(
             if process is not None:
                 console.print(f"The commands came from {process}: nothing is proved of it.", soft_wrap=True, markup=False)
         finally:
-            # The table does not wait for it, and nothing that was flown is lost.
+            # The table does not wait for it, and no flight is lost if it fails.
             keep(flights[-1])
 
     from starhold.report.painter import Painter
@@ -211,7 +211,7 @@ def new(
     start: Annotated[str | None, typer.Option("--from", help="copy this built-in scenario instead of the template")] = None,
     wheels: Annotated[bool, typer.Option("--wheels", help="a spacecraft with reaction wheels")] = False,
     libration: Annotated[bool, typer.Option("--libration", help="a craft near a libration point")] = False,
-    schema: Annotated[bool, typer.Option("--schema", help="write a JSON Schema beside it, for editors")] = False,
+    schema: Annotated[bool, typer.Option("--schema", help="also write a JSON Schema, for editors")] = False,
     force: Force = False,
 ) -> None:
     """Write a commented scenario file that runs as it is."""
@@ -258,7 +258,7 @@ def _schema_text() -> str:
 
 
 @app.callback(invoke_without_command=True)
-def _root(version: Annotated[bool, typer.Option("--version", help="print the version and leave")] = False) -> None:
+def _root(version: Annotated[bool, typer.Option("--version", help="print the version and exit")] = False) -> None:
     if version:
         typer.echo(_version())
         raise typer.Exit
@@ -274,7 +274,7 @@ _interrupted = Event()
 
 
 def _interrupt(number: int, frame: object) -> None:
-    # Noted as well as raised: in a callback of the garbage collector an exception is swallowed.
+    # Noted as well as raised, because an exception in a callback of the garbage collector is swallowed.
     _interrupted.set()
     raise InterruptedByUserError(number)
 
@@ -297,16 +297,16 @@ def main() -> None:
 
 
 def run_command() -> int:
-    """Run the command that stands in `sys.argv`, and return its exit code."""
-    # Before NumPy loads: on matrices as small as a law's, its library's threads only wait for one another.
+    """Run the command in `sys.argv`, and return its exit code."""
+    # Set before NumPy loads: on matrices as small as a law's, the threads of its library only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     warnings.formatwarning = _as_line
-    # A command loads much and lives briefly: looking for garbage at every step of that is time lost.
+    # A command loads much and ends soon, so frequent garbage collection only costs time.
     gc.set_threshold(200_000)
     if sys.argv[1:] == ["--version"]:
-        # Spared what reading options loads.
+        # This path avoids the modules that parse options.
         print(_version())
         return 0
     try:
@@ -320,7 +320,7 @@ def run_command() -> int:
         print("starhold: interrupted; files already written are whole", file=sys.stderr)
         return 128 + interrupt.args[0]
     except OSError as error:
-        # A name that is too long, a full disk: what the system refuses is no fault of the program.
+        # A name that is too long, a full disk: an error of the system, not of the program.
         print(f"starhold: {str(error.filename or '')[-100:]}: {error.strerror or error}", file=sys.stderr)
         return USER_ERROR
     except MemoryError:
@@ -333,6 +333,6 @@ def run_command() -> int:
 
 
 def _as_line(message: Warning | str, category: type[Warning], filename: str, number: int, line: str | None = None) -> str:
-    """A warning as a line of its own; of those that are not for users the place too."""
+    """Print a warning as one line, with its place in the source unless it is meant for users."""
     place = "" if category is UserWarning else f"{category.__name__} at {filename}:{number}: "
     return f"starhold: warning: {place}{message}\n"

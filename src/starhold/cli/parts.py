@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 NEW_MODES = "starhold new my.toml --from cubesat-mission shows one."
 
 
-def laws(name: Annotated[str | None, typer.Argument(help="show this law's card and gains; or a file's")] = None) -> None:
+def laws(name: Annotated[str | None, typer.Argument(help="show the card and gains of this law or file")] = None) -> None:
     """List the control laws, or describe one."""
     from starhold.cli.show import print_blocks
     from starhold.conformance.suite import find_law
@@ -36,7 +36,7 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
     elif name.endswith(".py"):
         print_blocks(_law_blocks(find_law(name)))
     elif name == MODES:
-        text = "modes: a law made of laws, each in a [[law.mode]] table with the condition on which the next one begins."
+        text = "modes: a law made of laws, each in a [[law.mode]] table with the condition that begins the next one."
         print_blocks([f"{text} {NEW_MODES}"])
     elif name not in known:
         raise InputError("laws", "", name, nearest(name, [*known, MODES]))
@@ -46,7 +46,7 @@ def laws(name: Annotated[str | None, typer.Argument(help="show this law's card a
 
 def parts(
     name: Annotated[
-        str | None, typer.Argument(metavar="ROLE|NAME|FILE", help="a role, the name of a part, or a Python file with one")
+        str | None, typer.Argument(metavar="ROLE|NAME|FILE", help="a role, a part's name, or a Python file that holds one")
     ] = None,
 ) -> None:
     """List the parts that a loop can be made of, those of one role, or describe one."""
@@ -105,7 +105,7 @@ def check_part(
 
 
 def _laws() -> dict[str, dict[str, Law]]:
-    """The laws by the bodies that they steer."""
+    """List the laws by the bodies that they control."""
     from starhold.laws.catalogue import catalogue
     from starhold.parts.catalogue import parts as installed
 
@@ -122,7 +122,7 @@ def _find(given: str) -> Part:
         try:
             law = installed.role_of(installed.read_module(Path(given))) == "law"
         except (OSError, ValueError):
-            # Told by whoever reads it for good.
+            # The error is raised by the reader that follows.
             law = True
     else:
         law = any(given in group for group in _laws().values())
@@ -130,7 +130,7 @@ def _find(given: str) -> Part:
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    """A table of plain words."""
+    """A table of unformatted text."""
     from rich.markup import escape
 
     return Table([*map(Column, heads)], [[*map(escape, row)] for row in rows])

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from starhold.publications.reproduction import Reproduction
 
 LONGEST_FIRST = "BEDCA"
-"""So that no process works alone for long."""
+"""The order in which they are started, so that no process works alone for long."""
 
 
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="[A|B|C|D|E|all]", help="which publication")] = "all",
     output: ReproductionOutput = None,
     force: Force = False,
-    processes: Annotated[int | None, typer.Option(min=1, help="side by side; all cores if nothing is said")] = None,
+    processes: Annotated[int | None, typer.Option(min=1, help="in parallel; all cores by default")] = None,
 ) -> None:
-    """Make every figure, table and number of the publications again, beside what they print: a page each, with verdicts."""
+    """Reproduce every figure, table and number of the publications: a page for each, with verdicts."""
     from starhold.cli.console import console
     from starhold.publications.paper import papers_of
     from starhold.publications.writing import write_index
@@ -45,7 +45,7 @@ def reproduce(
 
 
 def _make(letters: list[str], folder: Path, processes: int | None) -> list[Reproduction]:
-    """The publications in their order, made by processes of their own."""
+    """Reproduce the publications, each in its own process, and return them in order."""
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
@@ -77,7 +77,7 @@ def _make(letters: list[str], folder: Path, processes: int | None) -> list[Repro
 
 
 def _watch(left: set[Future[Any]], queue: Any, show: Callable[[str, int, int], None]) -> None:
-    """Show how far they are until all are done, or one has failed."""
+    """Show their progress until all are done, or one has failed."""
     from concurrent.futures import FIRST_COMPLETED, wait
     from queue import Empty
 
@@ -107,7 +107,7 @@ def _work(letter: str, folder: Path) -> Reproduction:
     from starhold.publications.writing import write_paper
 
     made = write_paper(letter, folder, lambda done, whole: _queue.put((letter, done, whole)))
-    # What is drawn by now need not travel.
+    # Figures already drawn need not be sent between processes.
     return replace(made, figures=dict.fromkeys(made.figures))
 
 

@@ -12,11 +12,11 @@ from starhold.cli.arguments import DIVERGED, FAILED_CHECK, Force, ScenarioFile, 
 
 def serve(
     file: ScenarioFile,
-    law: Annotated[str | None, typer.Option(help="whose measurement readings have; the first law if not given")] = None,
+    law: Annotated[str | None, typer.Option(help="the law whose measurements are sent; by default the first")] = None,
     host: Annotated[
-        str, typer.Option(help="the address on which it listens; others than this machine's own are open")
+        str, typer.Option(help="the address on which it listens; any but this machine's is open to the network")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="the port on which it listens; 0: any that is free")] = 5750,
+    port: Annotated[int, typer.Option(help="the port on which it listens; 0: any free one")] = 5750,
     udp: Annotated[bool, typer.Option("--udp", help="listen on UDP; TCP if not given")] = False,
     zmq: Annotated[bool, typer.Option("--zmq", help="listen on ZeroMQ, as a ROUTER (extra `zmq`)")] = False,
     serial: Annotated[
@@ -27,7 +27,7 @@ def serve(
         float | None, typer.Option(help="real time: how many times faster than the clock; lockstep if not given")
     ] = None,
     missing: Annotated[
-        str, typer.Option(metavar="hold|zero|stop", help="what flies a period of real time without a command")
+        str, typer.Option(metavar="hold|zero|stop", help="what acts in a period of real time without a command")
     ] = "hold",
     output: Annotated[
         Path | None,
@@ -49,11 +49,11 @@ def serve(
     scenario = load(file, allow_unstable)
 
     def announce(address: str) -> None:
-        # What else could be refused was, and nothing has been flown.
+        # All other refusals come before this line, and nothing has been flown.
         if output is not None:
             open_folder(output, force)
         console.print(f"Listening on {address}. Ctrl-C ends it.", soft_wrap=True, markup=False)
-        # Whoever waits for this line reads a pipe.
+        # A program that waits for this line reads a pipe.
         console.file.flush()
 
     with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False, redirect_stderr=False) as live:

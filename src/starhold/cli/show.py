@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 COLUMN = 9
-"""Characters that a metric takes."""
+"""Width of a metric in characters."""
 
 
 @contextmanager
 def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
-    """Progress bars, one a law; yields what the simulation calls."""
+    """Show progress bars, one for each law; yield the function that the simulation calls."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -47,7 +47,7 @@ def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, i
 
 
 def print_outcome(flights: Sequence[Flight]) -> None:
-    """The table and warnings."""
+    """Print the table and the warnings."""
     from starhold.report.text import lost_text, unknown_text
 
     print_table(flights)
@@ -69,25 +69,25 @@ def print_outcome(flights: Sequence[Flight]) -> None:
 
 
 def print_results(path: Path) -> None:
-    """Print where to look: at the page, or into the folder where there is none."""
+    """Print where the results are: the page, or the folder where there is no page."""
     console.print(f"{'Results' if path.is_dir() else 'Report'}: {path}", soft_wrap=True)
 
 
 def _step_text(flight: Flight) -> str:
-    """Tell how much half the integration step changes the metrics."""
+    """Print how much halving the integration step changes the metrics."""
     errors = flight.metrics["step_error"]
     if None in errors.values():
-        return f"{flight.name}: with half the integration step the motion is lost at another time"
+        return f"{flight.name}: with half the integration step the motion diverges at another time"
     changes: list[str] = []
     for name, error in errors.items():
         told_of = flight.recording.columns[name]
         unit = "rad" if told_of.dimension == "quaternion" else told_of.unit
         changes.append(f"{name.replace('_', ' ')} by {error:.1e} {unit}")
-    return f"{flight.name}: half the integration step changes at most the {', '.join(changes)}"
+    return f"{flight.name}: halving the integration step changes at most the {', '.join(changes)}"
 
 
 def print_table(flights: Sequence[Flight]) -> None:
-    """The ranked comparison; a star marks the best of each metric. On a narrow screen laws become columns."""
+    """Print the ranked comparison; a star marks the best value of each metric. On a narrow screen laws become columns."""
     metric_set = flights[0].metric_set
     results: Mapping[str, Mapping[str, Any]] = {flight.name: flight.metrics for flight in flights}
     won, order = metric_set.winners(results), metric_set.ranked(results)
@@ -95,7 +95,7 @@ def print_table(flights: Sequence[Flight]) -> None:
     measures = [metric_set.measures[metric] for metric in metrics]
     heads = [f"{measure.heading}\n[dim]{measure.unit}[/dim]" for measure in measures]
     cells = [[_cell(metric_set.cell(metric, results[name]), name in won[metric]) for metric in metrics] for name in order]
-    # No lines between thirteen columns: they would not fit into 120 characters.
+    # Lines between thirteen columns would not fit into 120 characters.
     table = Table(box=SIMPLE_HEAD, collapse_padding=True, show_edge=False, pad_edge=False)
     if console.width >= max(WIDE, COLUMN * (1 + len(metrics))):
         for head in ("law", *heads):
@@ -113,7 +113,7 @@ def print_table(flights: Sequence[Flight]) -> None:
         console.print(late)
     if len(flights) > 1:
         console.print(
-            f"Ranked by {', then '.join(metric_set.headings(results))}; [bold green]*[/bold green] best of its kind."
+            f"Ranked by {', then '.join(metric_set.headings(results))}; [bold green]*[/bold green] best value of its column."
         )
     for flight in flights:
         if flight.modes:
@@ -156,5 +156,5 @@ def print_rows(what: Rows, apart: bool = False) -> None:
 
 
 def printable(text: str) -> str:
-    """Text from a file without characters that steer a terminal."""
+    """Return text from a file without terminal control characters."""
     return "".join(c if c.isprintable() or c == "\N{NARROW NO-BREAK SPACE}" else ascii(c)[1:-1] for c in text)

@@ -1,4 +1,4 @@
-"""Prints the outcome of a campaign, and shows bars while it is flown."""
+"""Prints the outcome of a campaign, and shows its progress."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ if TYPE_CHECKING:
 
 COLOURS = {"met": "green", "missed": "red", "not decided": "yellow"}
 METRICS, DRIVERS, AGAIN = 8, 4, 3
-"""How many metrics, drivers of each kind and runs of a law are printed; the page has all."""
+"""How many metrics, drivers of each kind and runs of a law are printed; the page lists all."""
 
 
 class Rate(ProgressColumn):
     """Shows how many runs a second are flown."""
 
     def render(self, task: Task) -> Text:
-        """The rate of a task; nothing before there is one."""
+        """Return the rate of a task as text, empty before it is known."""
         speed = task.finished_speed or task.speed
         return Text(f"{figure(speed, 3)} runs/s" if speed else "")
 
 
 @contextmanager
 def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Iterator[Callable[[str, int], None]]:
-    """Show a bar for each law, of so many runs, with the rate and the time left; yields what is to be called with a law and
-    how many more of its runs are done, from any thread. Where an error ends it before any run, nothing of it stays. drawn:
+    """Show a bar for each law, of so many runs, with the rate and the time left; yield the function to call with a law and
+    how many more of its runs are done, from any thread. If an error comes before the first run, the bars disappear. drawn:
     whether runs differ in more than their noise."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"), Rate(), TimeLeft())
     titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]
     if not drawn:
-        titles[0] += "; nothing is drawn, so they differ by their random numbers alone, if there are any"
+        titles[0] += "; nothing is dispersed, so runs differ in their noise alone, if they have any"
     bars = Progress(*columns, console=console)
     tasks: dict[str, TaskID] = {}
     for law in laws:
@@ -68,7 +68,7 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
 
 
 def print_campaign(result: CampaignResult, body: str) -> None:
-    """Print the outcome of a campaign on a body of this name: how its laws do, verdicts, metrics, drivers, the worst
+    """Print the outcome of a campaign on the body of this name: a summary of each law, verdicts, metrics, drivers, worst
     runs."""
     words = Wording.of(body, result)
     console.print()
@@ -108,7 +108,7 @@ def _print(section: Section | None, columns: int | None = None, with_note: bool 
 
 
 def marked(cell: Any) -> str:
-    """Words as they can be printed, without markup of their own or characters that steer a terminal; outcomes in colour."""
+    """Return text without markup or terminal control characters; outcomes are coloured."""
     text = escape(printable(f"{cell}"))
     colour = COLOURS.get(cell.kind, "") if isinstance(cell, Cell) else ""
     return f"[{colour}]{text}[/{colour}]" if colour else text

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 LONGEST = 1_000
-"""Characters of a file that are printed at a time."""
+"""The most characters of a text from a file that are printed."""
 COLOURS = {
     "proved": "green",
     "refuted": "red",
@@ -48,8 +48,8 @@ COLOURS = {
 
 
 def print_certificate(tried: Tried, why: bool = False) -> None:
-    """Claims with their outcomes, those that leave out the fewest parts of the loop first, each list of such parts once, and
-    why claims that are not proved are not. why: how each was shown, too, and all assumptions."""
+    """Print claims with their outcomes, those that leave out the fewest parts of the loop first, each list of such parts
+    once, and why a claim is not proved. why: also how each was shown, and all assumptions."""
     certificate, trial, inside = tried
     subject = certificate.subject
     console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}")
@@ -71,15 +71,15 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
         console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]")
     outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
     if outside:
-        console.print(f"  this scenario starts outside the sets of: {', '.join(outside)}")
+        console.print(f"  this scenario starts outside the regions of: {', '.join(outside)}")
     if trial is not None:
         console.print(f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]")
     console.print()
 
 
 def print_proved(flights: Sequence[Flight]) -> None:
-    """The claim of each law that leaves out the least, the names of the others, and until when they cover a flight."""
-    console.print("\nCertified on this spacecraft (starhold certify --why tells how):")
+    """Print the claim of each law that leaves out the least, the names of the others, and how long they cover a flight."""
+    console.print("\nCertified on this spacecraft (for details: starhold certify --why):")
     table = _grid()
     for flight in flights:
         for place, certificate in enumerate(flight.certificates):
@@ -97,7 +97,7 @@ def _grid() -> Table:
 
 
 def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[tuple[str, str, str]]:
-    """At most three rows about a certificate: its first claim, the others by their names, and what a flight keeps to."""
+    """At most three rows about a certificate: its first claim, the names of the others, and the bounds of the flight."""
     claims, name = ranked(certificate), certificate.name
     if not claims:
         yield name, _coloured("undecided"), "no claim"
@@ -118,7 +118,7 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
 
 
 def _uncovered(flight: Flight, left: Sequence[Departure]) -> str:
-    """From when on no claim covers a flight, and what happens then; parts that claims leave out are not named again."""
+    """Say from when on no claim covers a flight, and why; parts that claims leave out are not named again."""
     time = left[0].time
     happens = [one.how for one in left if one.time == time]
     events = [how for how in happens if not how.startswith(HAS)]
@@ -129,7 +129,7 @@ def _uncovered(flight: Flight, left: Sequence[Departure]) -> str:
 
 
 def assumptions(certificate: Certificate) -> str:
-    """Every assumption once, with the claims that need it where not all do."""
+    """List every assumption once, with the claims that need it unless all do."""
     kinds = {claim.kind: texts(claim.assumptions) for claim in certificate.claims}
     parts: list[str] = []
     for assumption in dict.fromkeys(a for assumed in kinds.values() for a in assumed):
@@ -145,7 +145,7 @@ def assumptions(certificate: Certificate) -> str:
 
 
 def print_compared(others: Sequence[str], scenario: str | None) -> None:
-    """Print whether the proofs are about the loops of a scenario; None: they were not compared with any."""
+    """Print whether the proofs are about the loops of a scenario; None: they were compared with none."""
     if scenario is None:
         console.print("The programs of its proofs were not compared with those of a scenario.")
     elif not others:
@@ -182,7 +182,7 @@ def _where(finding: Finding) -> str:
 
 
 def _safe(text: str) -> str:
-    """Text from a file as one that can be printed: no markup, nothing that steers a terminal, no half of a character."""
+    """Return text from a file in printable form: no markup, no terminal control characters, no broken character."""
     plain = printable(text)
     return escape(plain if len(plain) <= LONGEST else f"{plain[:LONGEST]} …")
 

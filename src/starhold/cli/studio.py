@@ -15,10 +15,10 @@ def studio(
     file: Annotated[
         str | None, typer.Argument(metavar="FILE", help="a scenario file, or the name of a built-in scenario to begin with")
     ] = None,
-    port: Annotated[int, typer.Option(help="on which it listens, on this machine alone; 0: any that is free")] = 0,
+    port: Annotated[int, typer.Option(help="on which it listens, on this machine alone; 0: any free one")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page in the browser")] = True,
 ) -> None:
-    """Serve a page on this machine: edit a scenario, certify, design, fly and compare, and see results beside each other."""
+    """Serve a page on this machine: edit a scenario, certify, design, fly and compare, and see results side by side."""
     from starhold.cli.console import console
     from starhold.files import read_text
     from starhold.scenario.reading import builtin_names, builtin_text, nearest

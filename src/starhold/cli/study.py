@@ -16,20 +16,20 @@ from starhold.report.commands import Command, command
 
 
 class Outlet:
-    """A stream in place of `sys.stdout` or `sys.stderr`. The first error of writing is noted in `failure`; what comes after
-    it goes nowhere, so that a command ends its work and its files are written."""
+    """A stream in place of `sys.stdout` or `sys.stderr`. The first write error is kept in `failure` and all later output is
+    dropped, so that a command finishes its work and writes its files."""
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream
         self.failure: OSError | None = None
-        # What the encoding does not have is shown as a question mark.
+        # Characters that the encoding lacks are shown as question marks.
         stream.reconfigure(errors="replace")
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write the text as far as the stream takes it."""
+        """Write the text as far as the stream accepts it."""
         try:
             return self._stream.write(text)
         except OSError as error:
@@ -37,7 +37,7 @@ class Outlet:
             return len(text)
 
     def flush(self) -> None:
-        """Send on as much as the stream takes."""
+        """Flush as much as the stream accepts."""
         try:
             self._stream.flush()
         except OSError as error:
@@ -45,14 +45,14 @@ class Outlet:
 
     def _give_up(self, error: OSError) -> None:
         self.failure = self.failure or error
-        # The stream keeps what it could not send, and would fail with it again as Python ends.
+        # The stream keeps what it could not send, and would fail again when Python exits.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self._stream.fileno())
         os.close(nowhere)
 
 
 def open_outlets() -> None:
-    """Put outlets in place of the standard streams of this process; a stream that is closed prints nowhere."""
+    """Put outlets in place of the standard streams of this process; output to a closed stream is dropped."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
@@ -63,7 +63,7 @@ CODES = {"missed": REFUTED, "undecided": UNDECIDED}
 
 
 def command_of(name: str) -> Any:
-    """The command of a name."""
+    """Return the command of this name."""
     declared = command(name)
 
     def run(
@@ -147,7 +147,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
         shown = typer.Option(*flags, metavar=metavar, help=option.help)
         kinds[key] = Annotated[kind if option.default else kind | None, shown]
     if declared.prove is not None:
-        shown = typer.Option("--proof", help="prove how near to the target the loop stays, beside; this takes seconds")
+        shown = typer.Option("--proof", help="also prove how near to the target the loop stays; this takes seconds")
         kinds["proof"] = Annotated[bool, shown]
     if declared.suffix:
         subject = "SCENARIO" if declared.read is None else "SYSTEM"
@@ -162,7 +162,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
 
 @contextmanager
 def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
-    """A bar for a command that reports its progress; yields the function to be called."""
+    """Show a bar for a command that reports its progress; yield the function that it calls."""
     if declared.doing is None:
         yield lambda done, total, what: None
         return

@@ -11,7 +11,7 @@ import numpy as np
 from starhold.algebra.quaternion import conjugate, multiply, to_reference, vector_part
 from starhold.algebra.structure import flatten, leaves
 from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtract
-from starhold.certification.openness import COMMANDED, envelope_of
+from starhold.certification.unmodelled import COMMANDED, envelope_of
 from starhold.conformance.bench import PERIOD, sample_loop
 from starhold.conformance.units import SYSTEMS, rescale, rescale_params
 from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, require, run

@@ -1,2 +1,2 @@
-"""Exports laws for flight: C99 with the evidence that it can be trusted, and shells over it. A shell is a file in
-`templates` and a line of `shells.SHELLS`."""
+"""Exports laws for flight: C99 with evidence of its correctness, and shells around it. A shell is a file in `templates` and
+a line of `shells.SHELLS`."""

@@ -1,8 +1,8 @@
 """Attitudes over time as CCSDS attitude ephemeris messages (AEM), written and read in their keyword = value form.
 
-Versions 1.0 (CCSDS 504.0-B-1) and 2.0 (504.0-B-2). The quaternion Q1 Q2 Q3 QC of a message has its scalar last, and turns
-REF_FRAME_A into REF_FRAME_B as `starhold.algebra.quaternion` has it: a vector's components in A become those in B.
-"""
+Versions 1.0 (CCSDS 504.0-B-1) and 2.0 (504.0-B-2). The quaternion Q1 Q2 Q3 QC of a message has its scalar last, and rotates
+REF_FRAME_A into REF_FRAME_B with the convention of `starhold.algebra.quaternion`: a vector's components in A become those in
+B."""
 
 import math
 import re
@@ -22,19 +22,19 @@ from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, days_of, prec
 
 Version = Literal["1.0", "2.0"]
 BODY = "SC_BODY"
-"""How the names of frames fixed to the spacecraft begin."""
+"""The prefix of the names of frames fixed to the spacecraft."""
 OFF_UNIT = 1e-3
-"""By how much the length of a quaternion may differ from 1: more is no rounding."""
+"""The largest deviation of a quaternion's length from 1 that may be rounding."""
 VALUES = {"QUATERNION": 4, "QUATERNION/DERIVATIVE": 8, "QUATERNION/RATE": 7, "QUATERNION/ANGVEL": 7}
-"""Types of attitude that are read, and the numbers of a line of theirs; all but the quaternion are passed over."""
+"""The attitude types that are read, and the numbers in a line; all but the quaternion are skipped."""
 NAME = re.compile(r"[ -~]*[!-~][ -~]*")
 _EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")
 _SECOND = 10**9
 
 
 def from_date(attitudes: Any, epoch: Date, back: bool = False) -> NDArray[np.float64]:
-    """Attitudes (n, 4) relative to the mean equator and equinox of J2000 (EME2000), of those relative to the mean ones of a
-    date; back: the reverse."""
+    """Convert attitudes (n, 4) relative to the mean equator and equinox of date to those of J2000 (EME2000); back: the
+    reverse."""
     turn = precession(days_of(epoch))
     turned: Any = multiply(conjugate(turn) if back else turn, tuple(np.asarray(attitudes, dtype=float).T))
     return np.stack(turned, axis=1)
@@ -66,7 +66,7 @@ def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) ->
     try:
         write_aem(path, times, attitudes, epoch=begun, **about)
     except ValueError as error:
-        raise InputError("export aem", "", str(error), "what a CCSDS message may hold") from None
+        raise InputError("export aem", "", str(error), "a word that a CCSDS message may hold") from None
 
 
 def open_run(place: str | Path) -> Any:
@@ -131,7 +131,7 @@ def write_aem(
 
 
 def read_aem(path: Path) -> Aem:
-    """Read the attitudes of a message of one segment. OSError, or ValueError that names the line and what is wrong."""
+    """Read the attitudes of a message of one segment. OSError, or ValueError that names the line and its error."""
     lines = _Lines(read_text(path))
     version = lines.value("CCSDS_AEM_VERS")
     if version not in ("1.0", "2.0"):
@@ -142,7 +142,7 @@ def read_aem(path: Path) -> Aem:
     count = _numbers(metadata)
     rows = [lines.row(line, count) for line in lines.before("DATA_STOP")]
     if lines.following() is not None:
-        raise ValueError(f"line {lines.number}: a second segment, of which one alone is read")
+        raise ValueError(f"line {lines.number}: a second segment; only messages of one segment are read")
     if len(rows) < 2:
         raise ValueError(f"{len(rows)} attitudes")
     instants, table = [row[0] for row in rows], np.array([row[1] for row in rows])
@@ -161,7 +161,7 @@ def read_aem(path: Path) -> Aem:
 
 
 def _numbers(metadata: dict[str, str]) -> int:
-    """How many numbers a line of data has. ValueError for what is not read."""
+    """Return the number of numbers in a line of data. ValueError for a type that is not read."""
     for key in ("OBJECT_NAME", "REF_FRAME_A", "REF_FRAME_B", "TIME_SYSTEM", "ATTITUDE_TYPE"):
         if key not in metadata:
             raise ValueError(f"no {key}")
@@ -176,14 +176,14 @@ def _numbers(metadata: dict[str, str]) -> int:
 
 
 class _Lines:
-    """The lines of a message that are neither empty nor comments, in order; `number` is that of the last one taken."""
+    """The lines of a message that are neither empty nor comments, in order; `number` is that of the last line read."""
 
     def __init__(self, text: str) -> None:
         self.number = 0
         self._left = iter(enumerate(text.splitlines(), 1))
 
     def following(self) -> str | None:
-        """The next line; None where there is no more."""
+        """Return the next line, or None."""
         for number, raw in self._left:
             self.number, line = number, raw.strip()
             if line and not line.startswith("COMMENT"):
@@ -191,14 +191,14 @@ class _Lines:
         return None
 
     def before(self, end: str) -> Iterator[str]:
-        """The lines up to one, which is passed over."""
+        """Return the lines before a given one, which is skipped."""
         while (line := self.following()) != end:
             if line is None:
                 raise ValueError(f"no {end}")
             yield line
 
     def value(self, key: str) -> str:
-        """The value of the next line, which has this key."""
+        """Return the value of the next line, which must have this key."""
         line = self.following() or ""
         name, sign, value = line.partition("=")
         if not sign or name.strip() != key:
@@ -206,14 +206,14 @@ class _Lines:
         return value.strip()
 
     def pair(self, line: str) -> tuple[str, str]:
-        """The key and the value of a line."""
+        """Return the key and the value of a line."""
         key, sign, value = line.partition("=")
         if not sign:
             raise ValueError(f"line {self.number}: {line!r} in place of key = value")
         return key.strip(), value.strip()
 
     def row(self, line: str, count: int) -> tuple[int, list[float]]:
-        """The instant (ns) and the quaternion of a line of so many numbers."""
+        """Return the instant (ns) and the quaternion of a line of so many numbers."""
         epoch, *cells = line.split()
         try:
             values, instant = [float(cell) for cell in cells], _instant(epoch)
@@ -228,7 +228,7 @@ class _Lines:
 
 
 def _instant(epoch: str) -> int:
-    """Nanoseconds since the year 1 of an epoch, by days of 86400 s. ValueError for none."""
+    """Return the nanoseconds from the year 1 to an epoch, by days of 86400 s. ValueError if it is not an epoch."""
     match = _EPOCH.fullmatch(epoch)
     if match is None:
         raise ValueError(f"{epoch!r} in place of an epoch such as 2026-03-01T12:00:00")

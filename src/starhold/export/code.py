@@ -20,14 +20,14 @@ from starhold.trace.recording import RESERVED
 from starhold.trace.source import LONG, TIE, Expression, names
 
 SHORT = 130
-"""Characters of a call that is written where its value is used, other than in `return`."""
+"""The most characters of a call that is written inline, except in `return`."""
 
 
 _ANY = 1 << 20
 
 
 class _Kinds(dict[str, str]):
-    """Names in C of the kinds of a trace: structs have their own."""
+    """The names in C of the kinds of a trace; structs have their own."""
 
     def __missing__(self, kind: str) -> str:
         return kind
@@ -103,7 +103,7 @@ class Readable(C99):
     # Values.
 
     def _block(self, block: tuple[Any, ...]) -> None:
-        # A struct may be made where its numbers are read, unless something is written in between.
+        # A struct may be made where its numbers are read, unless there is a write in between.
         fresh: set[str] = set()
         for s in block:
             if isinstance(s, Load):
@@ -191,7 +191,7 @@ def _about(s: Op) -> Any:
 
 
 def check_name(name: str) -> str:
-    """Return a name that functions and files in C may begin with. InputError for any other."""
+    """Return a valid prefix of functions and files in C. InputError for any other."""
     free = name not in RESERVED and name not in C99.taken and not name.startswith("_")
     if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII) or not free or len(name) > 40:
         raise InputError(

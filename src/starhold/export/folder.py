@@ -28,13 +28,13 @@ COMPILERS = {
     "sparc64-linux-gnu-gcc": "SPARC V9",
     "sparc-gaisler-elf-gcc": "SPARC V8, LEON3",
 }
-"""Compilers that are asked, by name, and what they compile for."""
+"""The compilers that estimate costs, by name, and their targets."""
 FLAGS = ("-std=c99", "-ffp-contract=off", "-O2", "-fno-math-errno")
 
 
 class Cost(NamedTuple):
-    """A compiler and what it compiles for; bytes of code and constants, and of stack that a step takes at the most, without
-    those of the sqrt of a library where the processor has none."""
+    """A compiler and its target; bytes of code and constants, and the most stack of a step, without a library's sqrt where
+    the processor has none."""
 
     compiler: str
     target: str
@@ -90,14 +90,14 @@ MANIFEST = "export.json"
 
 @dataclass(frozen=True)
 class Exported:
-    """A law that was written as C: its code, what was proved, what it costs, and the files by name."""
+    """A law written as C: its code, its proofs, its costs, and the files by name."""
 
     code: Code
     proof: Proof
     costs: tuple[Cost, ...]
     files: Mapping[str, str | bytes]
     steps: int
-    """Of the self-test."""
+    """The number of steps of the self-test."""
 
 
 def make_files(

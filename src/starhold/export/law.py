@@ -1,4 +1,4 @@
-"""The part of a closed loop that flies on a computer: from readings of sensors to the command, with all memories."""
+"""The part of a closed loop that runs on the flight computer: from readings of sensors to the command, with all memories."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ UNITS = {
     "velocity": Quantity("m/s", "inertial axes"),
     "acceleration": Quantity("rad/s^2", "angular acceleration, target axes"),
 }
-"""What members mean whose class does not say it."""
+"""The meanings of members whose class does not state them."""
 
 
 class Parameters(NamedTuple):
@@ -47,8 +47,8 @@ class FlightLaw:
     start: Any
     inputs: Any
     given: tuple[dict[str, str], ...]
-    """Readings that an estimator or the law is given, each with the name of its input: the first of each name, then those of
-    each sensor that shows one again."""
+    """Readings for an estimator or the law, each with the name of its input: the first of each name, then those of further
+    sensors of the same reading."""
     command: Any
     """The class of the command."""
 
@@ -119,7 +119,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         for sensor, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
             part = sensor.part
             first = part.module.measure(loop.start, memory, params, _Still(), 0)[0]._asdict()
-            # Without an estimator attitude and rate are told as they are.
+            # Without an estimator attitude and rate are inputs.
             taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
             repeated = not firsts.keys().isdisjoint(taken)
             inputs = {name: f"{sensor.called.replace('-', '_')}_{name}" if repeated else name for name in taken}
@@ -185,7 +185,7 @@ def _seen(parts: Composition, copies: Copies) -> Composition:
 
 
 class _Still:
-    """Dice that show nothing."""
+    """Random numbers that are always zero."""
 
     def vector(self, place: int, deviation: Any) -> Any:
         return ZERO
@@ -244,7 +244,7 @@ def _tells_time(loop: ClosedLoop) -> bool:
 
 
 def _keeps_sign(parts: Composition, body: Any) -> bool:
-    """Tell whether the quaternion sign policy remembers."""
+    """Return whether the quaternion sign policy remembers."""
     policy = getattr(body, "SIGN_POLICIES", {}).get(parts.sign_policy)
     if policy is None:
         return False

@@ -77,7 +77,7 @@ class Copies:
 
 
 def _has_equations(names: dict[str, Any]) -> bool:
-    """Tell whether a module is one of equations: of this package, or a file with a part."""
+    """Return whether a module is one of equations: of this package, or a file with a part."""
     name = str(names.get("__name__", ""))
     return "CARD" in names or (name.startswith("starhold.") and name not in _WRITTEN_OUT)
 
@@ -97,7 +97,7 @@ class Signature(NamedTuple):
 
 
 class Reads(Recorder):
-    """A recorder of equations that finds which fields of tuples somebody reads that are handed from equation to equation."""
+    """A recorder of equations that finds which fields are read of tuples passed between equations."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -142,7 +142,7 @@ class Reads(Recorder):
 
 
 class Recording(Recorder):
-    """A recorder of equations that call each other. read: fields of classes that somebody reads."""
+    """A recorder of equations that call each other. read: the fields of classes that are read."""
 
     def __init__(self, read: set[Any]) -> None:
         super().__init__()
@@ -335,13 +335,13 @@ _OF_ROLES = frozenset(("torque", "control", "acceleration", "goal", "estimate", 
 
 
 def _title(equation: Any) -> str:
-    """Return what a function is called: after its part too, where many parts have a function of that name."""
+    """Return the name of a function, with its part's name where several parts have a function of that name."""
     name, module = free(equation.__name__), equation.__globals__
     return f"{module['__name__'].rpartition('.')[2]}_{name}" if name in _OF_ROLES and "CARD" in module else name
 
 
 _UNREAD: Any = {NUMBER: nan, TRUTH: False}
-"""In the place of a value that nobody reads."""
+"""The placeholder of a value that is never read."""
 
 
 def _operation(name: str, takes: tuple[str, ...], gives: str, about: Any) -> Operation:
@@ -354,18 +354,18 @@ def _made_of(kind: Type, parts: Sequence[Value]) -> Any:
 
 
 def _counts(leaf: Any) -> bool:
-    """Tell whether a leaf is a number or a truth of the program: not one that is known while recording."""
+    """Return whether a leaf is a number or a truth of the program: not one that is known while recording."""
     return isinstance(leaf, (Handle, float)) and not isinstance(leaf, bool)
 
 
 def _is_recordable(values: tuple[Any, ...]) -> bool:
-    """Tell whether a call can become a function of C."""
+    """Return whether a call can become a function of C."""
     parts = list(leaves(values))
     return all(map(_is_part, parts)) and any(isinstance(leaf, (Handle, Buffer)) for leaf in parts)
 
 
 def _is_part(leaf: Any) -> bool:
-    """Tell whether a leaf may be a member of a struct, is known while recording, or lies in a buffer."""
+    """Return whether a leaf may be a member of a struct, is known while recording, or lies in a buffer."""
     if isinstance(leaf, Buffer):
         return type(leaf.base) is type(leaf.size) is int
     return leaf.kind in (NUMBER, TRUTH) if isinstance(leaf, Handle) else isinstance(leaf, (bool, int, float))

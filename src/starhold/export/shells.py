@@ -1,4 +1,4 @@
-"""Shells over the same C, and their build files: templates filled with the names and numbers of a law."""
+"""Shells around the same C, and their build files: templates filled with the names and numbers of a law."""
 
 import io
 import re
@@ -24,7 +24,7 @@ SOURCES = {
     "position": ("translation", "read.r_BN_N"),
     "velocity": ("translation", "read.v_BN_N"),
 }
-"""Inputs of laws: the message of Basilisk that tells of them, and what they are in it."""
+"""Inputs of laws: the Basilisk message that holds them, and their fields."""
 
 
 def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
@@ -78,7 +78,8 @@ def _basilisk(code: Code) -> dict[str, str]:
 def _fmu(code: Code) -> dict[str, bytes]:
     """Return a law as an FMU for co-simulation, FMI 3.0: an archive of sources.
 
-    The standard wants every function of its interface in a binary; those that a sampled law has no use for refuse."""
+    The standard requires every function of its interface in a binary; those that a sampled law does not need return an
+    error."""
     inputs, outputs = variables(code)
     taken, given = 'causality="input" start="0.0"', 'causality="output" variability="discrete"'
     # The standard has a variable of the name `time`, that of the simulation.
@@ -112,7 +113,7 @@ def _process(code: Code) -> dict[str, str]:
     acting = [f"effectors.{one.called}" for one in loop.used("effector") if one.part.flag("ACTS")]
     places: list[int] = []
     for name, value in code.flight.inputs._asdict().items():
-        # The last sensor that tells of something is believed, as in the simulation.
+        # The last sensor of a quantity is used, as in the simulation.
         known = [f"sensors.{one.called}.{name}" for one in reversed(loop.used("sensor"))]
         known += {"target": ["target"], "wheels": acting[:1], CLOCK: [f"measurement.{CLOCK}"]}.get(name, [f"state.{name}"])
         begin = next(one.first for wanted in known for one in layout.fields if f"{one.name}.".startswith(f"{wanted}."))

@@ -23,7 +23,7 @@ from starhold.version import __version__
 
 class Proof(NamedTuple):
     """The certificate's file and the digest of that (both empty for none), its outcome, a line for each claim, what they
-    assume, why nobody should fly the law unread (empty where all is proved), and the command that checks it again."""
+    assume, warnings for readers (empty where all is proved), and the command that checks it again."""
 
     file: str
     digest: str
@@ -34,7 +34,7 @@ class Proof(NamedTuple):
     recheck: str = ""
 
 
-UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved of this law, because nobody asked for it.")
+UNPROVED = Proof("", "", "", (), (), "NO CERTIFICATE. Nothing was proved about this law, because no proof was requested.")
 
 
 def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
@@ -57,7 +57,7 @@ def proof_of(certificates: Sequence[Certificate], digest: str) -> Proof:
     outcomes = {certificate.outcome for certificate in certificates}
     outcome = next((one for one in ("refuted", "undecided") if one in outcomes), "proved")
     if outcome != "proved" and not wrong:
-        wrong.append("NOT DECIDED where the motion ends: no claim is made of it.")
+        wrong.append("NOT DECIDED: no ultimate bound is claimed.")
     return Proof(FILE, digest, outcome, tuple(claims), tuple(assumed), "\n".join(wrong), recheck(certificates))
 
 
@@ -131,11 +131,11 @@ STATE = Type("flight_state_t", "", named=True)
 def _state(code: Code, public: dict[str, str]) -> Iterator[str]:
     """Yield the declaration of the state."""
     if code.flight.start._fields:
-        yield from comment("What is remembered from step to step: set it by the function below, and leave it alone.")
+        yield from comment("The memory from step to step: set it by the function below, and do not change it.")
         kind = code.given["state"] or STATE
         yield from _declaration(kind, {**public, STATE.name: f"{code.name}_state_t"}, code.buffers)
     else:
-        yield from comment("What the law remembers: nothing. C has no empty structs.")
+        yield from comment("The law has no memory. C has no empty structs.")
         yield from ("typedef struct {", "    double unused;", f"}} {code.name}_state_t;")
 
 

@@ -148,7 +148,7 @@ def vectors(code: Code, seed: int = 1) -> list[Vector]:
 
 
 def selftest_rows(cases: list[Vector]) -> str:
-    """Return the rows of the self-test in C, which makes these steps and fails unless every bit is as told."""
+    """Return the rows of the self-test in C, which runs these steps and fails unless every bit agrees."""
     return ",\n".join("    {" + ", ".join([str(int(c.first)), _braced(c.inputs), _braced(c.command), _word(c.digest)]) + "}"
                       for c in cases)  # fmt: skip
 

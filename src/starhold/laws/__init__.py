@@ -1,4 +1,3 @@
-"""Control laws stand here, one file each.
-
-A module here with a `CARD` is a law; `catalogue` finds them, `interface` says what one holds.
+"""Control laws, one file each. A module here with a `CARD` is a law; `catalogue` finds them, `interface` defines their
+contents.
 """

@@ -1,4 +1,4 @@
-"""A dipole against the change of the measured magnetic field slows a tumbling body."""
+"""A dipole that opposes the change of the measured magnetic field slows a tumbling body."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Gains(NamedTuple):
 
 
 class Orbit(NamedTuple):
-    """The form takes the gain from the orbit, along which the field must turn before all axes have been slowed."""
+    """The form takes the gain from the orbit, because the field must rotate along it before all axes are slowed."""
 
     orbit_period: Annotated[float, Gain("s", above=0.0, text="of the orbit")]
     inclination: Annotated[float, Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit to the magnetic equator")]

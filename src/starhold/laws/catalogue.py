@@ -34,7 +34,7 @@ class Law(Part):
 
     @property
     def body(self) -> str:
-        """The name of the body that it steers: that of its file, or the one whose command it gives."""
+        """The name of the body that it controls: that of its file, or the one whose command it gives."""
         return getattr(self.module, "BODY", None) or next(
             name for name, command in _commands().items() if self.hook(command)
         )
@@ -83,7 +83,7 @@ class Law(Part):
         return self.module.design(craft, spec)
 
     def explain(self, craft: Any, spec: Any) -> list[tuple[str, Any]]:
-        """Figures, name and value, by which a design is judged; none for a law without `explain`."""
+        """Figures of merit of a design, name and value; none for a law without `explain`."""
         teller = getattr(self.module, "explain", None)
         return [] if teller is None else teller(craft, spec)
 
@@ -117,7 +117,7 @@ def _installed() -> dict[str, Law]:
 
 
 def catalogue(body: str = "rigid-body") -> dict[str, Law]:
-    """All laws for a body that are installed, by name. One of another package that does not load is left out, with a warning
+    """Return all installed laws for a body, by name. A law of another package that does not load is left out, with a warning
     that names it."""
     return _of_body(body)
 
@@ -145,19 +145,19 @@ _FROM_FILES: dict[str, Law] = {}
 
 
 def known_law(name: str) -> Law | None:
-    """The attitude law of this name: the installed one, else the last one read from a file of this name."""
+    """Return the attitude law of this name: the installed one, else the last one read from a file of this name."""
     law = catalogue().get(name, _FROM_FILES.get(name))
     return law if law is None or law.body == "rigid-body" else None
 
 
 def file_of(name: str) -> Path | None:
-    """The file that the law of this name was last read from; None for a law that is installed."""
+    """Return the file from which the law of this name was last read; None for an installed law."""
     law = None if name in _installed() else _FROM_FILES.get(name)
     return None if law is None else law.file
 
 
 def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:
-    """The law in a file, which is executed. `known`: the installed laws, of which it may be one. Errors as of
+    """Return the law in a file, which is executed. `known`: the installed laws, of which it may be one. Errors as in
     `parts.catalogue.from_file`."""
     law = parts.from_file(path, known or {}, as_law)
     if law.file is not None:
@@ -166,7 +166,7 @@ def from_file(path: Path, known: Mapping[str, Law] | None = None) -> Law:
 
 
 def as_law(module: ModuleType, path: Path | None = None) -> Law:
-    """The law in a module. ValueError, one line, where it lacks a part of the contract."""
+    """Return the law in a module. ValueError, in one line, where it lacks a part of the contract."""
     body = getattr(module, "BODY", None)
     commands = _commands().values() if body is None else [_command_of(body, module, path)]
     if not any(hasattr(module, command) for command in commands):
@@ -183,8 +183,7 @@ def as_law(module: ModuleType, path: Path | None = None) -> Law:
 
 
 def _command_of(body: Any, module: ModuleType, path: Path | None) -> str:
-    """The name of the command of a law's body. A body that is not known yet may stand in a file of its name beside the
-    law's."""
+    """Return the name of the command of a law's body. An unknown body may be in a file of its name beside the law's."""
     try:
         return parts.find("body", body).module.COMMAND
     except (KeyError, TypeError):

@@ -1,4 +1,4 @@
-"""The part of PD feedback across the magnetic field acts, which is all that magnetorquers can give."""
+"""Only the component of PD feedback across the magnetic field acts, which is all that magnetorquers can give."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ CARD = Card(
     title="Cross-product law",
     summary="u = m x B with m = -B x (k_rate w + k_attitude q) / |B|^2",
     sources=("Spacecraft Dynamics and Control (1997)",),
-    assumptions=("the field turns on the way along the orbit", "small gains: averaged over an orbit all axes are held"),
+    assumptions=("the field rotates along the orbit", "small gains: averaged over an orbit all axes are held"),
     claims="none",
 )
 READS = ("magnetic_field",)

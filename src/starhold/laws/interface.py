@@ -28,7 +28,7 @@ Claim: TypeAlias = Literal["global", "almost-global", "local", "none"]
 
 @dataclass(frozen=True)
 class Card(contract.Card):
-    """Title, formula, sources and assumptions of a law, the stability that it claims, and facts that its readers need."""
+    """Title, formula, sources and assumptions of a law, the stability that it claims, and facts that its users need."""
 
     claims: Claim
     """The stability that is claimed: global, almost-global, local or none; where it is any, the assumptions are not

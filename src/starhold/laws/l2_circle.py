@@ -1,4 +1,4 @@
-"""A circle round the line through the libration point is made attractive as a set of states, not a motion in time."""
+"""A circle around the line through the libration point is made attractive as a set of states, not as a motion in time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Gains(NamedTuple):
     """The gains give the circle, how strongly it attracts, and the feedback along X; all scaled."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
-    rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
+    rate: Annotated[float, Gain(dimension="rate", text="at which it is followed, from Y to Z; negative the other way")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
     k: Annotated[float, Gain(above=0.0, text="feedback on the velocity error; size of a relay's thrust")]
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
@@ -100,7 +100,8 @@ def neutral(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Ve
 
 
 def feedback(measurement: PointMeasurement, gains: Gains, plant: Libration) -> Vector:
-    """Return the control acceleration for the linear model (scaled): the part that keeps V, and the part that lowers it."""
+    """Return the control acceleration for the linear model (scaled): the part that keeps V constant, and the part that
+    decreases it."""
     off = errors(measurement, gains)
     wrong = (0.0, off[1], off[2])
     smooth, relayed = scale(gains.k, wrong), along(wrong, gains.k, gains.boundary_layer)

@@ -22,8 +22,8 @@ CARD = Card(
 class Gains(NamedTuple):
     """The gains give the equilibrium, and the feedback of each axis; all scaled."""
 
-    y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")]
-    z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")]
+    y: Annotated[float, Gain(dimension="length", text="equilibrium along Y, lengths")]
+    z: Annotated[float, Gain(dimension="length", text="equilibrium along Z, lengths")]
     k_x: Annotated[float, Gain(above=0.0, text="on the position along X")]
     k_velocity: Annotated[Vector, Gain(shape=(3,), text="on the velocity, by axis")]
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
@@ -33,8 +33,8 @@ class Degree(NamedTuple):
     """The form gives the feedback of the largest decay rate (degree of stability) that leaves the natural stiffness along Y
     and Z alone."""
 
-    y: Annotated[float, Gain(dimension="length", text="place of rest along Y, lengths")] = 0.0
-    z: Annotated[float, Gain(dimension="length", text="place of rest along Z, lengths")] = 0.0
+    y: Annotated[float, Gain(dimension="length", text="equilibrium along Y, lengths")] = 0.0
+    z: Annotated[float, Gain(dimension="length", text="equilibrium along Z, lengths")] = 0.0
     model: Annotated[int, Gain(choices=MODELS, text="nonlinear: cancels what the linear model leaves out too")] = 0
 
 
@@ -73,7 +73,7 @@ def control(measurement: PointMeasurement, gains: Gains, plant: Libration, memor
 
 
 def rest(gains: Gains) -> Vector:
-    """Return where the craft comes to rest."""
+    """Return the equilibrium."""
     return (0.0, gains.y, gains.z)
 
 

@@ -1,8 +1,7 @@
-"""Among all controls within the limit the law takes the one under which a chosen V decreases fastest.
-
-V weighs the velocity against one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with f1
-= y^2 + z^2 - radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle
-near the wanted one, for there that V is constant whatever the control.
+"""Among all controls within the limit the law takes the one under which a chosen V decreases fastest. V compares the
+velocity with one that leads to the circle, y' = -rate z - pull f1 y and z' = rate y - pull f1 z with f1 = y^2 + z^2 -
+radius^2. With pull = 0 it would be the V of `l2-circle`, and a control of full size would hold any circle near the intended
+one, because there that V is constant whatever the control.
 """
 
 from __future__ import annotations
@@ -29,10 +28,10 @@ class Gains(NamedTuple):
     """The gains give the circle and the weights of V; all scaled."""
 
     radius: Annotated[float, Gain(above=0.0, dimension="length", text="of the circle, lengths")]
-    rate: Annotated[float, Gain(dimension="rate", text="at which it is run through, from Y to Z; negative the other way")]
+    rate: Annotated[float, Gain(dimension="rate", text="at which it is followed, from Y to Z; negative the other way")]
     alpha: Annotated[float, Gain(above=0.0, text="weight of the distance from the circle")]
     beta: Annotated[float, Gain(above=0.0, text="weight of x' + slope x")]
-    surface_gain: Annotated[float, Gain(above=0.0, text="rate at which x then falls")]
+    surface_gain: Annotated[float, Gain(above=0.0, text="rate at which x then decreases")]
     pull: Annotated[float, Gain(above=0.0, text="of the demanded velocity towards the circle")]
     boundary_layer: Annotated[float, Gain(at_least=0.0, text="|g| within which the control is proportional to it")] = 0.0
 

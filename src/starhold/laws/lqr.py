@@ -115,7 +115,7 @@ def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
             moments, axes, q, r = _by_axes(inertia, spec)
             k_rate, k_attitude = (_turned(axes, k) for k in closed_form(moments, q, r))
     for gain in (k_rate, k_attitude):
-        # Weights that couple the axes may well give a negative entry; nothing else does within the range of doubles.
+        # Weights that couple the axes may give a negative entry; nothing else does within the range of doubles.
         if not np.isfinite(gain).all() or not (isinstance(spec, Numeric) or (np.diagonal(gain) > 0.0).all()):
             raise ValueError(OUT_OF_RANGE)
     return Gains(compact(k_rate), compact(k_attitude), share)
@@ -163,8 +163,8 @@ def riccati_problem(craft: Craft, spec: FormI | FormII | FormIII) -> tuple[Array
 
 
 def explain(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> list[tuple[str, Any]]:
-    """Return figures to judge a design by: P, its residual, how far it is from the numerical solution, the closed loop's
-    eigenvalues, and whether the gyroscopic torque leaves V alone."""
+    """Return the figures of merit of a design: P, its residual, its distance from the numerical solution, the closed loop's
+    eigenvalues, and whether the gyroscopic torque leaves V unchanged."""
     inertia, gains = tensor(craft.inertia), design(craft, spec)
     k_rate, k_attitude = tensor(gains.k_rate), tensor(gains.k_attitude)
     figures: list[tuple[str, Any]] = []
@@ -213,7 +213,7 @@ def _turned(axes: Array, diagonal: Array) -> Array:
 
 
 def _without_rounding(gain: Array) -> Array:
-    """Return the matrix, made symmetric where it is symmetric but for the rounding of the weights."""
+    """Return the matrix, made symmetric where it is symmetric up to the rounding of the weights."""
     if np.abs(gain - gain.T).max() <= 1e-14 * np.abs(gain).max():
         return 0.5 * (gain + gain.T)
     return gain

@@ -1,4 +1,4 @@
-"""Modal control places the poles of the motion exactly and level by level, linearising it anew at every step."""
+"""Modal control places the poles of the motion exactly, level by level, linearising it again at every step."""
 
 from __future__ import annotations
 
@@ -132,8 +132,8 @@ def _straighten(q: Vector, v: Vector) -> Vector:
 
 
 def _upper(q: Vector, w: Vector, gains: Gains, craft: Craft, first: Scalar, rest: Vector) -> Vector:
-    """Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if it could be steered by the
-    momentum."""
+    """Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if the momentum were its
+    input."""
     half = apply(craft.inertia, _straighten(q, w))
     doubled = scale(2.0, apply(craft.inertia, _straighten(q, rest)))
     last = scale(4.0 * gains.b, half)

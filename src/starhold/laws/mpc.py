@@ -39,7 +39,7 @@ BALL, UNLIMITED = LIMITS.index("norm"), LIMITS.index("none")
 
 
 class Gains(NamedTuple):
-    """The gains are weights of the cost, the horizon and limits. Choices are given by their place in the list."""
+    """The gains are weights of the cost, the horizon and limits. Choices are given by their index in the list."""
 
     q_attitude: Annotated[Vector, Gain("1", above=0.0, shape=(3,), text="weight of the quaternion's vector part")]
     q_rate: Annotated[Vector, Gain("s^2", at_least=0.0, shape=(3,), text="weight of the rate")]
@@ -51,8 +51,8 @@ class Gains(NamedTuple):
 
 
 CALLS, SWEEPS, WORST, EXHAUSTED, SHAPED = range(COUNTERS)
-"""Places in the counters: calls, Riccati sweeps in all, most sweeps in a call, calls that ended at the budget without
-the optimum, and whether limits shaped the last plan (1) or not (0), which decides how the next call starts."""
+"""Indices of the counters: calls, Riccati sweeps in all, most sweeps in a call, calls that ended at the budget without the
+optimum, and whether limits shaped the last plan (1) or not (0), which decides how the next call starts."""
 
 
 class Memory(NamedTuple):
@@ -102,7 +102,7 @@ def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any
     name = TERMINALS[gains.terminal]
     p: Any = q if name == "stage" else np.zeros((6, 6))
     if name == "riccati":
-        # Loaded here, the only place that needs it; by name because its types are too loose for a strict checker.
+        # Loaded only here, where it is needed; by name because its types are too loose for a strict checker.
         riccati = import_module("scipy.linalg").solve_discrete_are
         try:
             p = riccati(a, b, q, r)

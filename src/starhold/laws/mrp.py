@@ -1,4 +1,4 @@
-"""Feedback acts on modified Rodrigues parameters, those of the turn below 180 degrees."""
+"""Feedback acts on modified Rodrigues parameters, those of the rotation below 180 degrees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Proportional-integral-derivative feedback on the quaternion holds the target against a constant torque from outside."""
+"""Proportional-integral-derivative feedback on the quaternion holds the target against a constant external torque."""
 
 from __future__ import annotations
 

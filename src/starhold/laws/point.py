@@ -23,7 +23,7 @@ def least_rate(plant: Libration) -> float:
 
 
 def undo_remainder(control: Vector, measurement: PointMeasurement, plant: Libration, model: int) -> Vector:
-    """Return the control without what the full problem adds to the linear acceleration here, where `model` asks for that."""
+    """Return the control less the terms that the full problem adds to the linear acceleration here, if `model` says so."""
     if MODELS[model] == "linear":
         return control
     position, velocity = measurement.position, measurement.velocity
@@ -31,7 +31,7 @@ def undo_remainder(control: Vector, measurement: PointMeasurement, plant: Librat
 
 
 def check_x(k_position: float, k_velocity: float, plant: Libration) -> None:
-    """ValueError where the feedback of `hold_x` leaves the motion along X unstable, x'' = (Omega^2 + 2 C) x + control."""
+    """Raise ValueError where the feedback of `hold_x` leaves X unstable: x'' = (Omega^2 + 2 C) x + control."""
     least = plant.rate**2 + 2.0 * plant.stiffness
     if k_position <= least or k_velocity <= 0.0:
         raise ValueError(f"k_x must be above {least:.6g} and the velocity along X fed back, or X is unstable")

@@ -1,4 +1,4 @@
-"""The kernel is told programs and numbers of a craft near a libration point; certificates tell what it proved of them."""
+"""Gives the kernel programs and numbers of a craft near a libration point, and certificates what it proved about them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from starhold.trace.straight_line import labelled, straight_line
 
 
 def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: str) -> dict[str, dict[str, Any]]:
-    """Return the programs by role: the field, the law, how its control is limited, and what it declares to make attractive:
-    errors that vanish with their V, or a place of rest."""
+    """Return the programs by role: the field, the law, how its control is limited, and the set that it declares to make
+    attractive: errors that vanish with their V, or an equilibrium."""
     measurement = ASKED["libration-point"]
     programs = {
         "field": straight_line(nonlinear if full else linear, position=ZERO, velocity=ZERO, plant=craft),
@@ -34,7 +34,7 @@ def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: st
 
 
 def point_subject(gains: Any, craft: Libration, known: Libration) -> dict[str, str]:
-    """Return the exact numbers that the programs may ask for: gains, the craft's and those that the law takes it to have."""
+    """Return the exact numbers that the programs may read: gains, the craft's and those of the law's model of it."""
     named = [*labelled("gains", gains), *labelled("plant", craft), *labelled("craft", known)]
     return {name: x.hex() for name, x in named if isfinite(x)}
 
@@ -46,7 +46,7 @@ HOWS = {
     "Squares": "sum of squares",
     "Contracts": "Lyapunov's matrix",
 }
-"""How the kernel's rules show something."""
+"""The methods of the kernel's rules, in words."""
 TOLD = {
     "ends on the circle": ("circle", ("level", "inner", "outer", "velocity")),
     "comes to rest": ("equilibrium", ()),
@@ -55,24 +55,24 @@ TOLD = {
     "holds another circle": ("circle", ()),
     "does not return": ("equilibrium", ()),
 }
-"""The kind of claim that each theorem shows or refutes, and those of its numbers that the claim tells."""
+"""The kind of claim that each theorem proves or refutes, and the numbers that the claim states."""
 REFUTED = {
     "needs more control on the circle": ("control", ("control", "y", "z")),
     "holds another circle": ("only the circle", ("radius", "needs", "of")),
     "does not return": ("each axis returns", ()),
 }
-"""What the theorems that refute a claim say is not so, and by which numbers."""
+"""The statements that refuting theorems contradict, and the numbers."""
 _NUMBER = re.compile(r"( [+-]?\d+)+$")
 
 
 def claim_of(proved: Proved, circle: bool) -> dict[str, Any]:
-    """Return what a certificate tells of a proved claim; circle: the law is for one."""
+    """Return a certificate's entries of a proved claim; circle: the law is for one."""
     numbers = {name: float(x) for name, x in proved.claim.numbers.content.items()}
     kind, names = TOLD[proved.claim.theorem]
     limit = next((name for name in ("norm", "axis") if f"limit.{name}" in numbers), None)
     claimed: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
     claimed |= {name: numbers[name] for name in names}
-    # Steps of one name are told of once.
+    # Steps of one name are listed once.
     steps = dict.fromkeys((_NUMBER.sub("", name), HOWS[rule]) for name, rule in proved.shown)
     outcome, shown = "proved", [(*step, "proved", dict[str, float]()) for step in steps]
     if proved.claim.theorem in REFUTED:

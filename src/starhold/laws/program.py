@@ -1,5 +1,5 @@
-"""A law as a program of the proof kernel. Its digest stands in certificates, exported C, runs and the report, and so ties
-what flies to what is proved."""
+"""A law as a program of the proof kernel. Its digest is in certificates, exported C, runs and the report, and so ties the
+program that flies to the one proved."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ASKED: dict[str, Any] = {
     "rigid-body": Measurement((1.0, *ZERO), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO, ZERO, 0.0),
     "libration-point": PointMeasurement(ZERO, ZERO, 0.0, 0.0),
 }
-"""By body a measurement of which every number is an input."""
+"""For each body a measurement with every number an input."""
 
 
 def law_program(law: Law, gains: Any, craft: Any, period: float) -> dict[str, Any]:

@@ -47,9 +47,9 @@ class Gains(NamedTuple):
 
 
 class Layered(NamedTuple):
-    """The form asks for the natural frequency and damping of the linear loop within a boundary layer, which has two real
-    roots, those of the surface and of the layer. Exact about every axis for a diagonal inertia, whose reaching torques are
-    in proportion to the moments; else exact about the axis of the largest moment, and faster about the others."""
+    """The form takes the natural frequency and damping of the linear loop within a boundary layer, which has two real roots,
+    those of the surface and of the layer. Exact about every axis for a diagonal inertia, whose reaching torques are in
+    proportion to the moments; else exact about the axis of the largest moment, and faster about the others."""
 
     bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
     switching_gain: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]
@@ -78,7 +78,7 @@ FORMS: dict[str, Any] = {"bandwidth": Layered, "settling": Settling}
 
 
 def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | Settling:
-    """Return the inputs of a form; one that settles in time is completed from the scenario's start."""
+    """Return the inputs of a form; one for a settling time is completed from the scenario's start."""
     spec = response.complete(spec, start)
     if isinstance(spec, Layered) or spec.switching_gain is not None:
         return spec

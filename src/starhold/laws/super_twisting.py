@@ -50,7 +50,7 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
 
 
 def check(gains: Gains, craft: Craft) -> None:
-    """Raise ValueError where motion on the surface, q' = -K q/2 near the target, leads away from it."""
+    """Raise ValueError where motion on the surface, q' = -K q/2 near the target, diverges from it."""
     slope: Any = gains.surface_gain
     backwards: Any = tuple(scale(-1.0, row) for row in slope) if isinstance(slope[0], tuple) else scale(-1.0, slope)
     if not decays(backwards):

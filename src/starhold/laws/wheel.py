@@ -48,7 +48,7 @@ FORMS: dict[str, Any] = {"degree-of-stability": Stability}
 
 
 def design(craft: Craft, spec: Stability) -> Gains:
-    """Return the gains of the largest decay rate (degree of stability); ValueError if angle and rate are zero, for then
+    """Return the gains of the largest decay rate (degree of stability); ValueError if angle and rate are zero, because then
     nothing bounds them."""
     optimum = _optimum(craft, spec)
     k = optimum.k_attitude

@@ -1,4 +1,4 @@
-"""A closed loop is a body, a law and the parts around them; nowhere else does a law meet a plant."""
+"""A closed loop: a body, a law and the parts around them. This is the only place where a law meets a plant."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ ON_TARGET = Fitted(find("target", "inertial"), Inertial())
 
 
 class Setup(NamedTuple):
-    """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. Those of parts
-    stand in the order in which a loop has them; limit: the saturation limit of the command; divergence_bound: the distance
-    beyond which the motion has diverged."""
+    """The numbers of a loop that are neither the craft's nor the law's; kernels take them as an argument. Those of parts are
+    in the order of the loop; limit: the saturation limit of the command; divergence_bound: the distance beyond which the
+    motion has diverged."""
 
     period: float
     substep: float
@@ -142,7 +142,8 @@ class ClosedLoop:
     limit: Limit = "axis"
     command_limit: float | None = None
     """The limit at which the command saturates (N m), per axis or in norm as `limit` says; None: the torque limit that the
-    law sees, the craft's. With effectors that tell what they surely give the law sees that; beyond it they saturate."""
+    law sees, the craft's. If effectors state the torque that they can always give, the law sees that torque; beyond it they
+    saturate."""
     sign_policy: SignPolicy = "as_published"
     hysteresis_width: float = 0.5
     divergence_bound: float = 1e3
@@ -178,7 +179,7 @@ class ClosedLoop:
         return self.find(name) is not None
 
     def with_parts(self, *more: Fitted) -> Self:
-        """The loop with these parts in the places of parts of the same name, or after the others."""
+        """Return the loop with these parts in place of parts of the same name, or after the others."""
         kept, new = list(self.parts), list(more)
         for place, fitted in enumerate(kept):
             same = next((one for one in new if one.part.name == fitted.part.name), None)
@@ -188,12 +189,12 @@ class ClosedLoop:
         return replace(self, parts=(*kept, *new))
 
     def without(self, *words: str) -> Self:
-        """The loop without the parts of these roles or names."""
+        """Return the loop without the parts of these roles or names."""
         return replace(self, parts=tuple(f for f in self.parts if f.part.role not in words and f.part.name not in words))
 
     @property
     def wheels(self) -> Any:
-        """The numbers of the reaction wheels that a claim is about, None without any."""
+        """The numbers of the reaction wheels in a claim, or None."""
         fitted = self.find("wheels")
         return None if fitted is None else fitted.params
 
@@ -318,7 +319,7 @@ def is_recorded(sensor: Part) -> bool:
 
 
 def can_be_inactive(effector: Part) -> bool:
-    """Whether a mode can fly without an effector: one that takes the command, or one that acts from outside."""
+    """Return whether a mode can fly without this effector, because it takes the command or acts from outside."""
     return effector.flag("ACTS") or effector.flag("OUTSIDE")
 
 

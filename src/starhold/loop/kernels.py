@@ -75,14 +75,15 @@ def _form(value: Any, known: dict[str, int]) -> Any:
 
 
 def _in_common(value: tuple[Any, ...]) -> str | None:
-    """A key that is equal for bitwise equal numbers that parts have in common; None for others, and where lanes differ."""
+    """Return a key that is equal for bitwise equal numbers that parts have in common; None for others, and where lanes
+    differ."""
     if not getattr(value, "IN_COMMON", False) or not all(isinstance(leaf, float) for leaf in leaves(value)):
         return None
     return repr(value)
 
 
 def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
-    """The carry of a loop without events after so many control steps in plain Python."""
+    """Return the carry of a loop without events after so many control steps in plain Python."""
     step, carry, setup = make_step(loop.composition()), loop.carry(), loop.setup()
     key = (loop.seed, loop.run if run is None else run)
     for k in range(steps):

@@ -18,7 +18,7 @@ from starhold.parts.roles import Goal
 
 @dataclass(frozen=True)
 class ModeTargets:
-    """This has in place of the module of a target the target of the present mode; `goal` takes the mode, counted from 0."""
+    """Takes the place of a target's module, for the present mode's target; `goal` takes the mode, counted from 0."""
 
     parts: tuple[Part, ...]
     ROLE = "target"
@@ -73,14 +73,14 @@ class ModeTargets:
 def join_targets(targets: Sequence[Fitted]) -> Fitted:
     """The target of a loop whose modes have these, one each."""
     module: Any = ModeTargets(tuple(target.part for target in targets))
-    # A target from a file is tried out as all parts from files are.
+    # A target from a file is checked like all parts from files.
     file = next((target.part.file for target in targets if target.part.file is not None), None)
     return Fitted(Part("targets-of-modes", module, file), tuple(target.params for target in targets))
 
 
 @dataclass(frozen=True)
 class Inactive:
-    """This takes the place of the module of an effector that is inactive in a mode: its command is zero."""
+    """Takes the place of the module of an effector that is inactive in a mode: its command is zero."""
 
     module: Any
 

@@ -39,8 +39,8 @@ class Step(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """A law is given this at a control instant: its measurement, the readings of the sensors and the estimate. With the rest
-    the step goes on: the carry, the memories and the sign of the quaternion."""
+    """The inputs of a law at a control instant: its measurement, the readings of the sensors and the estimate; and what the
+    step needs afterwards: the carry, the memories and the sign of the quaternion."""
 
     measurement: Any
     readings: Any
@@ -246,7 +246,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
     def propagate(carry, craft, setup):
         """One substep."""
         applied = getattr(carry.state, body.COMMAND)
-        # A held command is shared out once.
+        # A held command is allocated once.
         commands = tuple(_commands(applied, carry.effectors, setup, carry.memory)) if not named.dynamic else None
         begun = _Begun(commands, applied, carry.actuators)
         state, effectors, outputs = advance(

@@ -1,1 +1,1 @@
-"""The figures and numbers that five publications print are made again and laid beside them."""
+"""Reproduces the figures and numbers of five publications and compares them with the printed ones."""

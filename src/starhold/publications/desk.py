@@ -1,4 +1,4 @@
-"""Measures get scenarios, flights, figures and proofs here; each is made once for a publication."""
+"""The scenarios, flights, figures and proofs for measures; each is made once for a publication."""
 
 import shutil
 import tempfile
@@ -82,7 +82,7 @@ class Desk:
         return self.once(("certificates", file, law, changes), lambda: certify(scenario, scenario.pick(law), loop))
 
     def claims(self, file: str, law: str, changes: Mapping[str, Any] | None = None) -> dict[str, Claim]:
-        """The claims about a law as the flight starts, by their kinds."""
+        """Return the claims about a law as the flight starts, by their kinds."""
         return {claim.kind: claim for claim in self.certificates(file, law, changes)[0].certificate.claims}
 
     def campaign(self, file: str) -> CampaignResult:

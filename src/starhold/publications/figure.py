@@ -44,7 +44,7 @@ class Panel:
     """Whether a unit is as long on both axes."""
     levels: Sequence[float] = ()
     notes: Sequence[tuple[float, float, str]] = ()
-    """Words at places (x, y)."""
+    """Labels at points (x, y)."""
 
 
 @dataclass(frozen=True)

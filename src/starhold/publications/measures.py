@@ -20,7 +20,7 @@ def metric(
 
 
 def proved(desk: Desk, file: str, law: str, claim: str) -> Finding:
-    """Tell whether a claim of a law's certificate is proved."""
+    """Return whether a claim of a law's certificate is proved."""
     outcome = desk.claims(file, law)[claim].outcome
     return Finding(outcome == "proved", f"{claim}: {outcome}")
 

@@ -19,8 +19,8 @@ class _Strict(BaseModel):
 
 
 class Item(_Strict):
-    """Something that a measure makes: the function's name, of a module in the paper's folder or of the common ones, and
-    its arguments beside the desk."""
+    """An item made by a measure: the function's name, from a module in the paper's folder or a common one, and its arguments
+    beside the desk."""
 
     by: str
     given: dict[str, Any] = Field(default_factory=dict, alias="with")
@@ -35,7 +35,7 @@ class FigureItem(Item):
     caption: str
     seen: str = ""
     after: str = ""
-    """The number of the figure that one of ours comes after."""
+    """The number of the figure that one of ours follows."""
 
 
 class Row(Item):
@@ -49,11 +49,11 @@ class Row(Item):
     """The printed numbers, with all their digits; none where a statement is judged."""
     unit: str = ""
     tolerance: float = 0.0
-    """Share of the printed number within which ours counts as close."""
+    """The relative difference from the printed number within which ours counts as close."""
     verdict: Verdict
     """The verdict that is expected."""
     why: str = ""
-    """The explanation of a verdict that is not plain agreement."""
+    """The explanation of a verdict other than agreement."""
     erratum: int | None = None
     """The erratum's number, of a row that shows one."""
 
@@ -87,7 +87,7 @@ class Section(_Strict):
 
 
 class Paper(_Strict):
-    """A publication, described as far as its source is."""
+    """A publication, with a description of its source."""
 
     letter: str
     title: str

@@ -1,4 +1,4 @@
-"""Every figure of a publication is made, and every row gets a verdict."""
+"""Makes every figure of a publication, and gives every row a verdict."""
 
 import time
 from collections.abc import Callable

@@ -54,7 +54,7 @@ class Printed:
         return float(self.text)
 
     def rounds_from(self, ours: float) -> bool:
-        """Tell whether a number rounds to the printed digits, a half either way."""
+        """Return whether a number rounds to the printed digits, a half either way."""
         if not math.isfinite(ours):
             return False
         exponent = Decimal(self.text).as_tuple().exponent

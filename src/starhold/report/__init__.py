@@ -1,1 +1,1 @@
-"""Results as they are read: the page, figures, tables as CSV and netCDF. Each body has a report in `bodies`."""
+"""Results in readable form: the page, figures, and tables as CSV and netCDF. Each body has a report in `bodies`."""

@@ -1,4 +1,4 @@
-"""The first screen of a page: whether each law does what it should, by how much, and what of that is proved."""
+"""The first screen of a page: whether each law meets its requirements, by how much, and what of that is proved."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from starhold.studies.verification import RequirementVerdict
 
 SPANS = ((63_115_200.0, 31_557_600.0, "years"), (172_800.0, 86_400.0, "days"), (7_200.0, 3_600.0, "h"), (600.0, 60.0, "min"))
-"""From how many seconds on a time is told in a unit, and its seconds."""
+"""The least time (s) that is shown in each unit, and the unit in seconds."""
 
 
 def span_text(seconds: float) -> str:
-    """Tell a time in the unit in which it is large and round."""
+    """Show a time in the unit in which it is large and round."""
     sizes = ((seconds / size, unit) for least, size, unit in SPANS if seconds >= least)
     return "{:g} {}".format(*next((one for one in sizes if abs(one[0] - round(one[0], 2)) < 1e-9), (seconds, "s")))
 
 
 def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
-    """Tell how long was flown, and how often the laws act."""
+    """State the duration of the flights and the control rate."""
     run = flights[0].recording.attrs
     period, end = (x * run.get("time_unit_s", 1.0) for x in (run["control_period"], scenario.table.simulation.duration))
     whose = f", commands from {run['law_process']}" if "law_process" in run else ""
@@ -41,7 +41,7 @@ def facts(scenario: Scenario, flights: Sequence[Flight]) -> str:
 
 
 def lost_alarm(flights: Sequence[Flight]) -> str:
-    """List the motions that diverged, and the metrics that are not numbers; empty if there are none."""
+    """List the motions that diverged and the metrics that are not finite; empty if there are none."""
     lost = [f"{flight.name} (at {lost_text(flight)})" for flight in flights if flight.lost is not None]
     sentences = [f"Diverged, and so without final values: {', '.join(lost)}"] if lost else []
     sentences += [said for flight in flights if (said := unknown_text(flight))]
@@ -49,7 +49,7 @@ def lost_alarm(flights: Sequence[Flight]) -> str:
 
 
 def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
-    """Make the table of what is required, with the verdicts on each law, and their counts; empty where nothing is."""
+    """Make the table of requirements with the verdict on each law, and count verdicts; empty without requirements."""
     names = {entry.name for entry in scenario.laws} if scenario.table.requirement else set[str]()
     judged = {number: verdicts_of_flight(scenario, one) for number, one in enumerate(flights) if one.name in names}
     if not judged:
@@ -59,7 +59,7 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
     by_law = list(judged.values())
     if all(one.verdict == "not decided" for of in by_law for one in of):
         subject = ", ".join(one.id for one in by_law[0])
-        return note(f"Required, and not decided by a flight: {subject}; starhold verify tells."), ""
+        return note(f"Required, but not decided by a flight: {subject}; run starhold verify."), ""
     rows: list[list[Any]] = []
     for same in zip(*by_law, strict=True):
         first = same[0]
@@ -77,7 +77,7 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
 
 
 def _evidence(verdict: RequirementVerdict, law: str) -> str:
-    """Tell how a verdict is known, without the law's name, so that what is the same of several laws is told once."""
+    """State how a verdict is known, without the law's name, so that equal texts of several laws appear once."""
     known = verdict.evidence.replace(f" of {law}", "")
     return f"{known}; leaving out {', '.join(verdict.left_out)}" if verdict.left_out else known
 
@@ -90,13 +90,13 @@ def _counted(given: Sequence[RequirementVerdict]) -> str:
 
 
 def key_metrics(metric_set: MetricSet, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """List the metrics of the table, those first that laws are ranked by."""
+    """List the metrics of the table, beginning with those by which laws are ranked."""
     there = metric_set.columns(results)
     return [*(name for name in metric_set.order if name in there), *(name for name in there if name not in metric_set.order)]
 
 
 def fate(flight: Flight) -> str:
-    """Tell in a word what became of a flight; empty where nothing says whether it settles."""
+    """State the outcome of a flight in a word; empty where no metric says whether it settles."""
     if flight.lost is not None:
         return "diverged"
     if "settling_time" not in flight.metrics:
@@ -105,7 +105,7 @@ def fate(flight: Flight) -> str:
 
 
 def ranking(flights: Sequence[Flight]) -> str:
-    """Make the ranked table: a row of key numbers for each law, below it what is best at what."""
+    """Make the ranked table: a row of key numbers for each law, and below it the best law by each metric."""
     metric_set = flights[0].metric_set
     results = {flight.name: flight.metrics for flight in flights}
     best, metrics = metric_set.winners(results), key_metrics(metric_set, results)
@@ -152,7 +152,7 @@ def columns_list(flights: Sequence[Flight]) -> str:
 
 
 def proofs(flights: Sequence[Flight]) -> str:
-    """Tell the strongest proof about each law in a sentence; empty where none was looked for."""
+    """State the strongest proof about each law in a sentence; empty where none was attempted."""
     lines = [_strongest(number, flight, len(flights)) for number, flight in enumerate(flights) if flight.certificates]
     if not lines:
         return ""

@@ -1,4 +1,4 @@
-"""The plots over time of a body that turns."""
+"""The plots over time of a rotating body."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 ACCURACIES = (("", "attitude, |q| ≤ 10⁻ᵏ"), ("rate_", "rate, |ω| ≤ 10⁻ᵏ rad/s"))
 """Errors whose steps to an accuracy are counted: the prefix of the metric, and the heading."""
 MOST_MARKS = 20
-"""Switches of a flight that are marked."""
+"""The most mode switches of a flight that are marked."""
 NEAR = 0.02
-"""Share of the largest error that counts as near the target."""
+"""The error is near the target below this share of its largest value."""
 KNOWN = (*rigid_body.Sample._fields, *wheels.Sample._fields, "error_angle")
 """Recorded quantities that have plots of their own."""
 
@@ -99,7 +99,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
 
 
 def begun(flights: Sequence[Flight]) -> list[Mark]:
-    """When modes begin; of laws that switch to and fro the first of them."""
+    """List when modes begin; for laws that switch back and forth, the first few switches."""
     of = {flight.name: flight.modes for flight in flights if flight.modes}
     return [
         Mark(one.time, one.mode if len(of) == 1 else f"{name}: {one.mode}")
@@ -109,7 +109,7 @@ def begun(flights: Sequence[Flight]) -> list[Mark]:
 
 
 def readers_of(scenario: Scenario) -> tuple[str, ...]:
-    """How the names of what sensors and estimators tell begin."""
+    """List the prefixes of the names of quantities that sensors and estimators output."""
     readers = [fitted.called for fitted in scenario.parts if fitted.part.role in ("sensor", "estimator")]
     return tuple(f"{name.replace('-', '_')}_" for name in readers)
 
@@ -137,8 +137,8 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
 
 
 def funnel(flight: Flight) -> Curve | None:
-    """Times (s) and the angles (rad) that the flight is proved not to exceed from each on, (2, n); None where nothing is
-    proved of all of it."""
+    """Return times (s) and the angles (rad) that the flight is proved not to exceed from then on, (2, n); None where no
+    proof covers the whole flight."""
     if flight.modes or [left.get("pointing") for left in flight.departures] != [()]:
         return None
     claim = flight.certificates[0].claim("pointing")
@@ -155,8 +155,8 @@ def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:
 
 
 def roll_pitch_yaw(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turns (deg) about the first, the new second and the new third axis that, taken from the last to the first, make up
-    each quaternion (n, 4); (n, 3). The same as `algebra.cosines.to_angles`, of many."""
+    """Return the rotations (deg) about the first, the new second and the new third axis that, from the last to the first,
+    make up each quaternion (n, 4); (n, 3). `algebra.cosines.to_angles` does the same for one."""
     q0, q1, q2, q3 = q.T
     roll = np.arctan2(2.0 * (q2 * q3 + q0 * q1), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     pitch = np.arcsin(np.clip(2.0 * (q0 * q2 - q1 * q3), -1.0, 1.0))
@@ -172,8 +172,8 @@ def _unwrapped(angles: Curve) -> Curve:
 
 
 def early(flights: Sequence[Flight]) -> float | None:
-    """The time (s) by which the motions that come near the target are near it, with a little to spare; None where that is
-    most of the run, or none does."""
+    """Return the time (s), with a small margin, by which the motions that come near the target are near it; None where that
+    is most of the run, or where none does."""
     longest, ends = max(float(flight.recording["time"][-1]) for flight in flights), list[float]()
     for flight in flights:
         run = flight.recording
@@ -186,7 +186,7 @@ def early(flights: Sequence[Flight]) -> float | None:
 
 
 def until(flights: Sequence[Flight], end: float) -> list[Flight]:
-    """Flights with what was recorded up to a time (s)."""
+    """Return the flights with their recordings cut at a time (s)."""
     return [replace(flight, recording=flight.recording.until(end)) for flight in flights]
 
 
@@ -237,8 +237,8 @@ def _wheels(flights: Sequence[Flight], factor: int, scenario: Scenario) -> tuple
 
 
 def closest_limit(flight: Flight, scenario: Scenario) -> tuple[float, str]:
-    """The limit of torque or wheels that a flight comes closest to: its largest value as a share of that, and what it is
-    of; (0, "") where there is no limit."""
+    """Find the limit of torque or wheels to which a flight comes closest: its largest value as a share of the limit, and the
+    name of the limit; (0, "") where there is none."""
     run, wheels = flight.recording, wheels_of(scenario)
     torque, attrs = run["torque"], run.attrs
     limited = [("torque", np.linalg.norm(torque, axis=1) if attrs["limit"] == "norm" else torque, attrs["torque_limit"])]

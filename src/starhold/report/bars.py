@@ -1,4 +1,4 @@
-"""Figures of bars: a row for each thing, a panel for each quantity."""
+"""Bar charts: a row for each item, a panel for each quantity."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -9,13 +9,13 @@ from starhold.report.figures import framed, plain, shortened
 from starhold.report.plots import COLOURS
 
 ACROSS = 4
-"""Panels in a row."""
+"""The number of panels in a row."""
 LINE, LIMIT = {"color": "0.3", "linewidth": 1.0, "dashes": (5, 3)}, {"color": "#b3202c", "linewidth": 1.2}
 
 
 class Bars(NamedTuple):
-    """A panel: its label, the length of each bar and the words at its end, a dashed line; a title, and the required value, a
-    line unless it is too far away."""
+    """A panel: its label, the length of each bar and the text at its end, a dashed line; a title, and the required value,
+    drawn as a line unless it is too far away."""
 
     label: str
     values: Sequence[float]
@@ -39,8 +39,9 @@ def draw_bars(
 ) -> Any:
     """Draw a figure.
 
-    note: below the title. rows: their names; hues: the numbers of their colours, which `kinds` names in the legend. dashed:
-    what the dashed lines are. label: of the rows. struck: words in place of the bars of some rows, which `why` explains."""
+    note: text below the title. rows: their names; hues: the numbers of their colours, which `kinds` names in the legend.
+    dashed: the meaning of dashed lines. label: of the rows. struck: text in place of the bars of some rows, which `why`
+    explains."""
     from matplotlib.lines import Line2D
 
     struck = struck or {}
@@ -83,7 +84,7 @@ def draw_bars(
         first.set_yticks(np.arange(len(rows)), names, parse_math=False)
         first.set_ylim(len(rows) - 0.5, -0.5)
         first.set_ylabel(label, fontsize=9)
-        # Words in place of bars take more room than the first panel has; the others have nothing to show beside them.
+        # Text in place of bars needs more room than the first panel has; in these rows the other panels are empty.
         first.set_zorder(1)
     handles = [Line2D([], [], color=COLOURS[hue], linewidth=6.0, label=name) for name, hue in kinds.items()]
     if why:

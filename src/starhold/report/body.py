@@ -1,4 +1,4 @@
-"""The hooks by which reports know a body, and how they are found by the body's name."""
+"""The hooks through which reports show a body, and how they are found by the body's name."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ if TYPE_CHECKING:
 
 
 class Sampling(NamedTuple):
-    """How plots are thinned: two samples kept of every `factor`. early: samples of the transient where it is shown alone,
-    and their factor."""
+    """How plots are thinned: two of every `factor` samples are kept. early: samples of the transient where it is shown
+    alone, and their factor."""
 
     factor: int
     early: tuple[int, int] | None = None
 
 
 class PageParts(NamedTuple):
-    """The parts of a page that belong to the body: the data of its scripts (each plot in "plots" has a box, the first on the
-    first screen), HTML, and the names of scripts among the assets."""
+    """The parts of a page that are specific to the body: the data of its scripts (each plot in "plots" has a box, the first
+    on the first screen), HTML, and the names of scripts among the assets."""
 
     data: dict[str, Any]
     views: str = ""
@@ -31,20 +31,20 @@ class PageParts(NamedTuple):
     measured: str = ""
     """A section below the ranking."""
     folds: Mapping[str, str] = {}
-    """The folds of these names hold this, too."""
+    """Further contents of the folds of these names."""
     transient: float | None = None
-    """The length of the transient (s) that the page can show by itself, None for none."""
+    """The length of the transient (s) that the page can show separately, or None."""
     scripts: Sequence[str] = ()
     footer: str = ""
     sampling: Sampling | None = None
-    """The thinning of curves on a page that flies again, None for one that does not."""
+    """The thinning of curves on a page with sliders, or None."""
 
 
 class BodyReport(Protocol):
     """The hooks of a body for pictures and pages, functions of its module in `starhold.report.bodies`."""
 
     def picture(self, flights: Sequence[Flight], scenario: Scenario) -> Picture:
-        """Gather what the figures show."""
+        """Collect the data of the figures."""
         ...
 
     def page(self, flights: Sequence[Flight], scenario: Scenario) -> PageParts:
@@ -53,5 +53,5 @@ class BodyReport(Protocol):
 
 
 def report_of(body: str) -> BodyReport:
-    """The report of a body of this name, or that of any body where there is none of its own."""
+    """Return the report of the body of this name, or the report for any body where it has none."""
     return body_module("starhold.report.bodies", body)

@@ -1,4 +1,4 @@
-"""The page with the outcome of a campaign, which opens offline and loads nothing, and recordings of runs worth a look."""
+"""The page with the outcome of a campaign, which opens offline and loads nothing, and recordings of selected runs."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
 
 
 FLAT = 1e-3
-"""Edges of bins whose ratios agree to this are those of a logarithmic scale."""
+"""Bin edges whose ratios agree within this tolerance belong to a logarithmic scale."""
 DECADES = 2.0
 """Quantities over time that span more powers of ten than this are drawn on a logarithmic scale."""
 DEEPEST = 12.0
-"""No more powers of ten are shown of a quantity over time."""
+"""The most powers of ten that are shown of a quantity over time."""
 NEAR = 1.0
-"""A bound farther from all values than so many times their range is not drawn."""
+"""A bound is not drawn if it is farther from all values than so many times their range."""
 
 
 def histograms(result: CampaignResult, words: Wording) -> list[dict[str, Any]]:
-    """Make a plot for each metric of which some law has a histogram."""
+    """Make a plot for each metric that has a histogram for some law."""
     plots: list[dict[str, Any]] = []
     for metric in headings_of(result, words):
         spreads = {
@@ -94,7 +94,7 @@ def _histogram(name: str, metric: str, spreads: dict[int, Spread], result: Campa
 
 
 def _geometric(edges: NDArray[np.float64]) -> bool:
-    """Tell whether bins are equal on a logarithmic scale and not on a linear one."""
+    """Return whether bins are equal on a logarithmic scale and not on a linear one."""
     widths, ratios = np.diff(edges), np.diff(np.log(edges)) if edges[0] > 0.0 else np.array([math.inf])
     even = float(np.ptp(ratios)) <= FLAT * float(np.abs(ratios).max()) if np.isfinite(ratios).all() else False
     return even and float(np.ptp(widths)) > FLAT * float(widths.max())
@@ -165,25 +165,30 @@ def _lines(envelope: Envelope) -> dict[str, NDArray[np.float64]]:
 
 
 READING = {
-    "verdict": "Met, missed or not decided, for a share of all flights and with a confidence, both set "
-    "beforehand. Met: were the requirement kept by less than that share, so few failures would come up with a probability "
-    "of at most 1 less the confidence (the consumer's risk). Not decided: too few runs to tell.",
-    "failure probability": "Its lower and its upper bound by Clopper and Pearson's exact formula, each holding by itself "
-    "with the confidence; of a campaign that stops when it knows enough, those of a confidence sequence.",
-    "margin": "How far a run is on the good side of the requirement's bound; below zero it is missed. Margin kept: one that "
-    "at least the share asked of all flights keeps, with the confidence, by an order statistic.",
-    "known before flight": "A condition that is known before flight is not averaged over: its quarters are judged apart, "
-    "and a requirement is met only if it is in each of them.",
+    "verdict": (
+        "Met, missed or not decided, for a share of all flights and with a confidence, both fixed beforehand. Met: if "
+        "less than that share kept the requirement, so few failures would occur with a probability of at most 1 minus "
+        "the confidence (the consumer's risk). Not decided: too few runs."
+    ),
+    "failure probability": "Its lower and its upper bound by Clopper and Pearson's exact formula, each valid by "
+    "itself with the confidence; for a campaign that stops early, the bounds of a confidence sequence.",
+    "margin": (
+        "How far a run is on the good side of the requirement's bound; below zero it misses. Margin kept: a margin that "
+        "at least the required share of all flights keeps, with the confidence, by an order statistic."
+    ),
+    "known before flight": "A condition that is known before flight is not averaged over: its quartiles are judged "
+    "separately, and a requirement is met only if each of them meets it.",
     "5 %, median, 95 %": "Five, fifty and ninety-five in a hundred of the runs that have the metric lie below.",
-    "lost, without value": "A lost run counts as one that misses every requirement on a value that it lacks.",
-    "over time": "The largest value of each run in each window of time is taken; line: their median, band: 5 to 95 %, thin "
-    "lines: the least and the largest of all runs that were not lost. Quantiles are right to within 3 %, the extremes are "
+    "lost, without value": "A lost run counts as missing every requirement on a value that it lacks.",
+    "over time": "The largest value of each run in each window of time counts. Line: the median; band: 5 to 95 %; "
+    "thin lines: the least and the largest of all runs that were not lost. Quantiles are right to within 3 %, the "
+    "extremes are "
     "exact.",
 }
 
 
 MOST_AGAIN, MOST_DRIVERS = 25, 10
-"""Runs worth flying again that are listed of a law, and its drivers of a kind."""
+"""The most runs worth flying again that are listed for a law, and the most drivers of each kind."""
 NBSP = "\N{NO-BREAK SPACE}"
 
 
@@ -219,7 +224,7 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
     ]
     data = {
         "laws": [{"name": law.law, "colour": colour(number)} for number, law in enumerate(result.laws)],
-        # The comparison's script draws these, of which a campaign has none.
+        # The comparison's script draws these, and a campaign has none.
         "plots": [],
         "histograms": [_for_script(plot) for plot in spreads],
         "envelopes": [_for_script(plot) for plot in over_time],
@@ -231,7 +236,7 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
 
 
 def _folded(section: Section | None) -> str:
-    """A section that is there when asked for."""
+    """Fold a section, to be opened by the reader."""
     return "" if section is None else fold(section.heading, _shown(section._replace(heading="")))
 
 
@@ -264,8 +269,8 @@ def _drivers(result: CampaignResult, words: Wording) -> Iterator[str]:
     looked = [(number, law) for number, law in enumerate(result.laws) if law.drivers is not None]
     if looked:
         yield note(
-            "Shown is what stands out from chance: all tests of a law are corrected together, so that with "
-            f"{percent(1.0 - RISK)} confidence nothing is shown by chance, if inputs were drawn independently. Numbers of "
+            "Only statistically significant inputs are shown: all tests of a law are corrected together, so with "
+            f"{percent(1.0 - RISK)} confidence none is shown by chance, if inputs were drawn independently. Numbers of "
             "inputs are in the units of their keys."
         )
     for number, law in looked:
@@ -293,7 +298,7 @@ def _distributions(plots: list[dict[str, Any]]) -> str:
         return ""
     rare = '<button id="rare" type="button" aria-pressed="false">Logarithmic counts: show rare runs</button>'
     note = (
-        '<p class="note">Bins of runs; dashed: what is required. Where laws have bins of their own, heights are per unit, '
+        '<p class="note">Histograms of runs; dashed: the requirement. Where laws have different bins, heights are per unit, '
         "so that areas compare.</p>"
     )
     grid = f'<div class="grid">{"".join(map(plot_box, plots))}</div>'
@@ -304,7 +309,7 @@ def _over_time(plots: list[dict[str, Any]]) -> str:
     if not plots:
         return ""
     note = (
-        '<p class="note">Of the runs that were not lost, the largest value in each window of time: median (line), 5 to 95 % '
+        '<p class="note">The largest value in each window of time of the runs that were not lost: median (line), 5 to 95 % '
         "(band), least and largest of all runs (thin lines). Drag to zoom, double-click to zoom out.</p>"
     )
     return f"{note}\n{''.join(map(plot_box, plots))}"
@@ -319,7 +324,7 @@ def _store(result: CampaignResult, words: Wording) -> str:
     examples = "".join(f"<p>{code(f'starhold query {folder} {shlex.quote(question)}')}</p>" for question in questions)
     return (
         f'<p>Digest (SHA-256 of the sorted results): <code class="copy">{escape(result.digest)}</code></p>\n'
-        '<p class="note">The same scenario gives the same digest, whatever flies it. Every run is a row of the table '
+        '<p class="note">The same scenario gives the same digest on any machine. Every run is a row of the table '
         f"<code>runs</code>, with its inputs, metrics and margins:</p>\n{examples}"
     )
 
@@ -334,7 +339,7 @@ RECORDED = "recorded"
 
 
 def write_campaign(scenario: Scenario, result: CampaignResult) -> Path:
-    """Fly again and record the runs of a campaign that are worth looking at, and write its page; returns the page's path."""
+    """Fly the selected runs of a campaign again, record them, and write the campaign's page; return the page's path."""
     for law in result.laws:
         for again in law.again:
             flown = fly_again(result.folder, again.run, law.law)

@@ -1,4 +1,4 @@
-"""The tables that sum up a campaign and tell why runs fail, as the terminal prints them and the page shows them."""
+"""The tables that sum up a campaign and explain why runs fail, for the terminal and the page."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class Section(NamedTuple):
-    """A table under its heading, and a note on it."""
+    """A table with its heading and a note."""
 
     heading: str
     table: Table
@@ -41,12 +41,12 @@ class Section(NamedTuple):
 
 
 def numbers(*names: str) -> list[Column]:
-    """Columns of numbers, aligned right: each its heading, and after a stroke the line below it."""
+    """Make columns of numbers, aligned right, from headings; a second line of a heading follows a "|"."""
     return [Column(name, below, ">") for name, _, below in (one.partition("|") for one in names)]
 
 
 def law_cell(result: CampaignResult, number: int) -> Cell:
-    """A law's name, which has its colour."""
+    """Show a law's name in its colour."""
     return Cell(result.laws[number].law, "law", number)
 
 
@@ -69,7 +69,7 @@ def verdicts(result: CampaignResult, words: Wording) -> Section | None:
         *map(Column, ("requirement", "law", "verdict")),
         *numbers("keep it|and must", "miss it|and may"),
         *numbers(f"failure probability|{'whenever stopped' if stopped else 'Clopper–Pearson'}"),
-        *numbers("worst margin|and its run", "margin kept|by the share asked"),
+        *numbers("worst margin|and its run", "margin kept|by the required share"),
     ]
     return Section("Verdicts", Table(columns, rows, ends=ends), " ".join(_conditions(result)))
 
@@ -87,7 +87,7 @@ def _verdict(verdict: Verdict, words: Wording) -> list[Any]:
 
 
 def _conditions(result: CampaignResult) -> list[str]:
-    """The conditions known before flight in which requirements are not met."""
+    """List the conditions known before flight in which requirements are not met."""
     sentences: list[str] = []
     for law in result.laws:
         for verdict in law.verdicts:
@@ -100,7 +100,7 @@ def _conditions(result: CampaignResult) -> list[str]:
 
 
 def runs(result: CampaignResult) -> Section:
-    """How many runs of each law were lost, and how many failed."""
+    """Count the runs of each law that were lost, and those that failed."""
 
     def of_runs(number: int, among: int) -> str:
         return f"{count_text(number)} ({percent(number / max(among, 1))})" if number else "0"
@@ -109,12 +109,12 @@ def runs(result: CampaignResult) -> Section:
         [law_cell(result, number), count_text(law.runs), of_runs(law.lost, law.runs), of_runs(law.failed, law.runs)]
         for number, law in enumerate(result.laws)
     ]
-    note = "Lost: the motion left all bounds and has no final values. Failed: lost, or a requirement is missed."
+    note = "Lost: the motion diverged and has no final values. Failed: lost, or misses a requirement."
     return Section("Runs", Table([Column("law"), *numbers("runs", "lost", "failed")], rows), note)
 
 
 def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> Section | None:
-    """The distribution of each metric under each law, the required ones first; `most`: no more metrics than these."""
+    """Show the distribution of each metric under each law, required ones first. most: the largest number of metrics."""
     headings, required = headings_of(result, words), {item.column for item in words.requirements.values()}
     rows: list[list[Any]] = []
     ends: set[int] = set()
@@ -133,12 +133,12 @@ def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> 
     if not rows:
         return None
     heads = numbers("least", "5 %", "median", "95 %", "largest", "mean", "without|value")
-    note = "Over the runs that have the metric; a run that is lost, or never settles, is without one."
+    note = "Over the runs that have the metric; a run that is lost, or never settles, has none."
     return Section("Metrics", Table([*map(Column, ("metric", "unit", "law")), *heads], rows, ends=ends), note)
 
 
 def again(result: CampaignResult, most: int) -> Section | None:
-    """The runs that are worth flying again, at most so many of a law, with what to type."""
+    """List the runs worth flying again, at most so many of each law, with the command."""
     rows = [
         [law_cell(result, number), str(item.run), item.why, Cell(item.command, "typed")]
         for number, law in enumerate(result.laws)
@@ -154,7 +154,7 @@ def again(result: CampaignResult, most: int) -> Section | None:
 
 
 def brackets(result: CampaignResult, words: Wording) -> Section | None:
-    """How bad metrics get: what was flown and what is proved."""
+    """Show the worst value of each metric: the one flown and the bound proved."""
     rows: list[list[Any]] = []
     faults: list[str] = []
     for number, law in enumerate(result.laws):
@@ -169,8 +169,9 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
     if not rows:
         return None
     note = (
-        "The worst flown is that of all runs and of a search over the box of the dispersions: no smaller bound can be true. "
-        "What is proved holds for every flight over what is drawn. The scenario file flies the worst run that was found."
+        "The worst flown is the worst of all runs and of a search over the box of the dispersions: no smaller bound can "
+        "be true. The proved bound holds for every flight within the dispersions. The scenario file flies the worst run "
+        "found."
     )
     columns = [*map(Column, ("metric", "law")), *numbers("flown ≤ true ≤ proved")]
     columns += [*map(Column, ("proved by", "looked for by", "flown by"))]
@@ -178,17 +179,17 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
 
 
 def dispersions(result: CampaignResult) -> Section | None:
-    """The dispersed keys with their distributions."""
+    """List the dispersed keys with their distributions."""
     rows = [[key, how] for key, how in result.over.items()]
     return Section("Dispersions flown", Table([Column("key"), Column("distribution")], rows)) if rows else None
 
 
 UP, DOWN, BOTH = "213,94,0", "0,114,178", "123,63,160"
-"""Red, green and blue of what grows, what falls, and what otherwise changes with an input."""
+"""Red, green and blue of what increases, decreases, and otherwise changes with an input."""
 
 
 def drivers(causes: Drivers, words: Wording, most: int) -> Section:
-    """Tell what makes runs of a law fail and what moves its metrics, at most so many of a kind."""
+    """List what makes runs of a law fail and what drives its metrics, at most so many of a kind."""
     kinds = [
         [_failure(item) for item in causes.inputs if item.significant],
         [_pair(item) for item in causes.pairs if item.significant],
@@ -197,11 +198,11 @@ def drivers(causes: Drivers, words: Wording, most: int) -> Section:
     rows = [row for kind in kinds for row in kind[:most]]
     left = sum(map(len, kinds)) - len(rows)
     sentences = [f"{causes.failures} of {counted(causes.runs, 'run')} failed."]
-    sentences += [] if rows else ["Nothing that was looked at stands out from chance."]
+    sentences += [] if rows else ["No input tested is significant."]
     sentences += [f"{counted(left, 'weaker one')} that stand out as well are left out of the table."] if left else []
     sentences += [f"{causes.remark[:1].upper()}{causes.remark[1:]}."] if causes.remark else []
     if causes.skipped:
-        sentences.append(f"Not looked at, for they are constant or lack values: {', '.join(causes.skipped)}.")
+        sentences.append(f"Not tested, because they are constant or lack values: {', '.join(causes.skipped)}.")
     columns = [*map(Column, ("what happens", "with", "how", "strength")), *numbers("p, corrected")]
     return Section("", Table(columns, rows), " ".join(sentences))
 
@@ -231,12 +232,12 @@ def _metric(item: MetricDriver, words: Wording) -> list[Any]:
 
 
 def _chance(item: FailureDriver | PairDriver | MetricDriver) -> str:
-    """A corrected p-value; below the least float there is nothing to show."""
+    """Show a corrected p-value, unless it is below the least float."""
     return f"{item.corrected:.2g}" if item.corrected > 1e-300 else "< 1e-300"
 
 
 def indices(result: CampaignResult, words: Wording) -> list[Section]:
-    """The sensitivity indices of each law's metrics, or why there are none; nothing where none were asked for."""
+    """Show the sensitivity indices of each law's metrics, or why there are none; nothing where none were requested."""
     from starhold.campaign.sensitivity import Morris, Refused
 
     sections: list[Section] = []
@@ -268,7 +269,7 @@ def _morris(effects: Morris, measure: Measure, heading: str) -> Section:
     )
     note += f"lies on each side; ± holds with {percent(effects.confidence)} confidence."
     if effects.dropped:
-        note += f" {effects.dropped} of {effects.trajectories} trajectories were dropped, for they hold failed runs."
+        note += f" {effects.dropped} of {effects.trajectories} trajectories were dropped, because they contain failed runs."
     columns = [Column("input"), Column("mean magnitude μ*", measure.unit)]
     columns += numbers(f"mean μ|{measure.unit}", f"spread σ|{measure.unit}")
     return Section(heading, Table(columns, rows), note)
@@ -289,14 +290,13 @@ def _with_width(value: float, width: float, scale: float = 1.0) -> str:
 
 
 def _strongest(values: Iterable[float]) -> Sequence[int]:
-    """The places of values, the largest first, NaN last."""
+    """Order the indices of values, the largest first, NaN last."""
     listed = list(values)
     return sorted(range(len(listed)), key=lambda i: (math.isnan(listed[i]), -listed[i]))
 
 
 def picture(causes: Drivers, words: Wording) -> str:
-    """Show the strengths of all inputs that stand out as colours, one row an input, one column for failure and each
-    metric."""
+    """Show the strengths of all significant inputs as colours: a row for each input, a column for each effect."""
     cells = {
         (item.input, ""): Cell(f"{item.distance:.2f}", "shade", item.distance, BOTH)
         for item in causes.inputs
@@ -320,5 +320,5 @@ def picture(causes: Drivers, words: Wording) -> str:
     return (
         f'{table_html(Table(columns, rows), "heat", fit=True)}\n<p class="note">{legend}. Failure: distance between the '
         "distributions of the input in failed and in passed runs. Metrics: rank correlation, or correlation ratio for "
-        "words. A dot: does not stand out from chance.</p>"
+        "words. A dot: not significant.</p>"
     )

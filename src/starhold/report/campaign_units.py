@@ -1,5 +1,5 @@
-"""How a campaign is told: metrics and requirements in the units of the other pages, shares, counts, and the sentences that
-sum it up, each with the assumption that it rests on."""
+"""The words of a campaign: metrics and requirements in the units of the other pages, shares, counts, and the sentences that
+sum it up, each with its assumption."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ if TYPE_CHECKING:
 
 DASH = "—"
 LOST = "lost"
-"""What stands for the metric in the requirement that a motion is not lost."""
+"""In the requirement that a motion is not lost, this takes the place of the metric."""
 INDEPENDENT = "random"
 """The sampling whose draws are independent of each other."""
 
 
 @dataclass(frozen=True)
 class Wording:
-    """How a campaign's numbers are shown: its body's metrics, the requirements by name, the SI units of metrics by name."""
+    """The data for showing a campaign's numbers: its body's metrics, the requirements by name, the SI units of metrics by
+    name."""
 
     metric_set: MetricSet
     requirements: Mapping[str, Requirement]
@@ -42,20 +43,20 @@ class Wording:
         return cls(known, {item.name: item for item in result.requirements}, units)
 
     def measure(self, metric: str, unit: str | None = None) -> Measure:
-        """Tell how a metric is shown: as on the other pages, else in the unit (SI) that it has, angles in degrees."""
+        """Return how a metric is shown: as on the other pages, else in its SI unit, angles in degrees."""
         known = self.metric_set.measures.get(metric)
         return known or plain_measure(metric, self.units.get(metric, "1") if unit is None else unit)
 
     def required(self, name: str) -> Measure:
-        """Tell how the metric of the requirement of this name is shown."""
+        """Return how the metric of the requirement of this name is shown."""
         return self.measure(self.requirements[name].column if name in self.requirements else name)
 
     def is_loss(self, name: str) -> bool:
-        """Tell whether the requirement of this name is that the motion is not lost."""
+        """Return whether the requirement of this name is that the motion is not lost."""
         return name in self.requirements and self.requirements[name].column == LOST
 
     def asks(self, name: str) -> str:
-        """Tell what the requirement of this name asks for; empty where only the name is known."""
+        """State what the requirement of this name demands; empty where only the name is known."""
         if name not in self.requirements:
             return ""
         item, measure = self.requirements[name], self.required(name)
@@ -64,7 +65,7 @@ class Wording:
         return f"{measure.heading} at {'most' if item.at_most else 'least'} {with_unit(item.bound, measure)}"
 
     def called(self, name: str) -> str:
-        """Name the requirement of this name, and say what it asks for."""
+        """Return the name of a requirement and what it demands."""
         asks = self.asks(name)
         return f"{name}: {asks}" if asks and name != self.requirements[name].metric else asks or name
 
@@ -78,7 +79,7 @@ class Wording:
 
 
 def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
-    """Tell how a quantity is shown of which only the unit (SI) is known; angles in degrees."""
+    """Return how a quantity is shown if only its SI unit is known; angles in degrees."""
     heading = name.replace("_", " ")
     if unit == "rad" or unit.startswith("rad/"):
         return Measure(heading, f"deg{pretty_unit(unit[3:])}", meaning, 180.0 / math.pi)
@@ -91,7 +92,7 @@ def pretty_unit(unit: str) -> str:
 
 
 def figure(value: float, digits: int = 4) -> str:
-    """Show a number with a few digits, and whole up to seven of them; a dash where there is none."""
+    """Show a number with a few digits, a whole number with up to seven; a dash for none."""
     if math.isnan(value):
         return DASH
     if math.isinf(value):
@@ -100,12 +101,12 @@ def figure(value: float, digits: int = 4) -> str:
 
 
 def with_unit(value: float, measure: Measure) -> str:
-    """Show an SI value in a measure's unit, which is named."""
+    """Show an SI value in a measure's unit, with the unit."""
     return f"{figure(value * measure.scale)} {measure.unit}".rstrip()
 
 
 def worst_text(bracket: Bracket, measure: Measure) -> str:
-    """Show the worst of a metric, the largest value or the least, as the first part of a bracket."""
+    """Show the worst value of a metric, the largest or the least, as the first part of a bracket."""
     if math.isnan(bracket.flown):
         return "lost, or without a value"
     return f"{with_unit(bracket.flown, measure)} {order(bracket)} true"
@@ -115,7 +116,7 @@ CONTRADICTED = "Contradicted by a flight, which is a fault of starhold: please r
 
 
 def order(bracket: Bracket) -> str:
-    """The sign between the parts of a bracket, from what is flown to what is proved."""
+    """Return the sign between the parts of a bracket, from the flown value to the proved one."""
     return "≤" if bracket.at_most else "≥"
 
 
@@ -125,12 +126,12 @@ def few_percent(share: float) -> str:
 
 
 def count_text(number: int) -> str:
-    """Show a count with its thousands set apart."""
+    """Show a count with separated thousands."""
     return f"{number:,}".replace(",", "\N{NARROW NO-BREAK SPACE}") if number >= 10_000 else str(number)
 
 
 def headings_of(result: CampaignResult, words: Wording) -> list[str]:
-    """List the metrics of a campaign: those of the body first, in its order, then the others as they come."""
+    """List the metrics of a campaign: those of the body first, in its order, then the others."""
     metrics = dict.fromkeys(spread.metric for law in result.laws for spread in law.spreads)
     known: list[str] = [metric for metric in words.metric_set.measures if metric in metrics]
     return [*known, *(metric for metric in metrics if metric not in known)]
@@ -158,13 +159,13 @@ SAMPLINGS = {
 
 
 def outcome_of(law: LawResult) -> str:
-    """Tell the outcome of all verdicts of a law together; empty where nothing is required."""
+    """Return the overall outcome of a law's verdicts; empty where nothing is required."""
     outcomes = {verdict.outcome for verdict in law.verdicts}
     return next((outcome for outcome in ("missed", "not decided", "met") if outcome in outcomes), "")
 
 
 def headline(law: LawResult, sampling: str, words: Wording) -> str:
-    """Tell in one or two sentences whether a law keeps its requirements, and what that rests on; without its name."""
+    """State in one or two sentences, without the law's name, whether a law meets its requirements, and on what evidence."""
     outcome = outcome_of(law)
     chosen = [verdict for verdict in law.verdicts if verdict.outcome == outcome]
     if outcome == "met":
@@ -174,17 +175,17 @@ def headline(law: LawResult, sampling: str, words: Wording) -> str:
     if outcome == "not decided":
         return _open(chosen, len(law.verdicts), sampling, words)
     lost = "no run was" if not law.lost else f"{count_text(law.lost)} of {counted(law.runs, 'run')} were"
-    return f"nothing is required of it, so nothing is judged; {lost} lost."
+    return f"has no requirements, so nothing is judged; {lost} lost."
 
 
 def flown_text(result: CampaignResult) -> str:
-    """Tell how many runs were flown of how many laws, and by what draws."""
+    """State how many runs were flown of how many laws, and how they were drawn."""
     laws = "one law" if len(result.laws) == 1 else f"each of {len(result.laws)} laws, all of which fly the same draws"
     return f"{counted(result.runs, 'run')} of {laws}; the dispersions are sampled by {sampled(result.sampling)}."
 
 
 def sampled(sampling: str) -> str:
-    """Tell a kind of sampling in words."""
+    """Describe a kind of sampling."""
     return SAMPLINGS.get(sampling, sampling)
 
 

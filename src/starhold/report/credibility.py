@@ -1,4 +1,4 @@
-"""The factors of credibility that NASA-STD-7009 names: what the program knows of each, and what it does not."""
+"""The credibility factors of NASA-STD-7009: what the program knows about each, and what it does not."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def factors_of(review: Review, certificates: Sequence[Certificate]) -> dict[str,
     verification = [f"Computed by {versions()}.", models, *checked]
     open_models = [f"Who verified the models of others: {', '.join(foreign)}."] if foreign else []
     open_models += ["Which tests of the release were run here."]
-    open_models += ["The error of the integration step: starhold run --check-step tells it."]
+    open_models += ["The error of the integration step: starhold run --check-step estimates it."]
     uncertainty: list[str] = []
-    unknown: list[str] = ["How uncertain the numbers are that are not drawn."]
+    unknown: list[str] = ["The uncertainty of the numbers that are not drawn."]
     robustness = [f"Flown with {counted(len(tables.fault), 'fault')}."] if getattr(tables, "fault", []) else []
     frail: list[str] = []
     if review.has_campaign:
@@ -40,9 +40,7 @@ def factors_of(review: Review, certificates: Sequence[Certificate]) -> dict[str,
         uncertainty.append(f"{result.runs} runs, by {result.sampling} sampling, draw {drawn}.")
         causes = result.laws[0].drivers
         if causes is not None:
-            robustness.append(
-                f"{causes.failures} of {counted(causes.runs, 'run')} failed, and causes of it were looked for."
-            )
+            robustness.append(f"{causes.failures} of {counted(causes.runs, 'run')} failed, and the causes were sought.")
     else:
         unknown.insert(0, "The spread of results: there is no [campaign].")
         frail.append("What makes requirements fail: there is no [campaign].")
@@ -54,7 +52,7 @@ def factors_of(review: Review, certificates: Sequence[Certificate]) -> dict[str,
         frail.append("Margins of a linear loop.")
     if any(claim.kind == "inertia" and claim.outcome == "proved" for claim in claims):
         robustness.append(f"Proved with {HEADINGS['inertia']}.")
-    pedigree = ["All inputs stand in one text, whose digest is told; units are checked as it is read."]
+    pedigree = ["All inputs are in one text, whose digest is given; units are checked as it is read."]
     if review.verdicts:
         pedigree.append(f"{reasons_given} of {len(review.verdicts)} requirements give a rationale.")
     records = [one.id for one in review.verdicts if one.method == "inspection" and one.verdict == "met"]

@@ -1,5 +1,4 @@
-"""A document is written once, as sections of sentences, tables and figures, and shown as a page that prints well and as
-Markdown."""
+"""A document is sections of sentences, tables and figures, written once and shown as a printable page and as Markdown."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from starhold.report.commands import Block, Cell, Heading, Table
 
 
 class Figure(NamedTuple):
-    """A figure, drawn with the plotting library, and what it shows, without the end of the sentence."""
+    """A figure, drawn with the plotting library, and its caption without the final stop."""
 
     caption: str
     draw: Callable[[], Any]
@@ -30,7 +29,7 @@ Piece: TypeAlias = Block | Figure | Listing
 
 
 class Section(NamedTuple):
-    """A section under its name. fresh: it begins a page. A `Cell` of kind "section" leads to that of the name in detail."""
+    """A section with its name. fresh: it begins a page. A `Cell` of kind "section" links to the one that detail names."""
 
     name: str
     pieces: Sequence[Piece]
@@ -38,7 +37,7 @@ class Section(NamedTuple):
 
 
 def pages_of(title: str, sections: Sequence[Section], footer: str) -> tuple[str, str]:
-    """Show a document as HTML, which needs no other file, and as Markdown; sections and figures are numbered."""
+    """Render a document as self-contained HTML and as Markdown; sections and figures are numbered."""
     heads = {one.name: f"{number} {one.name}" for number, one in enumerate(sections, 1)}
     anchors = {name: re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for name, head in heads.items()}
     figures = [piece for one in sections for piece in one.pieces if isinstance(piece, Figure)]
@@ -47,12 +46,12 @@ def pages_of(title: str, sections: Sequence[Section], footer: str) -> tuple[str,
 
 
 Drawn: TypeAlias = Mapping[int, tuple[str, str, str]]
-"""The number, the caption and the address of each figure."""
+"""Return the number, the caption and the address of each figure."""
 Names: TypeAlias = Mapping[str, str]
 
 
 def _data(figure: Figure) -> str:
-    """A figure as the address of its own data."""
+    """Return a figure as a data address."""
     file = BytesIO()
     # No software entry, lest equal figures differ between releases.
     figure.draw().savefig(file, format="png", metadata={"Software": None})
@@ -86,7 +85,7 @@ def _piece_html(piece: Piece, anchors: Names, drawn: Drawn) -> str:
 
 
 def block_html(block: Block, anchors: Names | None = None) -> str:
-    """Show a block of a command's result, whose cells may have marks of style. anchors: those of sections."""
+    """Render a block of a command's result, whose cells may have style marks. anchors: of sections, by name."""
     from starhold.report.tables import table_html
 
     level, kind = ("h2", "text tight") if anchors is None else ("h3", "told tight")
@@ -100,7 +99,7 @@ def block_html(block: Block, anchors: Names | None = None) -> str:
 
 
 def _cells(table: Table) -> Iterator[Iterable[tuple[Any, str]]]:
-    """The cells of each row, each with its text."""
+    """Return the cells of each row, each with its text."""
     return (zip(row, texts, strict=True) for row, texts in zip(table.rows, table.texts(), strict=True))
 
 
@@ -129,7 +128,7 @@ def _markdown(title: str, sections: Sequence[Section], footer: str, heads: Names
         lines += [text for piece in one.pieces if (text := _piece_markdown(piece, anchors, drawn))]
         if not place:
             lines.append("\n".join(f"* [{_safe(head)}](#{anchors[name]})" for name, head in heads.items()))
-    # The pictures stand last, so that the text can be read and compared as it is.
+    # The pictures come last, so that the text can be read and compared by itself.
     lines += [_safe(footer), *(f"[{number}]: {address}" for number, _, address in drawn.values())]
     return "\n\n".join(lines) + "\n"
 
@@ -160,5 +159,5 @@ def _cell_markdown(value: Any, text: str, anchors: Names) -> str:
 
 
 def _safe(text: str) -> str:
-    """Words in which Markdown sees no marks of its own."""
+    """Return text with Markdown's special characters escaped."""
     return re.sub(r"([\\`*<>|\[\]#]|(?<!\w)_|_(?!\w))", r"\\\1", " ".join(text.split()))

@@ -14,30 +14,30 @@ from starhold.studies.flight import Flight
 
 DPI = 110
 NOTHING: Any = None
-"""Stands for a recording where none is needed."""
+"""Takes the place of a recording where none is needed."""
 POINTS = 2000
-"""Samples of a curve, about two for each column of pixels."""
+"""The number of samples of a curve, about two for each column of pixels."""
 
 
 Picture: TypeAlias = dict[str, Callable[[], Any]]
-"""It maps the name of each file to what draws its figure without the runs: small, and quickly sent to another process."""
+"""For each file name, a function that draws its figure without the runs: small, and quickly sent to another process."""
 
 
 def without_runs(flights: Sequence[Flight]) -> list[Flight]:
-    """Flights without their recordings."""
+    """Return the flights without their recordings."""
     return [replace(flight, recording=NOTHING) for flight in flights]
 
 
 def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
-    """Write the figures, or a part of them, into `folder`, which exists, and return their paths."""
+    """Write the figures, or some of them, into `folder`, which exists, and return their paths."""
     with warnings.catch_warnings():
-        # A name in a script that the font lacks is drawn as boxes; that is no news to whoever runs a simulation.
+        # A name in a script that the font lacks is drawn as boxes; a warning would not help the user.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         return [save(make(), folder / f"{key}.png") for key, make in list(what.items())[part]]
 
 
 def warm_up() -> None:
-    """Make the plotting library load its fonts and file formats, which it does at the first figure."""
+    """Make the plotting library load its fonts and file formats now, not at the first figure."""
     figure, axes = blank(1, 1, 1.0, "", [], "", "")
     axes[0].set_yscale("log")
     figure.savefig(BytesIO())
@@ -58,7 +58,7 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
             axis.plot(times[: len(curve)], curve, color=colour(number), linewidth=width)
         if panel.log:
             axis.set_yscale("log")
-            # Ticks are what drawing spends its time on.
+            # Ticks take most of the drawing time.
             if panel.decades() > 2.0:
                 axis.minorticks_off()
         else:
@@ -70,7 +70,7 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
         for mark in marks:
             axis.axvline(mark.time, color="0.2", linewidth=0.9, linestyle=":")
             if mark in rows and axis is axes[0]:
-                # Above the axes, and what powers of ten stand there.
+                # Above the axes and any power of ten there.
                 place = {"xy": (mark.time, 1.0), "xycoords": axis.get_xaxis_transform(), "textcoords": "offset points"}
                 side = "right" if mark.time > 0.9 * end else "left"
                 axis.annotate(
@@ -90,11 +90,11 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
 
 
 WORD_HEIGHT, WORD_ROWS = 9.5, 4
-"""Points from row to row of words above axes, and rows at the most."""
+"""Points between rows of words above axes, and the most rows."""
 
 
 def word_rows(marks: Sequence[Mark], end: float) -> dict[Mark, int]:
-    """The row in which the word of each mark stands, so that none overlaps another; those without room are left out."""
+    """Place the word of each mark in a row so that none overlap; words without room are left out."""
     ends, rows = [-1.0] * WORD_ROWS, dict[Mark, int]()
     for mark in sorted(marks):
         row = next((row for row, taken in enumerate(ends) if mark.time >= taken), None)
@@ -108,7 +108,7 @@ def word_rows(marks: Sequence[Mark], end: float) -> dict[Mark, int]:
 def blank(
     rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, above: float = 0.0
 ) -> tuple[Any, Any]:
-    """A figure with its title, its legend and its axes, which leave room above (inches)."""
+    """Make a figure with its title, its legend and its axes, which leave room above (inches)."""
     figure, total, top = headed(height, title, flights, name, dashed, (0.28 if columns > 1 else 0.06) + above)
     grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.subplots_adjust(left=0.098, right=0.978, bottom=0.48 / total, top=top, hspace=0.09, wspace=0.14)
@@ -119,7 +119,7 @@ def blank(
 
 
 def plain(axis: Any, lines: str = "both") -> None:
-    """Axes with a light grid, of lines along both or at the values of "x" alone, and no frame above and beside."""
+    """Make axes with a light grid, both ways or at the values of "x" alone, and no frame at the top and right."""
     axis.grid(True, axis=lines, color="0.9", linewidth=0.6)
     axis.tick_params(labelsize=8.5)
     for side in ("top", "right"):
@@ -129,9 +129,9 @@ def plain(axis: Any, lines: str = "both") -> None:
 def headed(
     height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, gap: float
 ) -> tuple[Any, float, float]:
-    """A figure with its title and its legend, how high it is (inches), and up to where axes may reach, a gap (inches) below.
-
-    All is placed by fixed distances, for layout engines draw everything twice."""
+    """Make a figure with its title and its legend; return also its height (inches) and the top of its axes, a gap (inches)
+    below. Distances are fixed, because layout engines draw everything twice.
+    """
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -159,7 +159,7 @@ def headed(
         handlelength=1.8,
         columnspacing=1.6,
     )
-    # Set afterwards, for a name may start with an underscore or hold a dollar sign, which labels read as commands.
+    # Set afterwards, because labels interpret a leading underscore and dollar signs as commands.
     for text, words in zip(legend.get_texts(), names, strict=True):
         text.set_parse_math(False)
         text.set_text(words)
@@ -190,12 +190,12 @@ def framed(
     sharey: bool = False,
     **grid: Any,
 ) -> tuple[Any, Any]:
-    """A figure of a size with its title, and a grid of axes with room for sides: left, right, below, above (all inches)."""
+    """Make a figure of this size with its title, and a grid of axes with margins: left, right, below, above (all inches)."""
     from matplotlib.figure import Figure
 
     (width, height), (left, right, below, above) = size, sides
     figure = Figure(figsize=size, dpi=DPI)
-    # All is placed by fixed distances, for layout engines draw everything twice.
+    # Distances are fixed, because layout engines draw everything twice.
     figure.set_layout_engine("none")
     grid |= {"left": left / width, "right": 1.0 - right / width, "bottom": below / height, "top": 1.0 - above / height}
     axes = figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False, gridspec_kw=grid)
@@ -206,7 +206,7 @@ def framed(
 
 def save(figure: Any, path: Path) -> Path:
     """Write a figure to `path`, in a folder that exists, and return the path."""
-    # Fast compression: the files are small either way. No software entry, lest equal figures differ between releases.
+    # Fast compression: the files are small either way. No software entry, so that releases write equal files.
     with atomic_write(path) as hidden:
         figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return path

@@ -14,10 +14,10 @@ INSIDE, SET, AGAINST, TRUE = COLOURS[5], COLOURS[0], COLOURS[1], COLOURS[2]
 
 
 def draw(drawn: Sequence[Portrait], title: str) -> Any:
-    """A figure of portraits, of which each has a V."""
+    """Draw a figure of portraits, each of which has a V."""
     across = min(len(drawn), 2)
     down = -(-len(drawn) // across)
-    # Panels as wide as they are drawn where both axes have one scale.
+    # Panels are as wide as they are drawn where both axes have the same scale.
     shares = [max(_share(item) for item in drawn[k::across]) for k in range(across)]
     wide, height = 4.1 * sum(shares) + 0.75 * (across - 1), 4.1 * down + 0.75 * (down - 1) + 1.45
     width = max(wide + 0.85, 5.2)
@@ -53,14 +53,14 @@ def _panel(axis: Any, item: Portrait) -> None:
     unstable = item.claim.numbers["theorem"] == "unstable"
     if unstable and top > 0.0:
         axis.contourf(item.x, item.y, item.V, levels=[0.0, top], colors=[AGAINST], alpha=0.13)
-    # Where V jumps, contours would be drawn along the jump: it is left as it is computed.
+    # Where V jumps, contours would follow the jump, so V is drawn as computed.
     if level is not None and level < top:
         axis.contourf(item.x, item.y, item.V, levels=[-np.inf, level], colors=[INSIDE], alpha=0.45, extend="neither")
         axis.contour(
             item.x, item.y, item.V, levels=[level], colors=[SET], linewidths=1.6, linestyles="-" if proved else "--"
         )
     if item.equilibrium is None and not unstable:
-        # A little more than M, which may have no width.
+        # A little more than M, which may have zero width.
         floor = (1e-4 if item.u is not None else 2e-3) * (level or top)
         axis.contourf(item.x, item.y, item.V, levels=[-np.inf, floor], colors=[SET], alpha=0.5)
         axis.contour(item.x, item.y, item.V, levels=[floor], colors=[SET], linewidths=0.9)

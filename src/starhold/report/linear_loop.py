@@ -19,9 +19,9 @@ from starhold.studies.flight import Flight
 from starhold.studies.linear import linear_of
 
 NOTE = (
-    "The loop near rest on target, the target standing still, exact between control instants under the held torque, at "
-    "the gains of the file; no limit of the torque, and no delay of the computation. Each axis is cut by itself, the others "
-    "stay closed. The margins are computed in floating point and are no proof."
+    "The loop near rest on target, the target standing still, exact between control instants under the held torque, at the "
+    "gains of the file; no limit of the torque, and no delay of the computation. One axis is opened at a time; the others "
+    "stay closed. The margins are computed in floating point and prove nothing."
 )
 DASHES = {"x": "none", "y": "7 3", "z": "2 3"}
 DIGITS = 4
@@ -33,7 +33,7 @@ WIDTH, HEIGHT, LEFT, BOTTOM = 430.0, 250.0, 52.0, 36.0
 
 
 class Known(NamedTuple):
-    """A law's linear loop, its response and margins, by the law's number; `why` there is none."""
+    """A law's linear loop, its response and margins, by the law's number; or the reason `why` there is none."""
 
     number: int
     name: str
@@ -44,13 +44,13 @@ class Known(NamedTuple):
 
     @classmethod
     def of(cls, number: int, name: str, linear: Linear) -> Self:
-        """Gather what is known of a linear loop."""
+        """Collect what is known of a linear loop."""
         shown = response(linear)
         return cls(number, name, linear, shown, margins(linear, shown))
 
 
 def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
-    """The section as HTML; nothing where no law has a linear form."""
+    """Write the section as HTML; empty where no law has a linear form."""
     known = [_know(scenario, number, flight.name) for number, flight in enumerate(flights)]
     if not any(one.linear for one in known):
         return ""
@@ -66,7 +66,7 @@ def section(scenario: Scenario, flights: Sequence[Flight]) -> str:
 
 
 def margins_table(known: Sequence[Known]) -> Table:
-    """One row a law and an axis."""
+    """Make a row for each law and axis."""
     heads = ("gain margin|dB", "phase margin|deg", "delay margin|s", "crossover|rad/s", "peak of |1/(1 + L)||")
     named = [Column(name, unit, ">") for name, _, unit in (head.rpartition("|") for head in heads)]
     return Table([Column("law"), Column("axis"), *named], [row for one in known for row in _rows(one)])
@@ -92,13 +92,13 @@ def _rows(one: Known) -> list[list[Any]]:
 
 
 def _decibels(about: Margins) -> str:
-    """Up, and down where less gain loses the stability, too."""
+    """Show the gain margin up, and down where less gain also loses stability."""
     up = f"{20.0 * math.log10(about.gain):.1f}" if math.isfinite(about.gain) else "none"
     return f"{up}, −{-20.0 * math.log10(about.less):.1f}" if about.less > 0.0 else up
 
 
 class _Panel(NamedTuple):
-    """A pair of axes in the picture: where it begins, what it shows (from, to), labels, and where ticks are."""
+    """A pair of axes in the picture: its left edge, ranges (from, to), labels and ticks."""
 
     left: float
     x: tuple[float, float]
@@ -154,7 +154,7 @@ def _plots(known: Sequence[Known]) -> str:
 
 
 def _unwrapped(loop: Any) -> Any:
-    """The phase without jumps, from the highest gain on, within (-270, 90] degrees there."""
+    """Return the phase without jumps, within (-270, 90] degrees at the highest gain."""
     phase = np.unwrap(np.angle(loop))
     return phase - 2.0 * math.pi * np.ceil((phase[0] - 0.5 * math.pi) / (2.0 * math.pi))
 

@@ -1,4 +1,4 @@
-"""The page of a comparison, which opens offline and loads nothing, and the data by which it flies its scenario again."""
+"""The page of a comparison, which opens offline and loads nothing, and the data with which it flies its scenario again."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ FOLDS = {
     "Linear loop": "margins, Bode and Nichols plots",
     "Numbers and settings": "gains, the spacecraft, what the key numbers mean",
 }
-"""These folds stand below the first screen, each with a word on what it holds."""
+"""The folds below the first screen, each with a note of its contents."""
 
 
 def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Sampling) -> dict[str, Any] | str:
-    """The data of the page's sliders; where nothing can be moved, why not."""
+    """Return the data of the page's sliders, or the reason why nothing can be moved."""
     numbers = {flight.name: number for number, flight in enumerate(flights)}
     made = reflight(scenario, numbers)
     laws = made.laws
@@ -95,7 +95,7 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
 
 
 def _dial(made: Reflight, key: str) -> dict[str, Any]:
-    """A key that can be moved: its numbers, bounds and words."""
+    """Describe a key that can be moved: its numbers, bounds and texts."""
     item = made.gains.get(key)
     gain = _declared(made.scenario, key) if item is None else item.gain
     bounds = {"above": gain.above, "least": gain.at_least, "most": gain.at_most}
@@ -108,7 +108,7 @@ def _dial(made: Reflight, key: str) -> dict[str, Any]:
 
 
 def _declared(scenario: Scenario, key: str) -> Gain:
-    """The declaration of a key of the scenario's own tables; that of a fault is the craft's."""
+    """Find the declaration of a key of the scenario's own tables; a fault's keys are declared by the craft."""
     table, _, name = key.replace("fault[1]", "spacecraft").partition(".")
     return declared(type(getattr(scenario.table, table)).model_fields[name]) or Gain()
 
@@ -120,7 +120,7 @@ def _written(scenario: Scenario, key: str, value: Any) -> str:
 
 
 def _law(law: Reflown) -> dict[str, Any]:
-    """The data by which the page flies a law; numbers are the bytes of 64-bit floats."""
+    """Return the data with which the page flies a law; numbers are the bytes of 64-bit floats."""
     return {
         "name": law.name,
         "fly": _script(law.program),
@@ -142,8 +142,7 @@ def _law(law: Reflown) -> dict[str, Any]:
 
 
 def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
-    """Give the page the equations of the metrics of a law's flights; numbers that a slider or the flight's length changes go
-    by name."""
+    """Return the equations of the metrics of a law's flights; numbers that a slider or the duration changes go by name."""
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
     meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)
@@ -159,7 +158,7 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
 
 
 def _script(program: Program) -> dict[str, str]:
-    """A program's text, and what in it is called."""
+    """A program's text, and the functions in it to call."""
     text = JavaScript(program)
     return {"text": str(text), "name": text.name}
 
@@ -169,7 +168,7 @@ def _bytes(numbers: Any) -> str:
 
 
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
-    """Tell under which conditions each claim of the page stands."""
+    """State the conditions under which each claim of the page stands."""
     claims: list[dict[str, Any]] = []
     for number, flight in enumerate(flights):
         if flight.name not in laws:
@@ -185,7 +184,7 @@ def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict
 
 
 def _ranking(flights: Sequence[Flight]) -> dict[str, Any]:
-    """The measures that the page ranks laws by, and the metrics that the table began with."""
+    """Return the measures by which the page ranks laws, and the initial metrics of its table."""
     metric_set = flights[0].metric_set
     metrics = key_metrics(metric_set, {flight.name: flight.metrics for flight in flights})
     shown = [{"name": name} | asdict(metric_set.measures[name]) for name in metrics]
@@ -221,7 +220,7 @@ def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> Non
 
 
 def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
-    """The report as HTML text. Whatever comes from files is escaped."""
+    """Make the report as HTML text. All text from files is escaped."""
     parts = report_of(scenario.body).page(flights, scenario)
     living = "the page of this body has none" if parts.sampling is None else living_data(scenario, flights, parts.sampling)
     (lead, *plots), (required, counts) = parts.data["plots"], verdicts(scenario, flights)

@@ -1,4 +1,4 @@
-"""The parts that pages about any body are made of: text, tables, and data for their scripts."""
+"""The building blocks of pages about any body: text, tables, and data for their scripts."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 POINTS = 1500
-"""Samples of a curve."""
+"""The number of samples of a curve."""
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:"
 WITH_PLOTLY = ("planes.js", "campaign.js")
-"""Scripts that draw with Plotly; plots over time need less."""
+"""Scripts that draw with Plotly; plots over time do without them."""
 
 
 def document(
@@ -37,9 +37,9 @@ def document(
     answer: str = "",
     living: Mapping[str, Any] | None = None,
 ) -> str:
-    """A page of these sections, headed by the scenario's name with the answer in a word or two (HTML), what it is and some
-    facts, and ended by its text; the scripts, of the assets, read the data, which names the laws. living: what its scenario
-    flies again with, None for a page that does not."""
+    """Make a page of these sections, headed by the scenario's name with the answer in a word or two (HTML), a description
+    and some facts, and ended by the scenario's text; the scripts, from the assets, read the data, which names the laws.
+    living: the data for flying again, None for a page without sliders."""
     lead = " · ".join(filter(None, (scenario.table.description, facts)))
     body = [
         f'<header class="top"><h1>{escape(scenario.name)}</h1>{answer}</header>',
@@ -55,7 +55,7 @@ def document(
         libraries.append(get_plotlyjs())
         used.insert(0, "look.js")
     if data["plots"]:
-        # Its licence goes with every copy.
+        # Every copy must carry its licence.
         libraries.append(f"/*!\n{_asset('uplot.LICENSE').strip()}\n*/\n{_asset('uplot.js')}")
         used.insert(0, "plots.js")
     embedded = [_embedded("data", data)]
@@ -73,7 +73,7 @@ def document(
 
 
 def fold(name: str, content: str, hint: str = "") -> str:
-    """A part of the page that is there when asked for; nothing where it is empty."""
+    """Make a part of the page that the reader may unfold; nothing where it is empty."""
     if not content:
         return ""
     below = f"<small>{escape(hint)}</small>" if hint else ""
@@ -82,13 +82,13 @@ def fold(name: str, content: str, hint: str = "") -> str:
 
 
 def beside(*boxes: str) -> str:
-    """Boxes side by side, the first the widest; those that are empty are left out."""
+    """Place boxes side by side, the first the widest; empty ones are left out."""
     there = [box for box in boxes if box]
     return f'<div class="{"two" if len(there) > 1 else "one"}">{"".join(there)}</div>' if there else ""
 
 
 def plain_document(title: str, body: Iterable[str], styles: Sequence[str] = ("uplot.css", "page.css")) -> str:
-    """A page of these parts, those that are empty left out, with its title and the styles of these names."""
+    """Make a page of these parts, without empty ones, with its title and the styles of these names."""
     return "\n".join(
         [
             "<!DOCTYPE html>",
@@ -126,12 +126,12 @@ def _asset(name: str) -> str:
 
 
 def law_data(flights: Sequence[Flight]) -> list[dict[str, str]]:
-    """Names and colours."""
+    """List names and colours."""
     return [{"name": flight.name, "colour": colour(number)} for number, flight in enumerate(flights)]
 
 
 def views(flights: Sequence[Flight], frames: int, title: str, what: str, note: str) -> str:
-    """A view of each law in three dimensions, and the player for all of them. what: what a view shows, in a word."""
+    """Make a three-dimensional view for each law, and one player for all. what: the subject of a view, in a word."""
     boxes = "".join(
         f'<div class="view"><div><span>{swatch(number)}{escape(flight.name)}</span><output></output></div>'
         f'<canvas role="img" aria-label="{what} under {escape(flight.name)}"></canvas></div>'
@@ -148,7 +148,7 @@ def views(flights: Sequence[Flight], frames: int, title: str, what: str, note: s
 
 
 def over_time(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
-    """A plot over time for the script that draws it."""
+    """Return the data of a plot over time for the script that draws it."""
     order = back_to_front(flights, plot)
     panels = [panel_data(panel, order, thin=plot.chatters) for panel in plot.panels]
     data = {"name": plot.name, "title": plot.title, "dashed": plot.dashed, "topic": plot.topic, "clock": plot.clock}
@@ -156,7 +156,7 @@ def over_time(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def plot_box(plot: Mapping[str, Any], level: int = 3, more: str = "") -> str:
-    """The box of a plot, which a script fills; level: of its heading, more: what stands beside that."""
+    """Make the box of a plot, which a script fills; level: of its heading; more: text beside the heading."""
     notes = plot["notes"] if "notes" in plot else [f"– – {plot['dashed']}"] * bool(plot["dashed"])
     spans = "".join(f"<span>{escape(note)}</span>" for note in notes)
     below = f'<p class="note">{escape(plot["note"])}</p>' if plot.get("note") else ""
@@ -165,7 +165,7 @@ def plot_box(plot: Mapping[str, Any], level: int = 3, more: str = "") -> str:
 
 
 def transient_switch(transient: float | None) -> str:
-    """A switch from the whole run to its transient (s), where there is one."""
+    """Make a switch between the whole run and its transient (s), if there is one."""
     if transient is None:
         return ""
     first = f"{float(f'{transient:.3g}'):g}"
@@ -176,7 +176,7 @@ def transient_switch(transient: float | None) -> str:
 
 
 def laws_table(flights: Sequence[Flight]) -> str:
-    """The laws with their gains."""
+    """List the laws with their gains."""
     rows: list[list[Any]] = []
     for number, flight in enumerate(flights):
         gains = ", ".join(f"{name} = {value_text(*gain)}" for name, gain in flight.gains.items())
@@ -185,7 +185,7 @@ def laws_table(flights: Sequence[Flight]) -> str:
 
 
 def versions() -> str:
-    """The versions that made the page."""
+    """State the versions that made the page."""
     from starhold.version import __version__
 
     libraries = ", ".join(f"{name} {metadata.version(name)}" for name in ("llvmlite", "numpy", "plotly"))
@@ -193,7 +193,7 @@ def versions() -> str:
 
 
 def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, Any]:
-    """A panel for the script that draws it; laws in the order from back to front."""
+    """Return a panel for the script that draws it; laws are in order from back to front."""
     # Later laws get thinner lines, so that equal curves show as a line within a line.
     slimmer = [1.0 - 0.5 * number / max(len(order) - 1, 1) for number in range(len(order))]
     return {
@@ -210,5 +210,5 @@ def panel_data(panel: Panel, order: list[int], thin: bool = False) -> dict[str, 
 
 
 def rounded(values: Iterable[float], digits: int = 6) -> list[float | None]:
-    """Numbers of a few digits for JSON, which has none that are not finite."""
+    """Round numbers to a few digits for JSON; those that are not finite become null."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(list(values), dtype=float).tolist()]

@@ -1,4 +1,4 @@
-"""Draws the figures in processes of their own, while what was flown is proved and its page is written."""
+"""Draws the figures in processes of their own, while proofs and the page are made."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 UNWRITABLE = 2
-"""Exit code where the files cannot be written; the reason stands on standard error."""
+"""The exit code where the files cannot be written; the reason is on standard error."""
 
 
 class Painter:
     """Processes that draw the figures of flights into `folder`, which exists; `finish` waits until they have. Leaving the
-    context ends them. Where nothing is to be drawn there are none, and figures from before, which would show other flights,
-    are removed."""
+    context ends them. Where nothing is to be drawn, no process starts, and figures of earlier flights are removed.
+    """
 
     def __init__(self, scenario: Scenario, flights: Sequence[Flight], folder: Path, draw: bool = True) -> None:
         picture = report_of(scenario.body).picture(flights, scenario)
@@ -41,13 +41,13 @@ class Painter:
                 (folder / f"{name}.png").unlink(missing_ok=True)
             return
         self._process = subprocess.Popen(
-            # A group of its own, of which half the figures' process is one too.
+            # A process group of its own, which the process that draws the other half joins.
             [sys.executable, "-m", "starhold.report.painter"],
             stdin=subprocess.PIPE,
             stderr=subprocess.PIPE,
             process_group=0,
         )
-        # On a thread, for it does not listen yet.
+        # On a thread, because the process does not read yet.
         self._sender = Thread(target=self._send, args=((picture, folder.absolute()),))
         self._sender.start()
 
@@ -66,7 +66,7 @@ class Painter:
             clear_unfinished(self._folder)
 
     def _kill(self) -> None:
-        """End all that draw; on a system without groups of processes the one that was started."""
+        """End all processes that draw; on a system without process groups only the one started here."""
         assert self._process is not None
         if hasattr(os, "killpg"):
             with suppress(ProcessLookupError):
@@ -77,13 +77,13 @@ class Painter:
     def _send(self, what: object) -> None:
         assert self._process is not None
         assert self._process.stdin is not None
-        # Where it has died, `finish` tells why.
+        # If it has died, `finish` reports why.
         with suppress(OSError):
             pickle.dump(what, self._process.stdin)
             self._process.stdin.flush()
 
     def finish(self) -> InputError | None:
-        """Wait for the files. Returns why they cannot be written; RuntimeError for any other failure."""
+        """Wait for the files. Return why they cannot be written, if so; RuntimeError for any other failure."""
         if self._process is None:
             return None
         self._sender.join()
@@ -97,17 +97,17 @@ class Painter:
 
 
 def main() -> None:
-    """The process that draws: load what that needs, read what to draw, draw it."""
+    """Run the process that draws: load the modules, read what to draw, draw it."""
     # Ctrl-C goes to the parent alone, which ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.disable()
     from starhold.report.figures import paint, warm_up
 
-    # The pictures of every body load the parts of pages.
+    # The figures of every body load the parts of pages.
     import_module("starhold.report.page_parts")
     warm_up()
     what, folder = pickle.load(sys.stdin.buffer)
-    # Everything is loaded, so the other half of the figures costs a second process no start-up.
+    # Everything is loaded, so a second process draws the other half without start-up cost.
     other = os.fork() if hasattr(os, "fork") else None
     share = slice(None) if other is None else slice(0 if other else 1, None, 2)
     try:

@@ -1,5 +1,5 @@
 """The plots of a craft near a libration point: its path and its control in planes and over time, and the phase portrait of
-the X axis, along which rest is unstable: how far a limited control brings the craft back."""
+the unstable X axis, which shows from how far a limited control brings the craft back."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ if TYPE_CHECKING:
 
 
 WINDOW = 1.7
-"""Half the width of the picture, in distances of the saddles."""
+"""Half the width of the picture, as a multiple of the saddles' distance."""
 FAMILY = 26
-"""Paths on each edge of the picture."""
+"""The number of paths from each edge of the picture."""
 STEPS, STEP = 900, 0.01
-"""Steps of the paths: how many, and how long in units of the natural time."""
+"""The number of steps of a path, and their length in units of the natural time."""
 
 
 class _Axis:
-    """x'' = s^2 x + sat(-k_x x - k_v x'), in x (lengths) and x'/s, over the time s t."""
+    """The system x'' = s^2 x + sat(-k_x x - k_v x'), in x (lengths) and x'/s, over the time s t."""
 
     def __init__(self, entry: LawEntry, scenario: Scenario) -> None:
         plant, gains = scenario.craft, entry.gains
@@ -56,7 +56,7 @@ class _Axis:
         return np.stack([w, x + push])
 
     def path(self, start: Any, step: float) -> NDArray[np.float64]:
-        """From many starts (2, n) the paths (2, n, steps), by the classical Runge-Kutta method; far away they stop."""
+        """Return the paths (2, n, steps) from starts (2, n), by the classical Runge-Kutta method; they stop far away."""
         state, states = np.array(start, dtype=float), []
         for _ in range(STEPS):
             states.append(state)
@@ -69,7 +69,7 @@ class _Axis:
         return np.stack(states, axis=-1)
 
     def separatrix(self, side: float) -> tuple[Curve, Curve]:
-        """The path that ends in a saddle: where the region of attraction ends."""
+        """Return the path that ends in a saddle: the boundary of the region of attraction."""
         small = 1e-6 * self.saddle
         starts = np.array([[side * self.saddle + small, side * self.saddle - small], [-small, small]])
         halves = self.path(starts, -2.0 * STEP)
@@ -78,8 +78,8 @@ class _Axis:
 
 
 def phase_portrait(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot | None:
-    """x and x' of laws that hold a place of rest, among the paths of the X axis alone; None where no law does so or no law's
-    X axis has a limit of its own."""
+    """Plot x and x' of laws that hold an equilibrium, among the paths of the X axis alone; None where no law does so or
+    where no law's X axis has a saturation limit of its own."""
     resting = [
         entry
         for entry in entries
@@ -124,19 +124,19 @@ def phase_portrait(flights: Sequence[Flight], entries: Sequence[LawEntry], scena
 
 
 LONG = 400.0 * DAY
-"""Runs of more seconds are drawn over years."""
+"""Runs longer than this (s) are drawn over years."""
 ROOM = 0.08
-"""Share of a picture left free around what it shows."""
+"""The share of a picture left free around its contents."""
 PATH = 4000
-"""Samples of a path at most."""
+"""The most samples of a path."""
 LEAST = 0.02
-"""Half the width of a picture of x at least, as a share of the circle's radius: less is as good as nothing."""
+"""The least half width of a plot of x, as a share of the circle's radius: smaller motions are negligible."""
 
 
 @dataclass(frozen=True)
 class PathPlots:
-    """All pictures: the projections that the publication draws, the phase portrait of X where a law holds a place of rest,
-    paths (n, 3) in length units, and the plots over time with their times."""
+    """All plots: the projections that the publication draws, the phase portrait of X where a law holds an equilibrium, paths
+    (n, 3) in length units, and the plots over time with their times."""
 
     times: Curve
     over_time: list[Plot]
@@ -147,7 +147,7 @@ class PathPlots:
 
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathPlots:
-    """The pictures of a comparison, curves over time thinned to about `points` samples."""
+    """Make the plots of a comparison, with curves over time thinned to about `points` samples."""
     entries = [scenario.pick(flight.name) for flight in flights]
     units = scenario.table.libration.units
     longest = max((flight.recording["time"] for flight in flights), key=len)
@@ -170,7 +170,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathP
 
 
 def unit_text(scenario: Scenario) -> str:
-    """The unit of lengths, in words."""
+    """Name the unit of lengths."""
     length = scenario.table.libration.units.length
     return "Earth diameters" if length == EARTH_DIAMETER else f"units of {length / 1e3:g} km"
 
@@ -184,7 +184,7 @@ def _path(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _away(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, scenario: Scenario, clock: str) -> Plot:
-    """The distance from the circle, in its plane and across it, or from the equilibrium."""
+    """Return the distance from the circle, in its plane and across it, or from the equilibrium."""
     length = scenario.table.libration.units.length / 1e3
     x = [thin(flight.recording["position"][:, 0] * length, factor) for flight in flights]
     goals = [goal_of(entry.gains) for entry in entries]
@@ -201,7 +201,7 @@ def _away(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int, s
         return Plot("deviation", "off the circle, in its plane and across", [sound(p, flights) for p in panels], clock=clock)
     near_km = scenario.table.settling.tolerance * length
     panels = [positive("distance, km", off, (near_km,)), Panel("x, km", x)]
-    title = "distance from what is to be held, and along X"
+    title = "distance from the point to be held, and along X"
     return Plot("deviation", title, [sound(p, flights) for p in panels], "tolerance", clock=clock)
 
 
@@ -222,8 +222,8 @@ def _control(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int
 
 
 def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot:
-    """(x, y), (y, z) and (u_y, u_z), as published, and (u_x, u_z), in which the control comes nearest to the limit; with the
-    circle and the limit."""
+    """Plot (x, y), (y, z) and (u_y, u_z), as published, and (u_x, u_z), in which the control comes nearest to the limit;
+    with the circle and the limit."""
     radii = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, CircleGoal)})
     size = max([*radii, *(max(map(abs, goal_of(entry.gains).at(0.0)[0])) for entry in entries)]) or 1.0
     kept = [flight for flight in flights if flight.lost is None]
@@ -278,7 +278,7 @@ def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenari
 
 
 def _square(guide: Guide) -> Guide:
-    """The limit of each axis in place of that of the norm."""
+    """Use the limit of each axis in place of that of the norm."""
     size = float(np.abs(guide.x).max())
     x, y = size * np.array([1.0, 1.0, -1.0, -1.0, 1.0]), size * np.array([-1.0, 1.0, 1.0, -1.0, -1.0])
     return Guide(x, y, guide.text, guide.colour)

@@ -1,4 +1,4 @@
-"""Plots in a plane: paths of the laws over one another, and lines to judge them by; as figures, and as data of a page."""
+"""Plots in a plane: paths of the laws over one another, with reference lines; as figures, and as data of a page."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from starhold.report.plots import Curve, colour
 from starhold.studies.flight import Flight
 
 CORNERS = 181
-"""Points of a circle that is drawn."""
+"""The number of points of a drawn circle."""
 PATH = 1500
-"""Samples of a path on a page at most."""
+"""The most samples of a path on a page."""
 FAMILY = 60
-"""Samples of a faint line on a page at most."""
+"""The most samples of a faint line on a page."""
 FILLS = {"light": "#e8f1fa", "dark": "#c3dcf1"}
 GREY = "0.35"
 
@@ -29,7 +29,7 @@ class Line(NamedTuple):
 
 
 class Guide(NamedTuple):
-    """A line that is no law's path: dashed (in a law's colour where it is about that law alone) or faint, the edge of an
+    """A line that is not a law's path: dashed (in a law's colour where it concerns that law alone) or faint, the edge of an
     area, or points."""
 
     x: Curve
@@ -41,8 +41,8 @@ class Guide(NamedTuple):
 
 @dataclass(frozen=True)
 class Plane:
-    """One picture: the names of its axes, a path for each law, guides, what it shows (x and y from and to), and whether
-    both axes have one scale."""
+    """One plot: the names of its axes, a path for each law, guides, its ranges (x and y from and to), and whether both axes
+    have the same scale."""
 
     xlabel: str
     ylabel: str
@@ -54,7 +54,7 @@ class Plane:
 
 @dataclass(frozen=True)
 class PlanePlot:
-    """Pictures side by side, what their dashed lines are, and what they are drawn in."""
+    """Plots side by side, the meaning of their dashed lines, and their units."""
 
     name: str
     title: str
@@ -64,13 +64,13 @@ class PlanePlot:
 
 
 def ring(radius: float, text: str, shade: str | None = None) -> Guide:
-    """A circle about the origin."""
+    """Return a circle about the origin."""
     angle = np.linspace(0.0, 2.0 * np.pi, CORNERS)
     return Guide(radius * np.cos(angle), radius * np.sin(angle), text, shade)
 
 
 def draw_planes(plot: PlanePlot, flights: Sequence[Flight], name: str) -> Any:
-    """A figure of plots in a plane."""
+    """Draw a figure of plots in a plane."""
     count = len(plot.planes)
     figure, total, top = headed(8.1 if count > 1 else 6.9, plot.title, flights, name, plot.dashed, 0.10)
     axes: Any = figure.subplots(-(-count // 2), min(count, 2), squeeze=False).ravel()
@@ -88,7 +88,7 @@ def _fill(axis: Any, plane: Plane, flights: Sequence[Flight]) -> None:
     for guide in plane.guides:
         _guide(axis, guide)
     for number, line in enumerate(plane.lines):
-        # What was run through again and again shows the better the thinner it is.
+        # A path traversed many times is clearer when thin.
         axis.plot(line.x, line.y, color=colour(number), linewidth=0.7 * width_of(number, len(flights)))
         if len(line.x):
             axis.plot(line.x[:1], line.y[:1], "o", color=colour(number), markersize=4)
@@ -117,7 +117,7 @@ def _guide(axis: Any, guide: Guide) -> None:
 
 
 def plane_data(plot: PlanePlot) -> dict[str, Any]:
-    """Plots in a plane for the script that draws them."""
+    """Return plots in a plane for the script that draws them."""
     planes = [
         {
             "xlabel": plane.xlabel,

@@ -1,4 +1,4 @@
-"""Plots over time, whoever draws them: panels with a curve for each law."""
+"""Plots over time, for figures and pages alike: panels with a curve for each law."""
 
 from collections.abc import Container, Sequence
 from colorsys import hls_to_rgb
@@ -14,14 +14,14 @@ COLOURS = (
     *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A8A"),
     *("#7B3FA0", "#A6761D", "#E7298A", "#66A61E", "#4D5BD6", "#B3001B", "#2F8F9D"),
 )
-"""Okabe and Ito's palette, distinct to colour-blind readers, without what white or black paper swallows; then seven
-more that differ from these and from one another."""
+"""Okabe and Ito's palette, distinct to colour-blind readers, without colours invisible on white or black; then seven more
+that differ from these and from one another."""
 GOLDEN = 0.5 * (3.0 - 5.0**0.5)
-"""Share of a full turn: hues that are such a step apart fill the circle evenly, however many they are."""
+"""The hue step as a share of a full turn: any number of hues this far apart fill the circle evenly."""
 
 
 def colour(number: int) -> str:
-    """The colour of the law at this place of a comparison, the same in every picture."""
+    """Return the colour of the law with this index in a comparison, the same in every picture."""
     if number < len(COLOURS):
         return COLOURS[number]
     extra = number - len(COLOURS)
@@ -32,11 +32,11 @@ def colour(number: int) -> str:
 Curve: TypeAlias = NDArray[np.float64]
 
 OFF_SCALE = 5.0
-"""Limits so many times above all curves are not drawn."""
+"""Limits more than so many times above all curves are not drawn."""
 ACTING = ("N", "N m", "N m s", "A m^2")
 """Units of what acts on a body."""
 FLAG = "_is_new"
-"""How quantities end that tell at which control instants a reading is a new one; nothing is seen of them over a flight."""
+"""The suffix of quantities that mark the control instants with a new reading; plots over a flight omit them."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ class Panel:
     log: bool = False
     levels: tuple[float, ...] = ()
     span: tuple[float, float] | None = None
-    """The ordinates to show, where the curves would not say it well."""
+    """The range of ordinates to show, where that of the curves would be a poor choice."""
     source: tuple[Any, ...] = ()
-    """What a page makes the curves of when it flies again: ("column", recorded quantity, component, factor), ("norm",
-    quantity, factor), ("angle", factor), ("turn", 0 roll, 1 pitch, 2 yaw) or ("acceleration", component, factor); nothing
-    for curves that stay."""
+    """The source of the curves when a page flies again: ("column", recorded quantity, component, factor), ("norm", quantity,
+    factor), ("angle", factor), ("turn", 0 roll, 1 pitch, 2 yaw) or ("acceleration", component, factor); empty for curves
+    that do not change."""
     bounds: tuple[tuple[int, Curve, Curve], ...] = ()
-    """Proved bounds by the numbers of their flights: times, and what is not exceeded from each on; drawn dashed."""
+    """Proved bounds by the indices of their flights: times, and the value not exceeded from then on; drawn dashed."""
 
     def decades(self) -> float:
         """The number of decades that a logarithmic panel spans."""
@@ -69,43 +69,42 @@ class Panel:
 
 @dataclass(frozen=True)
 class Plot:
-    """Panels over one time axis, and what their dashed lines are."""
+    """Panels over one time axis, and the meaning of their dashed lines."""
 
     name: str
     title: str
     panels: list[Panel]
     dashed: str = ""
     chatters: bool = False
-    """Whether curves may jump from sample to sample; their lines are thin, and the wildest behind."""
+    """Whether curves may jump from sample to sample; their lines are thin, with the wildest at the back."""
     clock: str = "s"
     """The unit of the times."""
     topic: str = "Motion"
-    """The part of the page that it stands in."""
+    """The part of the page that holds the plot."""
 
 
 def first_alone(plot: Plot) -> list[Plot]:
-    """Make two plots of one: its first panel, and the others."""
+    """Split a plot in two: its first panel, and the others."""
     rest = replace(plot, name=f"{plot.name}-further", title=f"{plot.title}, further", panels=plot.panels[1:])
     return [replace(plot, panels=plot.panels[:1]), *([rest] if rest.panels else [])]
 
 
 class Mark(NamedTuple):
-    """A line across a plot at a time, with a word at its head."""
+    """A vertical line across a plot at a time, with a word at its top."""
 
     time: float
     word: str = ""
 
 
 def thinning(count: int, points: int) -> int:
-    """The number of samples of which a curve keeps two, of so many in all for about `points`."""
+    """Return the number of samples of which a curve keeps two, so that about `points` remain."""
     return 1 if count <= points else int(np.ceil(2 * count / points))
 
 
 def thin(values: Curve, factor: int) -> Curve:
-    """Two of every `factor` samples, to be drawn over `thin_times`.
-
-    Where the samples left out swing further than those kept, the least and the greatest take their places: chatter
-    stays as high as it is, and moves by less than `factor` periods."""
+    """Keep two of every `factor` samples, to be drawn over `thin_times`. Where omitted samples swing further than those
+    kept, the least and the greatest replace them: chatter keeps its amplitude, and shifts by less than `factor` periods.
+    """
     if factor == 1 or not len(values):
         return values
     groups = np.pad(values, (0, -len(values) % factor), mode="edge").reshape(-1, factor)
@@ -120,7 +119,7 @@ def thin(values: Curve, factor: int) -> Curve:
 
 
 def thin_times(times: Curve, factor: int) -> Curve:
-    """The times over which curves made by `thin` are drawn."""
+    """Return the times over which curves made by `thin` are drawn."""
     if factor == 1:
         return times
     starts = np.arange(0, len(times), factor)
@@ -130,7 +129,7 @@ def thin_times(times: Curve, factor: int) -> Curve:
 
 
 def back_to_front(flights: Sequence[Flight], plot: Plot) -> list[int]:
-    """Curves that chatter go behind those that do not, which they would hide."""
+    """Draw curves that chatter behind those that do not, which they would hide."""
     numbers = list(range(len(flights)))
     if plot.chatters:
         numbers.sort(key=lambda i: -float(flights[i].metrics.get("chatter") or 0.0))
@@ -138,20 +137,20 @@ def back_to_front(flights: Sequence[Flight], plot: Plot) -> list[int]:
 
 
 def near(levels: tuple[float, ...], curves: list[Curve]) -> tuple[float, ...]:
-    """Levels but those that would flatten the curves."""
+    """Return the levels, except those that would flatten the curves."""
     peak = max((float(np.abs(curve).max(initial=0.0)) for curve in curves), default=0.0)
     return levels if max(levels) <= OFF_SCALE * peak else ()
 
 
 def positive(label: str, curves: list[Curve], levels: tuple[float, ...]) -> Panel:
-    """A logarithmic panel; zeros have no place on it and leave gaps, and a panel of zeros is linear."""
+    """Make a logarithmic panel; zeros leave gaps, and a panel of zeros is linear."""
     log = any((curve > 0.0).any() for curve in curves)
     shown = [np.where(curve > 0.0, curve, np.nan) for curve in curves] if log else curves
     return Panel(label, shown, log, levels)
 
 
 def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
-    """The panel scaled by the runs that did not diverge, lest the lost ones flatten the others."""
+    """Scale the panel by the runs that did not diverge, so that diverged ones do not flatten the others."""
     kept = [c for c, flight in zip(panel.curves, flights, strict=True) if flight.lost is None and np.isfinite(c).any()]
     if not kept or all(flight.lost is None for flight in flights):
         return panel
@@ -165,9 +164,9 @@ def sound(panel: Panel, flights: Sequence[Flight]) -> Panel:
 def recorded_plots(
     flights: Sequence[Flight], factor: int, known: Container[str] = (), readers: tuple[str, ...] = ()
 ) -> list[Plot]:
-    """A plot of each quantity that all flights record and that is not known otherwise, with the name, unit and meaning that
-    its part declares; a panel for each component. What only tells whether a reading is new is not drawn. readers: how the
-    names of what sensors and estimators tell begin."""
+    """Plot each further quantity that all flights record, with the name, unit and meaning that its part declares; a panel
+    for each component. Flags of new readings are not drawn. readers: prefixes of the names of sensors' and estimators'
+    outputs."""
     longest = max((flight.recording for flight in flights), key=lambda run: len(run["time"]))
     _, coordinates = longest.variables()
     plots: list[Plot] = []

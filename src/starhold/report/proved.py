@@ -13,14 +13,13 @@ from starhold.report.text import left_text, number_text
 from starhold.studies.flight import Flight
 
 NOTE = (
-    "Proved means shown by a computation without rounding: identities and inequalities in exact rational numbers, the rest "
-    "in ball arithmetic, which carries a bound of its own error. No claim rests on samples or on flights. Refuted: "
-    "something that the proof needs is false at the state shown; the argument then fails, and the law itself may or may "
-    "not. Undecided: neither was shown. A claim speaks of motions that meet its assumptions, listed inside; where the "
-    "flight on this page does not, the page says so and from when on. Of torque held between samples it does so unless that "
-    "is proved to be stable. "
+    "Proved means shown by a computation without rounding errors: identities and inequalities in exact rational numbers, "
+    "the rest in ball arithmetic, which bounds its own error. No claim rests on samples or on flights. Refuted: a condition "
+    "of the proof is false at the state shown; the proof then fails, and the law itself may or may not. Undecided: neither "
+    "was shown. A claim is about motions that meet its assumptions, listed inside; where the flight on this page does not, "
+    "the page says so and from when on. Torque held between samples counts as such a case unless its stability is proved. "
 )
-RECHECK = f"The proofs are in {FILE} beside this page; <code>%s</code> goes through them again."
+RECHECK = f"The proofs are in {FILE} beside this page; <code>%s</code> checks them again."
 
 SYMBOLS = {
     "start": ("V at the start, at most", ""),
@@ -33,10 +32,10 @@ SYMBOLS = {
     "mu": ("μ in (σ² + μx²)/2, σ = x + ẋ/s", ""),
     "reach": ("|x|, at most", ""),
     "epsilon": ("ε in V + ε q·Jω", ""),
-    "rho": ("share of V that the added term stays within", ""),
+    "rho": ("bound on the added term, as a share of V", ""),
     "rate_bound": ("rate up to which V is shown to be non-increasing", "rad/s"),
     "tau": ("τ: a torque M does work of at most τ |Wᵀω + εq|² + M²/(4τ)", ""),
-    "beta": ("β: share of V + ε q·Jω that is left of the decrease", "1/s"),
+    "beta": ("β: decay rate left, as a share of V + ε q·Jω", "1/s"),
     "shift": ("p in |ω × Jω| ≤ |ω| |(J + p)ω|", ""),
     "weight": ("c in |ω| |(J + p)ω| ≤ (c |ω|² + |(J + p)ω|²/c)/2", ""),
     "momentum": ("total angular momentum, at most", "N m s"),
@@ -48,11 +47,11 @@ SYMBOLS = {
     "eigenvalues": ("eigenvalues at the control period", ""),
     "longest": ("longest period shown", "s"),
 }
-"""Numbers that make a proof and stand in no sentence: what each means, and its unit, which for V depends on the law."""
+"""The numbers of a proof that no sentence states: the meaning of each, and its unit, which for V depends on the law."""
 
 
 def section(flights: Sequence[Flight]) -> str:
-    """The section as HTML; nothing where no flight has a certificate."""
+    """Write the section as HTML; empty where no flight has a certificate."""
     blocks = [_law(flight, number, i) for number, flight in enumerate(flights) for i in range(len(flight.certificates))]
     if not blocks:
         return ""
@@ -68,7 +67,7 @@ def _law(flight: Flight, number: int, place: int) -> str:
         (heading, [_claim(c, certificate.subject, left_text(flight, place, c.kind), marks[c.kind]) for c in claims])
         for heading, claims in grouped(certificate).items()
     ]
-    # What is about less of the loop is there for who looks for it.
+    # Claims about less of the loop stay folded.
     claims = "".join(
         f'<details class="share"{opened}><summary>{escape(_sentence_case(heading))}</summary>{"".join(parts)}</details>'
         for opened, (heading, parts) in zip([" open", *[""] * len(groups)], groups, strict=False)
@@ -109,7 +108,7 @@ def _obligation(obligation: Obligation) -> Markup:
 
 
 def _numbers(claim: Claim) -> str:
-    """The numbers behind the sentence; those without bound, and a cross term that is not needed, are left out."""
+    """List the numbers behind the sentence, without infinite ones and a cross term that is not needed."""
     values = claim.numbers | {name: value for name, value in claim.witness.items() if value}
     items = [
         f"<dt>{escape(meaning)}</dt><dd>{escape(_text(name, values[name]))}{f' {escape(unit)}' if unit else ''}</dd>"
@@ -127,5 +126,5 @@ def _text(name: str, value: Any) -> str:
     if name != "eigenvalues":
         return number_text(value)
     pairs = (f"{real:.6g}{f' {chr(0xB1)} {imaginary:.3g} i' if imaginary else ''}" for real, imaginary in value)
-    # Conjugates come in pairs, which read as one.
+    # Conjugate pairs are shown as one.
     return ", ".join(dict.fromkeys(pair.replace("± -", "± ") for pair in pairs))

@@ -1,4 +1,4 @@
-"""Files of results: every one appears under its name only when it is whole."""
+"""Files of results: each appears under its name only when it is complete."""
 
 from __future__ import annotations
 
@@ -45,19 +45,20 @@ MARKS = (SUMMARY, EXPORT, "run.nc", PAGE, INDEX, CERTIFICATES, KERNEL, *TIMING, 
 
 
 def open_folder(folder: Path, force: bool) -> Path:
-    """Create the folder for results. One that holds results is refused unless `force`, which clears those results alone."""
+    """Create the folder for results. A folder that holds results is refused unless `force`, which removes only those
+    results."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         claim(folder)
         clear_unfinished(folder)
-        # Looked for once nobody else writes them.
+        # Checked once no other process can write them.
         marks = [mark for mark in MARKS if (folder / mark).exists()]
         if marks and not force:
             raise InputError(str(folder), "", f"results already there ({marks[0]})", "another folder with -o, or --force")
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
     except BlockingIOError:
-        raise InputError(str(folder), "", "another starhold that writes there", "another folder with -o") from None
+        raise InputError(str(folder), "", "another starhold is writing there", "another folder with -o") from None
     except OSError as error:
         shown = cut(str(folder), LONGEST_PATH)
         raise InputError(shown, "", f"cannot write there: {error.strerror}", "a folder you may write to") from None
@@ -89,17 +90,17 @@ def _clear(folder: Path) -> None:
 
 
 def _exported(folder: Path) -> list[str]:
-    """The files that an export of this folder lists."""
+    """List the files that an export of this folder wrote."""
     try:
         names = [Path(name) for name in json.loads((folder / EXPORT).read_text(encoding="utf-8"))["files"]]
-        # Whatever the list says, nothing outside the folder.
+        # Never a file outside the folder, whatever the list says.
         return [str(name) for name in names if not name.is_absolute() and ".." not in name.parts]
     except (OSError, ValueError, KeyError, TypeError):
         return []
 
 
 def _lemma_files(folder: Path) -> dict[str, list[int]]:
-    """The files for Rocq of a folder's certificates, each with the places of its proofs in certificate.json."""
+    """Return the Rocq files of a folder's certificates, each with the indices of its proofs in certificate.json."""
     files = dict[str, list[int]]()
     try:
         content: Any = json.loads((folder / CERTIFICATES).read_text(encoding="utf-8"))
@@ -115,7 +116,7 @@ def _lemma_files(folder: Path) -> dict[str, list[int]]:
 
 
 def write_lemmas(folder: Path) -> list[Path]:
-    """Write what the kernel checks of a folder's certificate.json as lemmas for Rocq, a file for each certificate in it."""
+    """Write the kernel's checks of a folder's certificate.json as lemmas for Rocq, a file for each certificate in it."""
     from starhold.certification.rocq import printed
     from starhold.kernel.check import check
 
@@ -128,21 +129,21 @@ def write_lemmas(folder: Path) -> list[Path]:
 
 
 def write_run(run: Recording, path: Path) -> None:
-    """A run as netCDF-4."""
+    """Write a run as netCDF-4."""
     path.parent.mkdir(exist_ok=True)
     with atomic_write(path) as hidden:
         write_netcdf(run, hidden)
 
 
 def write_summary(scenario: str, results: dict[str, Any], path: Path) -> None:
-    """The metrics of each law of a scenario of this name, SI units, as JSON; a value that does not exist is null."""
+    """Write the metrics of each law of a scenario of this name in SI units as JSON; a missing value is null."""
     content = {"scenario": scenario, "starhold_version": __version__, "laws": _finite(results)}
     with atomic_write(path) as hidden:
         hidden.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _finite(value: Any) -> Any:
-    """A value in which what is no finite number is None."""
+    """Return a value in which numbers that are not finite are None."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in cast("dict[Any, Any]", value).items()}
     if isinstance(value, list | tuple):
@@ -151,8 +152,8 @@ def _finite(value: Any) -> Any:
 
 
 def write_result(result: commands.Result, name: str, subject: str, folder: Path) -> dict[str, Path]:
-    """Write the results of a study of a subject into an existing folder; returns what is to be looked at: the paths of its
-    table, its certificate and its picture, where there are such."""
+    """Write the results of a study of a subject into an existing folder; return the paths of its table, its certificate and
+    its picture, where they exist."""
     written = dict[str, Path]()
     if result.numbers is not None:
         written["Table"] = write_part(result, "csv", folder / f"{name}.csv")
@@ -184,8 +185,8 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
 
 
 def study_into(name: str, about: tuple[Any, ...], folder: Path | None) -> Any:
-    """Run the command of a name about something, and return what it computed, which is written into the folder, if there is
-    one. InputError, before anything is computed, where that holds results or cannot be written."""
+    """Run the command of this name on a subject, and return what it computed, which is written into the folder, if one is
+    given. InputError, before anything is computed, if the folder holds results or cannot be written."""
     declared = commands.command(name)
     subject = declared.prepare(*about)
     into = None if folder is None else open_folder(folder, force=False)
@@ -196,7 +197,7 @@ def study_into(name: str, about: tuple[Any, ...], folder: Path | None) -> Any:
 
 
 def write_part(result: commands.Result, kind: str, path: Path) -> Path:
-    """Write the numbers of a result ("csv") or its figure ("png"), which it has, and return the path."""
+    """Write the numbers of a result ("csv") or its figure ("png"), and return the path."""
     from starhold.report.figures import save
     from starhold.report.tables import write_table
 
@@ -209,7 +210,7 @@ def write_part(result: commands.Result, kind: str, path: Path) -> Path:
 
 
 def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -> Path:
-    """Certificates as one file of a folder, and beside it the kernel that checks those with proofs; returns its path."""
+    """Write certificates as one file of a folder, and beside it the kernel that checks their proofs; return its path."""
     path = folder / CERTIFICATES
     with atomic_write(path) as hidden:
         write_certificates(certificates, name, hidden)
@@ -226,8 +227,8 @@ def _write_kernel(folder: Path) -> None:
 
 
 def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, drawn: bool = True) -> Path:
-    """Summary, certificates and, if it is to be drawn, the page into an existing folder; returns the path of the page,
-    or the folder where there is none. The runs are written by `write_run`, and the pictures by a `Painter`."""
+    """Write summary, certificates and, if requested, the page into an existing folder; return the path of the page, or of
+    the folder where there is none. `write_run` writes the runs, and a `Painter` the figures."""
     write_summary(scenario.name, {flight.name: flight.results() for flight in flights}, folder / SUMMARY)
     if certificates := [certificate for flight in flights for certificate in flight.certificates]:
         write_proofs(certificates, scenario.name, folder)
@@ -241,12 +242,12 @@ def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, d
 
 
 BLOCK = 65_536
-"""Samples that are copied at a time."""
+"""The number of samples that are copied at a time."""
 
 
 class _Sink(io.FileIO):
-    """A file that notes why it could not be written and lets the writer go on: the HDF5 library does not survive an error
-    while it closes a file."""
+    """A file that keeps its write error and lets the writer go on, because the HDF5 library does not survive an error while
+    it closes a file."""
 
     failure: OSError | None = None
 
@@ -268,8 +269,8 @@ class _Sink(io.FileIO):
 
 
 def write_netcdf(run: Recording, path: Path) -> None:
-    """A run as a new file. OSError where it cannot be written."""
-    # Loaded here, where alone it is needed; and not xarray, which takes longer to load than most flights.
+    """Write a run as a new file. OSError if it cannot be written."""
+    # Loaded only here, where it is needed; not xarray, which takes longer to load than most flights.
     import h5netcdf
     import h5py
 

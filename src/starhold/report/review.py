@@ -1,4 +1,4 @@
-"""The document of a review: what is required, what is known of it and by what, and what is left open."""
+"""The document of a review: what is required, what is known about it and how, and what is left open."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ PLACES = {
     "inspection": MISSION,
     "": REQUIREMENTS,
 }
-"""The section in which the evidence of each method stands."""
+"""The section that holds the evidence of each method."""
 ATTITUDE = "rigid-body"
 DRIVERS = 8
-"""Drivers of each kind that are shown."""
+"""The most drivers of each kind that are shown."""
 PICTURES = ("angle", "wheel-momentum")
-"""The figures of a flight that are shown, if it has them; else its first."""
+"""The figures of a flight that are shown, if it has them; else the first."""
 
 
 class Open(str):
@@ -59,15 +59,15 @@ class Open(str):
 
 
 class Listed(Open):
-    """One that stands in the list alone, for its section says the same otherwise."""
+    """A point that appears in the list alone, because its section says the same in other words."""
 
 
 Points: TypeAlias = list[tuple[str, str]]
-"""These points are left open, each with the section that says so."""
+"""The points that are left open, each with the section that says so."""
 
 
 def sections_of(review: Review) -> tuple[list[Section], Points]:
-    """Make the sections of the document; and tell what it leaves open."""
+    """Return the sections of the document and the points that it leaves open."""
     makers: dict[str, Callable[[Review], Iterator[Piece]]] = {
         MISSION: _mission,
         ASSUMPTIONS: _assumptions,
@@ -85,13 +85,13 @@ def sections_of(review: Review) -> tuple[list[Section], Points]:
     columns = [Column("no."), Column("from"), Column("what is open")]
     sections.append(Section(OPEN, [Table(columns, rows) if rows else "No point is open."]))
     scenario = review.evidence.scenario
-    sections.append(Section("Scenario", ["The text that all of this is computed from.", Listing(scenario.text)], True))
+    sections.append(Section("Scenario", ["The text from which all of this is computed.", Listing(scenario.text)], True))
     shown = [one._replace(pieces=[piece for piece in one.pieces if not isinstance(piece, Listed)]) for one in sections]
     return [Section("Outcome", [*_outcome(review, len(points))]), *shown], points
 
 
 def _safe(text: str) -> str:
-    """Words without marks of style."""
+    """Return text without style marks."""
     from rich.markup import escape
 
     return escape(text)
@@ -102,7 +102,7 @@ def _safe_rows(rows: Iterable[Sequence[Any]]) -> list[list[Any]]:
 
 
 def _table(names: str, rows: Iterable[Sequence[Any]], title: str = "") -> Table:
-    """A table of words; names: its headings, with strokes between them."""
+    """Make a table of text; names: its headings, separated by "|"."""
     return Table([*map(Column, names.split("|"))], _safe_rows(rows), title)
 
 
@@ -115,8 +115,8 @@ def _outcome(review: Review, points: int) -> Iterator[Piece]:
     yield f"Required of the law {review.evidence.entry.name}: {said} of {len(judged)}." if judged else "Nothing is required."
     limited = [one.id for one in judged if one.verdict == "met" and one.left_out]
     if limited:
-        yield f"Met only without something that flies: {listed(limited)}."
-    yield f"{OPEN}: {points}, which have a section of their own." if points else "No point is open."
+        yield f"Met only if some parts of the flight are left out: {listed(limited)}."
+    yield f"{OPEN}: {points}; see the section of that name." if points else "No point is open."
 
 
 # --- sections ---------------------------------------------------------------------------------------------------------
@@ -153,7 +153,7 @@ def _assumptions(review: Review) -> Iterator[Piece]:
     needed: dict[str, list[str]] = {}
     for one in _issued(review):
         for claim in one.claims:
-            # What a claim leaves out stands with it.
+            # What a claim leaves out is stated with it.
             for text in texts(name for name in claim.assumptions if not name.startswith(WITHOUT)):
                 needed.setdefault(text, []).append(f"{one.name}: {HEADINGS[claim.kind]}")
     if needed:
@@ -258,7 +258,7 @@ def _momentum(review: Review) -> Iterator[Piece]:
 def _margins(review: Review) -> Iterator[Piece]:
     evidence = review.evidence
     if evidence.scenario.body != ATTITUDE:
-        yield "Margins are told of laws that turn a body."
+        yield "Margins exist only for laws that rotate a body."
         return
     linear = evidence.linear
     if isinstance(linear, str):
@@ -281,7 +281,7 @@ def _campaign(review: Review) -> Iterator[Piece]:
     from starhold.report.campaign_units import Wording, flown_text, headline
 
     if not review.has_campaign:
-        yield Open("No campaign is flown, so nothing is known of other numbers: the scenario has no [campaign] table.")
+        yield Open("No campaign is flown, so nothing is known for other parameters: the scenario has no [campaign] table.")
         return
     result = review.evidence.campaign
     law, words = result.laws[0], Wording.of(review.evidence.scenario.body, result)
@@ -297,7 +297,7 @@ def _campaign(review: Review) -> Iterator[Piece]:
         if one is not None and one.note:
             yield one.note
     if law.drivers is None:
-        yield Open("What drives failures was not looked for: nothing is drawn, or by a design that repeats its values.")
+        yield Open("Drivers of failures were not sought: nothing is drawn, or the sampling repeats its values.")
 
 
 def _certificates(review: Review) -> Iterator[Piece]:
@@ -332,7 +332,7 @@ def _certificates(review: Review) -> Iterator[Piece]:
         covered += [f"{name}: {coverage(first, subject)} ({HEADINGS[first.kind]})."] if coverage(first, subject) else []
         if first.outcome == "proved" and first.left_out:
             points.append(Open(f"{name}: no proof about the motion takes in {enumerated(first.left_out)}."))
-        # Certificates of later phases begin where this flight is not looked at.
+        # Certificates of later phases begin at states that this flight does not reach.
         inside = study_of(review.evidence.scenario.body).start_inside(given) if given.step == 0 else {}
         outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
         if outside:
@@ -347,7 +347,7 @@ def _certificates(review: Review) -> Iterator[Piece]:
 
 
 def _credibility(review: Review) -> Iterator[Piece]:
-    """Tell what is known for each factor that NASA-STD-7009 names; a level is for people to assign."""
+    """State what is known for each factor of NASA-STD-7009; people assign the levels."""
     yield "The factors are those of NASA-STD-7009; no level is assigned, for that is left to people."
     factors = factors_of(review, _issued(review))
     rows = [[name, " ".join(known) or "nothing", " ".join(blank)] for name, (known, blank) in factors.items()]

@@ -1,4 +1,4 @@
-"""The settings of a scenario as tables: all that its file says, with meanings, and what it takes by default."""
+"""The settings of a scenario as tables: all values of its file, with meanings, and the defaults."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 MANY = 9
-"""Numbers of a setting beyond which only the first and the last are shown."""
+"""Of a setting with more numbers than this only the first and the last are shown."""
 
 
 def settings(scenario: Scenario) -> str:
-    """All tables of a scenario, those of its parts included."""
+    """Return all tables of a scenario, those of its parts included."""
     from pydantic import BaseModel
 
     parts: list[str] = []
@@ -29,12 +29,12 @@ def settings(scenario: Scenario) -> str:
     shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
     for name in type(scenario.table).model_fields:
         table = getattr(scenario.table, name)
-        # What a campaign draws is not flown here, nor a target beside one that is a part.
+        # Draws of a campaign are not flown here, nor is a target if another is given as a part.
         is_part = any(fitted.part.role == name for fitted in scenario.parts)
         if isinstance(table, BaseModel) and name != "campaign" and not is_part:
             parts.append(_table(name, table, shared, written.get(name, {})))
         elif table is None:
-            # Told with each part where the table is not there.
+            # Shown with each part if the table is absent.
             shared = {key: value for key, value in shared.items() if not key.startswith(f"{name}.")}
     parts += [
         _part(fitted, shared, is_part) for fitted, is_part in zip(scenario.parts, written.get("part", []), strict=True)
@@ -43,7 +43,7 @@ def settings(scenario: Scenario) -> str:
 
 
 def _taken(scenario: Scenario) -> set[str]:
-    """The keys that give parameters to the parts and laws of a scenario, targets of modes among them."""
+    """List the keys that give parameters to the parts and laws of a scenario, including targets of modes."""
     fitted = [*scenario.parts, *(target for entry in scenario.laws for target in entry.targets)]
     declared = [item for one in fitted if not one.part.table for item in one.part.fields()]
     declared += [item for entry in scenario.laws for item in entry.law.fields(entry.form)]
@@ -51,8 +51,8 @@ def _taken(scenario: Scenario) -> set[str]:
 
 
 def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> str:
-    """One table of the scenario with the descriptions its schema holds, numbers with units as the file has them; keys
-    without a value are left out, but for those with a default that parts take."""
+    """Show one table of the scenario with the descriptions of its schema, and numbers with units as in the file; keys
+    without a value are left out, unless parts supply a default."""
     from pydantic import BaseModel
 
     properties = type(table).model_json_schema()["properties"]
@@ -81,8 +81,8 @@ def with_units(written: Any, value: Any) -> str:
 
 
 def _part(fitted: Fitted, shared: Collection[str], written: Mapping[str, Any]) -> str:
-    """The parameters of a part with their units and meanings; numbers that the file gives with units are shown as written
-    there. Parameters that these shared keys of the scenario give are left out."""
+    """Show the parameters of a part with their units and meanings; numbers that the file gives with units are shown as
+    written. Parameters given by these shared keys of the scenario are left out."""
     rows: list[tuple[str, ...]] = []
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
         if item.gain.shared in shared:

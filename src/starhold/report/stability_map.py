@@ -9,17 +9,17 @@ from starhold.report.figures import DPI
 from starhold.synthesis.stability_degree import Optimum, boundary, degree, optimum
 
 POINTS = 400
-"""Gains each way at which the map is computed, about two pixels apart."""
+"""The number of gains along each side of the map, about two pixels apart."""
 DASHES = ((1, 1.2), (5, 2), (7, 2, 1, 2))
 """One for each axis."""
 LINE = "#D55E00"
-"""The budget's colour, which stands out from the map's blues and yellows for every reader."""
+"""The budget's colour, which stands out from the map's blues and yellows also to colour-blind readers."""
 SAME = 1e-9
 """Moments that differ by less than this share count as equal."""
 
 
 class StabilityMap(NamedTuple):
-    """All that the map shows.
+    """The contents of the map.
 
     K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: torque asked for over the budget, of the
     same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given."""
@@ -36,7 +36,7 @@ class StabilityMap(NamedTuple):
 
 
 def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> StabilityMap:
-    """The map around the optimum. Arguments and errors as of `draw_map`."""
+    """Compute the map around the optimum. Arguments and errors as in `draw_map`."""
     best = optimum(ratios, alpha, omega, budget)
     # The optimum at fixed shares of both sides, so that the words around it never meet the lines.
     K_a = np.linspace(0.0, 2.0 * best.K_a, POINTS)
@@ -48,10 +48,10 @@ def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) 
 
 
 def draw_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> Any:
-    """A figure of the map of eta(K_a, K_w). Equal arguments give equal files.
+    """Draw the map of eta(K_a, K_w). Equal arguments give equal files.
 
     ratios: (3,), J_axis / J_x in any order; alpha: largest initial error (rad); omega: largest initial rate (1/t0); budget:
-    L. ValueError as `optimum` raises it."""
+    L. ValueError as from `optimum`."""
     from matplotlib.figure import Figure
 
     what = stability_map(ratios, alpha, omega, budget)
@@ -90,7 +90,7 @@ def draw_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> An
 
 
 def _budget(axis: Any, what: StabilityMap) -> None:
-    """The budget line, and the side beyond it veiled and hatched."""
+    """Draw the budget line, with the side beyond it faded and hatched."""
     beyond = [1.0, max(float(what.ask.max()), 1.0) * 2.0]
     axis.contourf(what.K_a, what.K_w, what.ask, levels=beyond, colors=["white"], alpha=0.42)
     hatched = axis.contourf(what.K_a, what.K_w, what.ask, levels=beyond, colors="none", hatches=["//"])
@@ -100,7 +100,7 @@ def _budget(axis: Any, what: StabilityMap) -> None:
 
 
 def _curves(axis: Any, what: StabilityMap) -> list[Any]:
-    """The border between what decides, and each axis' critical damping; what the legend says of these lines."""
+    """Draw the border between the two decisive modes, and each axis' critical damping; return the legend of these lines."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
     from matplotlib.patheffects import withStroke
@@ -110,7 +110,7 @@ def _curves(axis: Any, what: StabilityMap) -> list[Any]:
     axis.plot(boundary(what.ratios) * what.K_w**2, what.K_w, **edge)
     handles = [
         Line2D([], [], color=LINE, linewidth=2.4, label="torque budget, 2 K_a α + K_w ω = L"),
-        Patch(facecolor="white", edgecolor="0.25", hatch="////", linewidth=0.0, label="more torque than there is"),
+        Patch(facecolor="white", edgecolor="0.25", hatch="////", linewidth=0.0, label="more torque than available"),
         Line2D([], [], label="border of the two regions", **edge),
     ]
     for number, (name, ratio) in enumerate(_axes(what.ratios)):
@@ -121,7 +121,7 @@ def _curves(axis: Any, what: StabilityMap) -> list[Any]:
 
 
 def _words(axis: Any, what: StabilityMap) -> None:
-    """Write what decides on each side of the border, and the optimum with its numbers."""
+    """Label the decisive mode on each side of the border, and the optimum with its numbers."""
     named, best = sorted(_axes(what.ratios), key=lambda pair: pair[1]), what.best
     numbers = f"optimum\nK_a = {best.K_a:.4g}\nK_w = {best.K_w:.4g}\nη = {best.eta:.4g}"
     texts = (
@@ -148,8 +148,8 @@ def _words(axis: Any, what: StabilityMap) -> None:
 
 
 def _places(what: StabilityMap, texts: Any) -> list[tuple[float, float]]:
-    """Centres, as shares of the axes, of words that hide as little as can be of the lines and of each other: each as near
-    as it can be to where it is wanted, above the border (1), below it (-1) or anywhere (0)."""
+    """Return centres, as shares of the axes, of labels that hide as little as possible of the lines and of each other: each
+    as near as possible to its preferred place, above the border (1), below it (-1) or anywhere (0)."""
     u = np.linspace(0.0, 1.0, 600)
     K_a, K_w, c = u * what.K_a[-1], u * what.K_w[-1], boundary(what.ratios)
     curves = [(factor * K_w**2 / what.K_a[-1], u) for factor in (c, *(1.0 / (8.0 * i) for i in what.ratios))]
@@ -181,7 +181,7 @@ def _places(what: StabilityMap, texts: Any) -> list[tuple[float, float]]:
 
 
 def _axes(ratios: tuple[float, ...]) -> list[tuple[str, float]]:
-    """The axes by name, those of equal moments together, each with its ratio."""
+    """Name the axes, those of equal moments together, each with its ratio."""
     groups: list[tuple[str, float]] = []
     for name, ratio in zip("xyz", ratios, strict=True):
         for number, (names, other) in enumerate(groups):

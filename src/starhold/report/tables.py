@@ -22,15 +22,15 @@ PILLS = {
 
 
 class Markup(str):
-    """HTML that a cell shows as it stands; what comes from files is escaped in it."""
+    """HTML that a cell shows unchanged; text from files is already escaped."""
 
 
 def table_html(table: Table, kind: str = "", fit: bool = False, rows: Mapping[int, str] | None = None) -> str:
-    """Make a table that scrolls where it is too wide; with `fit` it is no wider than its contents. Without names of columns
-    it has no head. rows: attributes of rows by their number."""
+    """Make a table that scrolls if it is too wide; with `fit` it is no wider than its contents. Without column names it has
+    no head. rows: attributes of rows by index."""
     headed = any(column.name for column in table.columns)
     sides = [f' class="{"number" if column.format else "words"}"' if headed else "" for column in table.columns]
-    # On a narrow screen each cell of such a table is a line of its own.
+    # On a narrow screen each cell of such a table takes a line of its own.
     named = [
         f'{side} data-head="{escape(column.name)}"' if "rows" in kind else side
         for side, column in zip(sides, table.columns, strict=True)
@@ -46,12 +46,12 @@ def table_html(table: Table, kind: str = "", fit: bool = False, rows: Mapping[in
 
 
 def titled(title: str, table: Table) -> str:
-    """Make a section of a table below a heading."""
+    """Make a section that holds a table below a heading."""
     return f"<section><h3>{escape(title)}</h3>\n{table_html(table, 'text')}</section>"
 
 
 def listed(rows: Sequence[Sequence[Any]]) -> Table:
-    """Make a table of rows that need no head."""
+    """Make a table of rows without a head."""
     return Table([Column("")] * max(map(len, rows), default=0), rows)
 
 
@@ -82,12 +82,12 @@ def _cell(value: Any, side: str) -> str:
 
 
 def pill(outcome: str, text: str = "") -> str:
-    """Show an outcome, or a text in its place, in its colour; nothing where there is none."""
+    """Show an outcome, or a text in its place, in the outcome's colour; nothing where there is none."""
     return f'<span class="outcome {PILLS[outcome]}">{escape(text or outcome)}</span>' if outcome in PILLS else ""
 
 
 def swatch(number: int) -> str:
-    """A law's colour as a little square."""
+    """Show a law's colour as a small square."""
     return f'<span class="swatch" style="background:{colour(number)}"></span>'
 
 
@@ -102,14 +102,13 @@ def note(text: str) -> str:
 
 
 def write_table(table: Table, path: Path) -> None:
-    """Write a table with all digits, units in the header; what does not exist is an empty cell, vectors are separated by
-    blanks."""
+    """Write a table with all digits, units in the header; a missing value is an empty cell, blanks separate components."""
     with atomic_write(path) as hidden, hidden.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([table.heads(), *(map(cell, row) for row in table.rows)])
 
 
 def cell(value: Any) -> str:
-    """A value with all digits."""
+    """Write a value with all digits."""
     if value is None or isinstance(value, str):
         return value or ""
     return " ".join(repr(number) for number in np.asarray(value).ravel().tolist())

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 ROUNDING = 1e-13
-"""Share of a matrix's largest entry below which another is taken for what rounding left."""
+"""Entries below this share of a matrix's largest count as rounding errors."""
 
 
 def number_text(value: Any, digits: int = 6) -> str:
-    """A number, vector or matrix for reading; of a diagonal matrix the diagonal, of equal numbers one; a name as it is. An
-    entry that is nothing beside the largest but the rounding of a computation reads as 0."""
+    """Show a number, vector or matrix for reading: a diagonal matrix by its diagonal, equal numbers as one, a name
+    unchanged. An entry that is only a rounding error beside the largest reads as 0."""
     if isinstance(value, str):
         return value
     array = np.asarray(value, dtype=float)
@@ -41,30 +41,30 @@ def _row_text(row: Any, digits: int) -> str:
 
 
 def value_text(value: Any, unit: str) -> str:
-    """A value with its unit."""
+    """Show a value with its unit."""
     return number_text(value) if unit == "1" else f"{number_text(value)} {unit}"
 
 
 def left_text(flight: Flight, certificate: int, kind: str) -> str:
-    """The way in which a flight leaves a claim of one of its certificates, as text; empty if it does not."""
+    """Describe how a flight leaves a claim of one of its certificates; empty if it does not."""
     left, moment = flight.left(certificate, kind), flight.metric_set.moment
     groups = {time: _how([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
     return "; ".join(f"{'from the start' if time == 0.0 else f'at {moment(time, 4)}'} {how}" for time, how in groups.items())
 
 
 def _how(departures: Sequence[str]) -> str:
-    """Departures at one time in a row, the parts that the loop has told together."""
+    """List departures in order of time, naming the parts of the loop together."""
     parts = [text.removeprefix(HAS) for text in departures if text.startswith(HAS)]
     others = [text for text in departures if not text.startswith(HAS)]
     return listed([*([HAS.removesuffix("the ") + enumerated(parts)] if parts else []), *others])
 
 
 def unknown_text(flight: Flight) -> str:
-    """Recorded quantities of a flight that are no numbers to its end, for reading; empty where all are."""
+    """List recorded quantities of a flight that stop being finite before its end; empty where none do."""
     spans = [f"{name} from {flight.metric_set.moment(time)} on" for name, time in flight.unknown.items()]
     return f"{flight.name}: no number to the end: {', '.join(spans)}" if spans else ""
 
 
 def lost_text(flight: Flight, digits: int = 6) -> str:
-    """The time at which a flight diverged, as text; empty if it did not."""
+    """Show the time at which a flight diverged; empty if it did not."""
     return "" if flight.lost is None else flight.metric_set.moment(flight.lost, digits)

@@ -1,4 +1,4 @@
-"""The transient of each law against the limits of its scenario, in words and as a section of the page."""
+"""The transient of each law compared with the limits of its scenario, as text and as a section of the page."""
 
 import math
 from collections.abc import Sequence
@@ -9,13 +9,13 @@ from starhold.studies.flight import Flight
 
 
 def transient_text(flight: Flight) -> str:
-    """One line about a flight with such metrics."""
+    """Summarize in a line a flight with such metrics."""
     time, rate, accelerations, fate = _cells(flight)
     return f"transient {time}; peak rate {rate}; peak acceleration {accelerations}: {fate}"
 
 
 def section(flights: Sequence[Flight]) -> str:
-    """The section of the page; empty where no limits were given."""
+    """Write the section of the page; empty where no limits were given."""
     if not all("limits_kept" in flight.metrics for flight in flights):
         return ""
     cells_of = [(number, flight, *_cells(flight)) for number, flight in enumerate(flights)]

@@ -1,4 +1,4 @@
-"""Scenarios are files, or made in Python: called, this package is `make_scenario`, for `sh.scenario({...})`."""
+"""Scenarios, from files or made in Python. Called, this package is `make_scenario`, for `sh.scenario({...})`."""
 
 import sys
 from types import ModuleType

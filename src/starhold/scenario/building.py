@@ -1,4 +1,4 @@
-"""Closed loops are built from a scenario."""
+"""Builds closed loops from a scenario."""
 
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop
@@ -9,8 +9,8 @@ from starhold.scenario.reading import LawEntry, Scenario
 
 
 def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
-    """The closed loop of one law of a scenario. InputError where the law cannot work with its gains, or the integration
-    cannot follow the loop."""
+    """Build the closed loop of one law of a scenario. InputError where the law cannot work with its gains, or the
+    integration cannot follow the loop."""
     loop = scenario.hooks.build(scenario, entry)
     check_fit(loop, scenario.where)
     try_parts(loop, scenario.where, f"law {entry.name}")

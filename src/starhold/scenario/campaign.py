@@ -1,7 +1,5 @@
-"""The [campaign] table of a scenario: which keys are drawn from which distributions, and how many runs.
-
-Numbers that carry the unit of another key, such as the bounds of a distribution, stay here as the file has them; the
-package `campaign` reads them with those keys' units.
+"""The [campaign] table of a scenario: the distributions of keys, and the number of runs. Numbers in the unit of another key,
+such as the bounds of a distribution, stay as in the file; the package `campaign` reads them with those keys' units.
 """
 
 from __future__ import annotations
@@ -26,10 +24,10 @@ class CampaignTable(Table):
     seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of the draws"))] = 1
     sampling: Annotated[
         Literal["random", "sobol", "latin-hypercube", "morris", "saltelli"],
-        Field(description="how the draws are placed; the last two for the shares that inputs have in the result"),
+        Field(description="how the draws are placed; the last two for sensitivity indices of the inputs"),
     ] = "random"
-    metrics: list[str] = Field(default=[], description="to be measured beside the usual ones: overshoot, iterations")
-    over: dict[str, Dispersed] = Field(default={}, description="distributions by the keys that they are of")
+    metrics: list[str] = Field(default=[], description="measured beside the usual ones: overshoot, iterations")
+    over: dict[str, Dispersed] = Field(default={}, description="distributions by key")
 
     @model_validator(mode="before")
     @classmethod

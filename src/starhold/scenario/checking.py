@@ -1,4 +1,4 @@
-"""The contents of a scenario file are checked: every fault becomes one line."""
+"""Checks the contents of a scenario file: every error becomes one line."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ RENAMED = {
 }
 """Old names of keys, laws and built-in scenarios, refused with the new one named where that one is known."""
 MOST_SUBSTEPS = 10**6
-"""The most in a control period, which ends before an interrupt is heeded."""
+"""The most substeps in a control period, which ends before an interrupt is heeded."""
 
 
 LONGEST_TEXT, DEEPEST, MOST_DIGITS = 2**22, 16, 60
-"""Characters of a file, tables and lists within one another, and digits of a whole number."""
+"""The most characters of a file, nested tables and lists, and digits of a whole number."""
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{50}}")
-"""A dotted key so long that the time to read it, which grows with its square, matters."""
+"""A dotted key so long that the time to read it, which grows as the square of its length, matters."""
 
 
 def read_toml(text: str, where: str) -> dict[str, Any]:
-    """The tables of a TOML text; `where` names it in errors."""
+    """Return the tables of a TOML text; `where` names it in errors."""
     if len(text) > LONGEST_TEXT:
         raise InputError(where, "", f"more than {LONGEST_TEXT} characters", "a shorter file")
     if _LONG_KEY.search(text):
@@ -61,14 +61,14 @@ def read_toml(text: str, where: str) -> dict[str, Any]:
     except RecursionError:
         raise InputError(where, "", "tables or lists too deep", f"at most {DEEPEST} within one another") from None
     except ValueError:
-        # Python says so of integers that are too long to convert.
+        # Python raises this for integers that are too long to convert.
         raise InputError(where, "", "a number of thousands of digits", f"at most {MOST_DIGITS} digits") from None
     _check_sizes(tables, where)
     return _in_words(tables)
 
 
 def _in_words(value: Any) -> Any:
-    """The value with TOML's own dates and times as strings, which keys of an epoch take and others refuse by their rules."""
+    """Return the value with TOML's dates and times as strings, which keys of an epoch accept and others refuse."""
     if isinstance(value, dict):
         return {name: _in_words(item) for name, item in cast(dict[str, Any], value).items()}
     if isinstance(value, list):
@@ -77,7 +77,7 @@ def _in_words(value: Any) -> Any:
 
 
 def _check_sizes(tables: dict[str, Any], where: str) -> None:
-    """InputError where anything is nested too deeply, or a whole number is far beyond the range of floats."""
+    """Raise InputError where anything is nested too deeply, or a whole number is far beyond the range of floats."""
     left: list[tuple[int, str, Any]] = [(0, "", tables)]
     while left:
         depth, key, value = left.pop()
@@ -93,7 +93,7 @@ def _check_sizes(tables: dict[str, Any], where: str) -> None:
 
 
 def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
-    """The law tables of a file with the keys that errors call them by; InputError where there is none."""
+    """Return the law tables of a file with their keys in errors; InputError where there is none."""
     if not isinstance(laws, list) or not laws:
         given = "no law" if laws is None else show(laws)
         raise InputError(where, "law", given, "at least one [[law]] table")
@@ -103,8 +103,8 @@ def numbered(laws: Any, where: str) -> list[tuple[str, Any]]:
 def pick_law(
     data: Any, known: Mapping[str, Law], body: str, folder: Path, where: str, key: str
 ) -> tuple[dict[str, Any], Law, str | None]:
-    """A law table with its type, the law of that type or in the `file` of the table, which is relative to a folder, and its
-    form; known: the installed laws for the body of this name."""
+    """Return a law table with its type, the law of that type or from the table's `file`, which is relative to a folder, and
+    its form; known: the installed laws for the body of this name."""
     if not isinstance(data, dict):
         raise InputError(where, key, show(data), "a [[law]] table")
     table = cast(dict[str, Any], data)
@@ -112,7 +112,7 @@ def pick_law(
     table = {name: value for name, value in table.items() if name != "file"} | {"type": law.name}
     form = table.get("form")
     if form is not None and (not isinstance(form, str) or form not in law.forms):
-        allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} takes its gains"
+        allowed = nearest(str(form), list(law.forms)) if law.forms else f"no form; {law.name} needs its gains"
         raise InputError(where, f"{key}.form", show(form), allowed)
     for name in table:
         _refuse_other_way(law, form, name, where, f"{key}.{name}")
@@ -120,7 +120,7 @@ def pick_law(
 
 
 def _refuse_other_way(law: Law, form: str | None, name: str, where: str, key: str) -> None:
-    """InputError for a gain beside a form, and for an input of a form that is absent."""
+    """Raise InputError for a gain beside a form, and for an input without its form."""
     inputs = {way: {item.name: None for item in law.fields(way)} for way in (None, *law.forms)}
     if name in inputs[form]:
         return
@@ -137,7 +137,7 @@ def _law_of(table: dict[str, Any], known: Mapping[str, Law], where: str, key: st
     name = table.get("type")
     if not isinstance(name, str) or name not in known:
         allowed = nearest(name, list(known)) if isinstance(name, str) else f"{nearest('', list(known))}; or a file"
-        allowed = allowed if known else "a file, for no law for this body is installed"
+        allowed = allowed if known else "a file, because no law for this body is installed"
         raise InputError(where, f"{key}.type", show(name) if name is not None else "nothing", allowed)
     return known[name]
 
@@ -153,8 +153,8 @@ def _law_in(table: dict[str, Any], known: Mapping[str, Law], body: str, folder: 
 
 
 def in_file(table: Mapping[str, Any], read: Callable[[Path], _Part], what: str, folder: Path, where: str, key: str) -> _Part:
-    """The law, body or other part (`what` in errors) that `read` finds in the `file` of a raw table, called `key` in errors.
-    InputError where there is none, or its name is none that a file may give."""
+    """Return the law, body or other part (`what` in errors) that `read` finds in the `file` of a raw table, named `key` in
+    errors. InputError where there is none, or where a file may not use its name."""
     given, key = table["file"], f"{key}.file"
     if not isinstance(given, str):
         raise InputError(where, key, show(given), 'the name of a Python file, such as "mine.py"')
@@ -173,7 +173,7 @@ def in_file(table: Mapping[str, Any], read: Callable[[Path], _Part], what: str, 
 
 
 def make_gains(law: Law, values: list[Any], spec: Any, craft: Any, where: str, key: str) -> Any:
-    """The gains themselves, or those that a design gives from its inputs `spec`."""
+    """Return the gains themselves, or those of a design from its inputs `spec`."""
     with refusing(law, where, key):
         return law.gains(*values) if spec is None else law.design(craft, spec)
 
@@ -196,8 +196,8 @@ def refusing(law: Law, where: str, key: str) -> Generator[None]:
 
 
 def try_law(loop: Any, where: str, key: str) -> None:
-    """InputError where the loop's law fails, with the line of its file: it is called once, in plain Python, which goes
-    through all of it."""
+    """Raise InputError where the loop's law fails, with the line of its file: it is called once, in plain Python, which runs
+    every line."""
     law = loop.law
     with refusing(law, where, key):
         carry, setup = loop.carry(), loop.setup()
@@ -209,7 +209,7 @@ def try_law(loop: Any, where: str, key: str) -> None:
         if not isinstance(pair[0], tuple) or len(cast(Any, pair[0])) != 3:
             raise ValueError(f"{law.file.name}: {law.equation} must return three numbers and the memory, not {show(given)}")
         if form(pair[1]) != form(carry.memory):
-            raise ValueError(f"{law.file.name}: the memory that {law.equation} returns must be formed as it was given")
+            raise ValueError(f"{law.file.name}: the memory that {law.equation} returns must have the form of its argument")
 
 
 def refuse_unstable(check: Callable[[], None], where: str, key: str) -> None:
@@ -217,11 +217,11 @@ def refuse_unstable(check: Callable[[], None], where: str, key: str) -> None:
     try:
         check()
     except ValueError as error:
-        raise InputError(where, key, "", f"{error}; --allow-unstable takes it all the same") from None
+        raise InputError(where, key, "", f"{error}; --allow-unstable accepts it all the same") from None
 
 
 def free_name(given: str | None, kind: str, taken: set[str], where: str, key: str) -> str:
-    """The name of a law, its type if none is given; names of a file differ."""
+    """Return the name of a law, by default its type; names in a file differ."""
     if given is None:
         counted = (kind if n == 1 else f"{kind}-{n}" for n in range(1, len(taken) + 2))
         return next(name for name in counted if name not in taken)
@@ -231,12 +231,12 @@ def free_name(given: str | None, kind: str, taken: set[str], where: str, key: st
 
 
 RESOLVED = 0.5
-"""Substeps are at most this part of the shortest time constant: beyond, the classical method of fourth order loses digits,
+"""Substeps are at most this part of the shortest time constant: beyond it the classical fourth-order method loses digits,
 and from 2.8 on it is unstable."""
 
 
 def check_substeps(loop: Any, where: str) -> None:
-    """InputError where the integration cannot follow the fastest of the parts."""
+    """Raise InputError where the integration cannot follow the fastest part."""
     fastest = loop.fastest
     if fastest is None:
         return
@@ -253,8 +253,8 @@ def check_substeps(loop: Any, where: str) -> None:
 def validate(
     model: type[_Model], data: Any, where: str, prefix: str, extra: Iterable[str] = (), context: Any = None
 ) -> _Model:
-    """A table as the model reads it; `extra`: keys that are known besides the model's, `context`: what its validators need.
-    InputError tells the first fault."""
+    """Return a table validated by the model; `extra`: further known keys, `context`: for the model's validators. InputError
+    for the first error."""
     try:
         return model.model_validate(data, context=context)
     except ValidationError as error:
@@ -264,7 +264,7 @@ def validate(
 def _translate(
     error: ValidationError, model: type[BaseModel], data: Any, where: str, prefix: str, extra: list[str]
 ) -> InputError:
-    """The first fault that pydantic reports, in starhold's words."""
+    """Return the first error that pydantic reports, in starhold's words."""
     # Unknown keys first: a misspelt key is the reason that the right one is missing.
     fault = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
     place = [f"[{part + 1}]" if isinstance(part, int) else part for part in fault["loc"]]
@@ -287,7 +287,7 @@ def _translate(
 
 
 def _quoted(part: str) -> str:
-    """A key as TOML writes it where it holds dots or a comma, as the keys of [campaign.over] do."""
+    """Return a key as TOML writes it where it contains dots or a comma, as the keys of [campaign.over] do."""
     return f'"{part}"' if {".", ","} & set(part) else part
 
 
@@ -309,17 +309,17 @@ def _plain(message: str) -> str:
 
 
 def show(value: Any) -> str:
-    """A value as text, short enough for one line."""
+    """Return a value as text, short enough for one line."""
     return cut(f'"{value}"' if isinstance(value, str) else str(value))
 
 
 def cut(text: str, most: int = 60) -> str:
-    """The beginning of a text that is too long for a line."""
+    """Return a text, cut where it is too long for a line."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def nearest(word: str, known: list[str]) -> str:
-    """The new name of a word that is an old one, else the nearest known word, else all of them."""
+    """Return the new name of a renamed word, else the nearest known word, else all of them."""
     if (new := RENAMED.get(word)) in known:
         return f"{new}, its new name"
     near = difflib.get_close_matches(word[:100], known, n=1, cutoff=0.6)

@@ -1,9 +1,7 @@
-"""The interface of distributions: their uniform numbers go in and values come out, so that random, Sobol and Latin hypercube
-samples serve all of them alike.
-
-Parameters stay as the file has them until `read` puts the numbers that they mean for a key in their places. Every `draw`
-takes uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n), each a function of its own column of u
-alone, to the last bit: so a campaign may be cut into chunks anywhere.
+"""The interface of distributions: uniform numbers go in and values come out, so that random, Sobol and Latin hypercube
+samples serve all of them alike. Parameters stay as in the file until `read` replaces them by numbers in the units of a key.
+Every `draw` takes uniforms u (dims, n) strictly between 0 and 1 and returns values (width, n), each a function of its own
+column of u alone, to the last bit: so a campaign may be cut into chunks anywhere.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
 Array: TypeAlias = NDArray[np.float64]
 SYMMETRIC = 1e-9
-"""Difference of a matrix from its transpose, as a share of its largest entry, that counts as none."""
+"""A matrix counts as symmetric if it differs from its transpose by at most this share of its largest entry."""
 DISTRIBUTIONS: dict[str, type[Distribution]] = {}
 """The classes by the names of their distributions."""
 
@@ -32,7 +30,7 @@ class Distribution(Table):
     """One key, or several that are drawn together."""
 
     WORDS: ClassVar[bool] = False
-    """Whether values may be words, truths and dates."""
+    """Whether values may be words, booleans and dates."""
     WHOLE: ClassVar[bool] = False
     """Whether values may be whole numbers."""
     SEVERAL: ClassVar[bool] = False
@@ -41,10 +39,11 @@ class Distribution(Table):
     """Whether values have bounds, whatever the parameters are."""
 
     judged_apart: Annotated[
-        Flag, Field(description="known before flight, as the day of a launch: runs of like values are judged by themselves")
+        Flag,
+        Field(description="known before flight, as the day of a launch: runs of similar values are judged by themselves"),
     ] = False
     known_to_law: Annotated[
-        Flag, Field(description="laws are told each drawn value and designed for it; else for what the file has")
+        Flag, Field(description="laws know each drawn value and are designed for it; else for the file's value")
     ] = False
 
     @classmethod
@@ -54,15 +53,15 @@ class Distribution(Table):
 
     @classmethod
     def named(cls, flag: str) -> str:
-        """The names of distributions that have a flag, as errors list them."""
+        """Return the names of distributions with a flag, as errors list them."""
         return " or ".join(name for name, kind in DISTRIBUTIONS.items() if getattr(kind, flag))
 
     DIMS: ClassVar[int] = 1
-    """The number of uniforms that a draw takes, where it does not depend on the parameters."""
+    """Return the number of uniforms of a draw, where it does not depend on the parameters."""
 
     @property
     def dims(self) -> int:
-        """The number of uniforms that a draw takes."""
+        """The number of uniforms of a draw."""
         return self.DIMS
 
     @property
@@ -72,7 +71,7 @@ class Distribution(Table):
 
     @property
     def independent(self) -> bool:
-        """Whether each uniform moves a number of its own."""
+        """Whether each uniform determines a number of its own."""
         return False
 
     @property
@@ -81,7 +80,7 @@ class Distribution(Table):
         return getattr(self, "relative", False)
 
     def read(self, keys: Sequence[KeyReading]) -> Self:
-        """The distribution with the numbers that its parameters mean for its keys. InputError where they cannot be."""
+        """Return the distribution with its parameters as numbers for its keys. InputError where they are impossible."""
         return self.model_copy(update=self._numbers(*keys))
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
@@ -93,18 +92,19 @@ class Distribution(Table):
         """Return values (width, n) for uniforms (dims, n)."""
 
     def size(self, rows: Sequence[Array]) -> tuple[str, Array] | None:
-        """A name and a function of the drawn numbers (n,), which may matter more than they do; None where there is none."""
+        """A name and a function of the drawn numbers (n,) that may matter more than the numbers themselves, or None."""
         return None
 
 
 class Relative(Distribution):
     """One whose numbers may be shares."""
 
-    relative: Annotated[Flag, Field(description="the numbers are shares of the value that the file has")] = False
+    relative: Annotated[Flag, Field(description="the numbers are shares of the file's value")] = False
 
 
 class Spread(Relative):
-    """One that is drawn for each component on its own, or once for all; each parameter has a number for each, (width,)."""
+    """A distribution that is drawn for each component by itself, or once for all; each parameter has a number for each,
+    (width,)."""
 
     together: Annotated[Flag, Field(description="all components move together, by one draw")] = False
     _width: int = PrivateAttr(1)

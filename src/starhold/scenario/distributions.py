@@ -1,6 +1,6 @@
-"""Distributions of the numbers that runs of a campaign differ in, one class each: its table in a file, how that is read as
-its key asks, and its inverse distribution function. A class whose field `distribution` names it is found by that; nothing
-else has to know of it."""
+"""Distributions of the numbers that differ between runs of a campaign, one class each: its table in a file, how its key's
+values are read, and its inverse distribution function. A class is found by its field `distribution`; no other code names it.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Uniform(Spread):
-    """Every value between two is as likely; whole ones from both ends inclusive."""
+    """The uniform distribution between two values; for whole numbers both ends are included."""
 
     WHOLE = BOUNDED = True
     distribution: Literal["uniform"]
@@ -35,11 +35,11 @@ class Uniform(Spread):
         return _ordered(key, key.numbers("low"), key.numbers("high"))
 
     def draw(self, u: Array) -> Array:
-        """Numbers in proportion to the uniforms."""
+        """Return numbers in proportion to the uniforms."""
         low, high = column(self.low), column(self.high)
         if self._whole:
             return np.minimum(low + np.floor((high - low + 1.0) * u), high)
-        # Rounding may lead beyond an end, which the key may refuse.
+        # Rounding may exceed an end, and the key may refuse that.
         return np.clip(low + (high - low) * u, low, high)
 
 
@@ -47,7 +47,7 @@ class Normal(Spread):
     """Gauss's distribution."""
 
     distribution: Literal["normal"]
-    mean: Annotated[Any, *raw("by default what the file has")] = None
+    mean: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviation")]
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
@@ -59,11 +59,11 @@ class Normal(Spread):
 
 
 class TruncatedNormal(Spread):
-    """Gauss's distribution between two bounds."""
+    """The normal distribution truncated at bounds."""
 
     distribution: Literal["truncated-normal"]
-    mean: Annotated[Any, *raw("of the distribution before it is cut; by default what the file has")] = None
-    sigma: Annotated[Any, *raw("standard deviation before it is cut")]
+    mean: Annotated[Any, *raw("of the distribution before truncation; by default the file's value")] = None
+    sigma: Annotated[Any, *raw("standard deviation before truncation")]
     low: Annotated[Any, *raw("the least value, if there is one")] = None
     high: Annotated[Any, *raw("the greatest value, if there is one")] = None
 
@@ -80,7 +80,9 @@ class TruncatedNormal(Spread):
         given = {"mean": key.centre("mean", checked=False), "sigma": key.sigma(key.unit), **ends}
         if not self.model_copy(update=given).reached:
             name = "high" if self.low is None else "low"
-            raise key.place.refuse(name, show(getattr(self, name)), "an interval that the normal distribution reaches")
+            raise key.place.refuse(
+                name, show(getattr(self, name)), "an interval where the normal distribution has probability"
+            )
         return given
 
     @property
@@ -90,8 +92,8 @@ class TruncatedNormal(Spread):
 
     @cached_property
     def _tails(self) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Whether each is turned about its mean, and the probabilities below its ends when it is. The upper tail's are too
-        near one to be told apart, so an interval there is turned into the lower."""
+        """Return whether each is reflected about its mean, and the probabilities below its ends afterwards. In the upper
+        tail these are too near one to be distinguished, so an interval there is reflected into the lower tail."""
         from scipy.special import ndtr
 
         mean, sigma, low, high = (column(numbers) for numbers in (self.mean, self.sigma, self.low, self.high))
@@ -107,7 +109,7 @@ class TruncatedNormal(Spread):
         return bool((above - below > 0.0).all())
 
     def draw(self, u: Array) -> Array:
-        """Quantiles of the cut distribution."""
+        """Return quantiles of the truncated distribution."""
         turned, below, above = self._tails
         z = ndtri(below + np.where(turned, 1.0 - u, u) * (above - below))
         values = column(self.mean) + column(self.sigma) * np.where(turned, -z, z)
@@ -115,10 +117,10 @@ class TruncatedNormal(Spread):
 
 
 class LogNormal(Spread):
-    """The logarithm has Gauss's distribution."""
+    """The lognormal distribution."""
 
     distribution: Literal["log-normal"]
-    median: Annotated[Any, *raw("by default what the file has")] = None
+    median: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviation of the natural logarithm, no unit")]
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
@@ -134,12 +136,12 @@ class LogNormal(Spread):
 
 
 class Choice(Relative):
-    """One of several values, each a tuple of numbers or a single word, by weights."""
+    """One of several values, each a tuple of numbers or a single word, with weights."""
 
     WORDS = WHOLE = BOUNDED = True
     distribution: Literal["choice"]
-    values: Annotated[list[Any], Field(description="words, truths or numbers")]
-    weights: Annotated[list[Any] | None, Field(description="how likely they are to one another; equally if absent")] = None
+    values: Annotated[list[Any], Field(description="words, booleans or numbers")]
+    weights: Annotated[list[Any] | None, Field(description="relative probabilities; equal if absent")] = None
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
         weights = [1.0] * len(self.values) if self.weights is None else self.weights
@@ -154,7 +156,7 @@ class Choice(Relative):
         return {"values": values, "weights": weights}
 
     def draw(self, u: Array) -> NDArray[Any]:
-        """The value in whose part of the line from 0 to 1 the uniform falls."""
+        """Return the value whose part of the interval from 0 to 1 contains the uniform."""
         ends = np.cumsum(np.array(self.weights, dtype=float))
         return np.array(self.values).T[:, np.searchsorted(ends[:-1] / ends[-1], u[0], side="right")]
 
@@ -165,12 +167,12 @@ class CorrelatedNormal(Relative):
 
     SEVERAL = True
     distribution: Literal["correlated-normal"]
-    mean: Annotated[Any, *raw("by default what the file has")] = None
+    mean: Annotated[Any, *raw("by default the file's value")] = None
     sigma: Annotated[Any, *raw("standard deviations")] = None
     correlation: Annotated[Any, *raw("correlations, a row for each number")] = None
     covariance: Annotated[Any, *raw("covariances (SI), a row for each number, in place of sigma and correlation")] = None
     _factor: Any = PrivateAttr(())
-    """The rows of the lower triangular L with the covariance L L^T."""
+    """Return the rows of the lower triangular L with the covariance L L^T."""
 
     @model_validator(mode="after")
     def _one_matrix(self) -> CorrelatedNormal:
@@ -187,7 +189,7 @@ class CorrelatedNormal(Relative):
         return len(self.mean)
 
     def read(self, keys: Sequence[KeyReading]) -> Self:
-        """The distribution with its numbers; of the vector of one key, or of keys of a number each."""
+        """Return the distribution with its numbers, for the vector of one key, or for keys of one number each."""
         first = keys[0]
         if any(bool(key.place.shape) != (len(keys) == 1) for key in keys):
             allowed = "numbers of several keys, or the vector or matrix of one"
@@ -204,7 +206,7 @@ class CorrelatedNormal(Relative):
         return reading
 
     def _each(self, keys: Sequence[KeyReading], name: str, checked: bool = True) -> tuple[float, ...]:
-        """A number for each of several keys, or for each component of one vector."""
+        """Return a number for each of several keys, or for each component of one vector."""
         if len(keys) == 1:
             return keys[0].numbers(name, checked)
         given = getattr(self, name)
@@ -226,7 +228,8 @@ class CorrelatedNormal(Relative):
 
 
 class Rotations(Distribution):
-    """An attitude, uniform on the rotation group: both signs of each quaternion are as likely, for laws may tell them apart.
+    """An attitude, uniform on the rotation group: both signs of each quaternion are equally likely, because laws may
+    distinguish them.
 
     Source: K. Shoemake, Uniform random rotations, Graphics Gems III (1992): the subgroup algorithm."""
 
@@ -235,12 +238,12 @@ class Rotations(Distribution):
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
         if key.place.shape != (4,):
-            allowed = "another, for these are of an attitude as a quaternion"
+            allowed = "another, because this is for an attitude as a quaternion"
             raise key.place.refuse("distribution", show(self.distribution), allowed)
         return {}
 
     def draw(self, u: Array) -> Array:
-        """A turn about an axis, and a point of the sphere where that is turned to."""
+        """Return a rotation about an axis, then one that takes the axis to a point of the sphere."""
         near, far = np.sqrt(1.0 - u[0]), np.sqrt(u[0])
         first, second = math.tau * u[1], math.tau * u[2]
         return np.stack([far * np.cos(second), near * np.sin(first), near * np.cos(first), far * np.sin(second)])
@@ -260,22 +263,22 @@ class Shell(Relative):
 
     @property
     def shares(self) -> bool:
-        """Never, once shares of a norm have become norms."""
+        """Never, because shares of a norm have become norms."""
         return False
 
     def _numbers(self, key: KeyReading) -> dict[str, Any]:
         if key.place.shape != (3,) or key.place.gain is None or key.place.gain.shape != (3,):
-            raise key.place.refuse("distribution", '"shell"', "another, for this one is of a vector of three numbers")
+            raise key.place.refuse("distribution", '"shell"', "another, because this one is for a vector of three numbers")
         low, high = key.norm("low"), key.norm("high")
         if not 0.0 <= low < high:
             raise key.place.refuse("low", show(self.low), f"from 0 to below high, which is {show(self.high)}")
         size = math.hypot(*key.nominal) if self.relative else 1.0
-        # One direction stands for all.
+        # One direction represents all.
         key.accept([high * size, 0.0, 0.0], "high")
         return {"low": low * size, "high": high * size}
 
     def draw(self, u: Array) -> Array:
-        """A radius by its cube, a height on the unit sphere (Archimedes) and a longitude."""
+        """Draw a radius by its cube, a height on the unit sphere (Archimedes) and a longitude."""
         hollow = (self.low / self.high) ** 3
         radius = np.clip(self.high * np.cbrt(hollow + u[0] * (1.0 - hollow)), self.low, self.high)
         height, longitude = 2.0 * u[1] - 1.0, math.tau * u[2]
@@ -288,14 +291,14 @@ class Shell(Relative):
 
 
 def _ordered(key: KeyReading, low: Sequence[float], high: Sequence[float]) -> dict[str, Any]:
-    """Ends by name. InputError where the lower is not below the upper."""
+    """Return the ends by name. InputError where the lower is not below the upper."""
     if not all(a < b for a, b in zip(low, high, strict=True)):
         raise key.place.refuse("low", show(key.table.low), f"below high, which is {show(key.table.high)}")
     return {"low": low, "high": high}
 
 
 def _positive(key: KeyReading, given: Any, size: int, name: str) -> Array:
-    """A matrix of correlations or covariances. InputError where it is none."""
+    """Return a matrix of correlations or covariances. InputError where it is not one."""
     allowed = f"{size} rows of {size} plain numbers"
     try:
         matrix = np.array(given, dtype=float)
@@ -307,7 +310,7 @@ def _positive(key: KeyReading, given: Any, size: int, name: str) -> Array:
         raise key.place.refuse(name, show(given), "a symmetric matrix")
     if name == "correlation" and np.abs(np.diagonal(matrix) - 1.0).max() > SYMMETRIC:
         raise key.place.refuse(name, show(given), "ones on the diagonal")
-    # Scaled to correlations, for covariances may be of many units.
+    # Scaled to correlations, because covariances may have various units.
     size_of = np.sqrt(np.abs(np.diagonal(matrix)))
     with np.errstate(all="ignore"):
         scaled = matrix / np.outer(size_of, size_of)
@@ -329,11 +332,11 @@ def _read(given: Any) -> Distribution:
     try:
         return validate(DISTRIBUTIONS[name], dict(table), "", "")
     except InputError as error:
-        # Told again by the table around, which knows the rest of the key.
+        # Raised again by the enclosing table, which knows the rest of the key.
         raise told_at(error.key, error.given, error.allowed) from None
 
 
 Dispersed: TypeAlias = Annotated[
     Any, BeforeValidator(_read), WithJsonSchema({"anyOf": [table.model_json_schema() for table in DISTRIBUTIONS.values()]})
 ]
-"""The table of one dispersion, by its distribution."""
+"""Return the table of one dispersion, by its distribution."""

@@ -1,4 +1,4 @@
-"""The JSON Schema of scenario files, with laws and parts as they are installed."""
+"""The JSON Schema of scenario files, with the installed laws and parts."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from starhold.scenario.schema import LawTable, law_model
 
 
 def json_schema() -> dict[str, Any]:
-    """A JSON Schema of scenario files of every body, for completion and checks in editors."""
+    """Return a JSON Schema of scenario files of every body, for completion and checks in editors."""
     known = [_file_schema(body) for body in (*bodies().values(), *others())]
     shared: dict[str, Any] = {}
     for schema in known:
@@ -20,7 +20,8 @@ def json_schema() -> dict[str, Any]:
 
 
 def _file_schema(body: Body) -> dict[str, Any]:
-    """A JSON Schema of the files of one body: its tables, those of its laws, gains and design forms, and of its parts."""
+    """Return a JSON Schema of the files of one body: its tables, those of its laws, gains and design forms, and of its
+    parts."""
     base = body.law_table
     schema = body.tables.model_json_schema()
     known = schema.setdefault("$defs", {})
@@ -42,8 +43,8 @@ def _file_schema(body: Body) -> dict[str, Any]:
 
 
 def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> list[dict[str, Any]]:
-    """JSON Schemas of the tables of all laws for a body, and of one from a file, with what `base` has beside the gains;
-    their definitions go to the known ones."""
+    """Return JSON Schemas of the tables of all laws for a body, and of a law from a file, with the keys of `base` beside the
+    gains; add their definitions to the known ones."""
     tables: list[dict[str, Any]] = []
     for model in (
         law_model(law, form, base, tuple(body.tables.SHARED)) for law in body.laws().values() for form in (None, *law.forms)

@@ -1,4 +1,4 @@
-"""The table of one key's dispersion, and the numbers that it means for the key."""
+"""The table of one key's dispersion, read as numbers for the key."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Numbers: TypeAlias = tuple[float, ...]
 
 
 def components(shape: tuple[int, ...], symmetric: bool = False) -> list[tuple[int, ...]]:
-    """The indices of the numbers of an array, row by row; of a symmetric one those on and above the diagonal."""
+    """Return the indices of the numbers of an array, row by row; for a symmetric one those on and above the diagonal."""
     every = [tuple(map(int, index)) for index in np.ndindex(shape)]
     return [index for index in every if index[0] <= index[1]] if symmetric else every
 
@@ -30,12 +30,12 @@ class KeyReading:
     place: Place
     table: Any
     index: tuple[tuple[int, ...], ...]
-    """The components that are drawn have these indices."""
+    """The indices of the drawn components."""
     relative: bool
 
     @staticmethod
     def of(scenario: Scenario, place: Place, table: Any) -> KeyReading:
-        """InputError where values of the distribution cannot be such a key's."""
+        """Raise InputError where such a key cannot have values of the distribution."""
         relative, value = getattr(table, "relative", False), place.value
         for holds, flag, what in (
             (place.wordy, "WORDS", "a word"),
@@ -43,10 +43,10 @@ class KeyReading:
             (place.gain == EPOCH, "WORDS", "a date"),
         ):
             if holds and not getattr(table, flag):
-                allowed = f"{Distribution.named(flag)}, for the key holds {what}"
+                allowed = f"{Distribution.named(flag)}, because the key holds {what}"
                 raise place.refuse("distribution", show(table.distribution), allowed)
         if relative and (place.wordy or place.whole):
-            raise place.refuse("relative", "true", "false, for the key holds a word or a whole number")
+            raise place.refuse("relative", "true", "false, because the key holds a word or a whole number")
         if relative and (value is None or not np.isfinite(value).all() or not np.any(value)):
             raise place.refuse("relative", "true", f"false, for there are no shares of {_shown(value)}")
         index = components(place.shape, symmetric=is_symmetric(place))
@@ -64,41 +64,41 @@ class KeyReading:
 
     @property
     def nominal(self) -> tuple[Any, ...]:
-        """The numbers or the word that the file has, by component; NaN where it has none."""
+        """The numbers or the word of the file, by component; NaN where it has none."""
         value = self.place.value
         if self.place.wordy:
             return (word(value),)
         return self.picked(np.full(self.place.shape, np.nan) if value is None else value)
 
     def picked(self, array: Any) -> Numbers:
-        """The components that are drawn, of an array of the key's shape."""
+        """Return the drawn components of an array of the key's shape."""
         full = np.asarray(array, dtype=float)
         return tuple(float(full[item]) for item in self.index)
 
     def centre(self, name: str, checked: bool = True) -> Numbers:
-        """A mean or a median, by default what the file has."""
+        """Return a mean or a median, by default the file's value."""
         value = self.place.value
         if getattr(self.table, name) is not None:
             return self.numbers(name, checked)
         if not self.relative and (value is None or not np.isfinite(value).all()):
-            raise self.place.refuse(name, "nothing", f"a value, for the file has {_shown(value)}")
+            raise self.place.refuse(name, "nothing", f"a value, because the file has {_shown(value)}")
         return (1.0,) * len(self.index) if self.relative else self.nominal
 
     def numbers(self, name: str, checked: bool = True) -> Numbers:
-        """The numbers of a parameter in the key's unit, or as shares; `checked`: whether the key must take them. InputError
-        where it does not."""
+        """Return the numbers of a parameter in the key's unit, or as shares; `checked`: whether the key must accept them.
+        InputError where it does not."""
         return self.read(getattr(self.table, name), name, checked)
 
     def norm(self, name: str) -> float:
-        """The number of a parameter that is of a whole vector."""
+        """Return the number of a parameter of a whole vector."""
         return float(width_at(replace(self.place, shape=()), getattr(self.table, name), name, self.unit))
 
     def accept(self, value: Any, name: str) -> Any:
-        """The validated form of a value. InputError, which calls it by a name, where the key does not take it."""
+        """Return the validated form of a value. InputError, with this name, where the key does not accept it."""
         return accepted(self.scenario, self.place, value, name)
 
     def read(self, raw: Any, name: str, checked: bool = True) -> tuple[Any, ...]:
-        """The numbers, or the word, that a raw value means, which errors call by a name; `checked` as of `numbers`."""
+        """Return the numbers, or the word, of a raw value with this name in errors; `checked` as in `numbers`."""
         if self.place.wordy:
             return (word(self.accept(raw, name)),)
         if self.place.gain == EPOCH and isinstance(raw, str):
@@ -112,7 +112,8 @@ class KeyReading:
         return self.picked(read)
 
     def sigma(self, unit: str | None) -> Numbers:
-        """Standard deviations in a unit, None for the key's. InputError where one is negative, or nothing is dispersed."""
+        """Return standard deviations in a unit, None for the key's. InputError where one is negative, or nothing is
+        dispersed."""
         raw, scale = self.table.sigma, self.nominal if self.relative else (1.0,) * len(self.index)
         widths = self.picked(width_at(self.place, raw, "sigma", unit))
         if min(widths) < 0.0 or not any(share * size for share, size in zip(widths, scale, strict=True)):

@@ -1,4 +1,4 @@
-"""Changed scenarios and tables from Python are written as TOML and read as a file is, so that both mean the same."""
+"""Writes changed scenarios and tables from Python as TOML and reads them like a file, so that both mean the same."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _PART = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """The scenario with other values at these keys, named as errors name them, "spacecraft.inertia" or "law[2].k_rate",
-    and for laws and parts by their names too, "law.pd.k_rate"; None removes a key, a table or a law."""
+    """Return the scenario with other values at these keys, with their names in errors, "spacecraft.inertia" or
+    "law[2].k_rate", and for laws and parts also by name, "law.pd.k_rate"; None removes a key, a table or a law."""
     return next(variants(scenario, [changes]))
 
 
 def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[Scenario]:
-    """The scenario changed in one way after the other; errors name the change."""
+    """Yield the scenario with each change in turn; errors name the change."""
     names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
     tables = read_toml(scenario.text, scenario.where)
     for change in changes:
-        # As short as one line allows: of many changes the first.
+        # Short enough for one line: only the first of many changes.
         described = ", ".join(f"{key} = {show(value)}" for key, value in list(change.items())[:4])
         described = " ".join(described.split()).encode(errors="backslashreplace").decode()
         where = f"{scenario.where} with {described}" if described else scenario.where
@@ -46,13 +46,13 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
 
 
 def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str | int]:
-    """The path of a key as `with_` takes it: names of tables and keys, and places in lists from 0; `names`: those of laws
-    and parts, by the arrays of their tables. InputError where it is no key."""
+    """Return the path of a key of `with_`: names of tables and keys, and indices in lists from 0; `names`: those of laws and
+    parts, by the arrays of their tables. InputError where it is not a key."""
     if not isinstance(key, str):
-        raise InputError(where, show(key), "a key that is no string", 'keys such as "spacecraft.inertia"')
+        raise InputError(where, show(key), "a key that is not a string", 'keys such as "spacecraft.inertia"')
     array, dot, rest = key.partition(".")
     if dot and array in names:
-        # The longest first: names may hold dots.
+        # The longest first, because names may contain dots.
         for name in sorted(names[array], key=len, reverse=True):
             if rest == name or rest.startswith(f"{name}."):
                 after = rest[len(name) + 1 :]
@@ -69,7 +69,7 @@ def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[st
 
 
 def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, validated: Any) -> None:
-    """Put a value into raw tables; validated: those whose defaults stand for vectors that the file leaves out."""
+    """Put a value into raw tables; validated: tables whose defaults supply vectors that the file leaves out."""
     here: Any = tables
     seen = ""
     for part, after in zip(path, [*path[1:], None], strict=True):
@@ -83,7 +83,7 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, validat
         else:
             seen = f"{seen}.{part}".lstrip(".")
             if not isinstance(here, dict):
-                raise InputError(where, seen, "a value that is no table", "keys of tables")
+                raise InputError(where, seen, "a value that is not a table", "keys of tables")
             validated = getattr(validated, part, None)
             if not last:
                 known = list(cast(Any, validated)) if isinstance(validated, tuple) else []
@@ -95,7 +95,7 @@ def _put(tables: Any, path: Sequence[str | int], value: Any, where: str, validat
 
 
 def plain(value: Any, where: str, key: str) -> Any:
-    """The value in types that TOML has; InputError where it has none of them."""
+    """Return the value in types of TOML; InputError where that is impossible."""
     # Without the module loaded there is no rotation.
     transform: Any = sys.modules.get("scipy.spatial.transform")
     if transform is not None and isinstance(value, transform.Rotation):
@@ -119,4 +119,4 @@ def plain(value: Any, where: str, key: str) -> Any:
     if isinstance(value, list | tuple):
         items = list(cast(Sequence[Any], value))
         return [plain(item, where, f"{key}[{n}]") for n, item in enumerate(items, 1) if item is not None]
-    raise InputError(where, key, show(value), "numbers, strings, truths, dates, rotations, and lists and tables of them")
+    raise InputError(where, key, show(value), "numbers, strings, booleans, dates, rotations, and lists and tables of them")

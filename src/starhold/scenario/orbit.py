@@ -1,4 +1,4 @@
-"""The table of an orbit, by position and velocity or by elements, and the orbits that are refused."""
+"""The table of an orbit, by position and velocity or by elements, and the checks that refuse one."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from starhold.scenario.tables import Table, at_key, refuse
 DENSEST = 1e6
 """Mean density (kg/m3) above which a start lies inside the central body; planets have less than 6000."""
 LOWEST = 1.0 / 64.0
-"""Plain altitudes below this share of the body's radius need a unit: about the Earth, below 100 km."""
+"""Plain altitudes below this share of the body's radius need a unit: for the Earth, below 100 km."""
 AIR = 5e4
-"""Altitude (m) below which nothing circles the Earth; that of any orbit up to the geostationary one, a thousand times too
-small, lies below."""
+"""Altitude (m) below which nothing orbits the Earth; any altitude up to geostationary, a thousand times too small, is below
+it."""
 FASTEST = 10.0
-"""Speed over that of escape from the Sun, a planet or the Moon beyond which a unit is taken to be wrong."""
+"""The ratio of speed to the escape speed of the Sun, a planet or the Moon above which the unit is taken to be wrong."""
 STRAIGHT = 1e-9
-"""Sine of the angle between position and velocity at which a path is taken for one through the centre."""
+"""The sine of the angle between position and velocity below which a path is taken to pass through the centre."""
 ANGLE_UP = Gain("rad", at_least=0.0, at_most=math.pi, text="of the orbit's plane against the first two axes")
 ANGLES = ("inclination", "raan", "argument_of_perigee", "true_anomaly")
 
 
 def too_dense(gravity: float, distance: float) -> bool:
-    """Whether no body with this gravitational parameter (m3/s2) is small enough for an orbit at this distance (m)."""
+    """Return whether any body with this gravitational parameter (m3/s2) is too large for an orbit at this distance (m)."""
     return gravity > DENSEST * NEWTON * 4.0 / 3.0 * math.pi * distance**3
 
 
 def check_gravity(key: str, gravity: float) -> None:
-    """An error where a gravitational parameter is a known body's in km^3/s^2."""
+    """Raise an error where a gravitational parameter is a known body's in km^3/s^2."""
     meant = body_of(1e9 * gravity)
     if meant is not None:
         raise at_key(key, f'm^3/s^2; that of the {meant} is "{gravity:.10g} km^3/s^2"', gravity)
@@ -66,7 +66,7 @@ EPOCH_KEY = (
                     "description": "year, month, day, hour, minute, second",
                 },
             ],
-            "description": "when the flight begins, for all parts that know the Sun or the turn of the Earth; "
+            "description": "when the flight begins, for all parts that use the Sun or the Earth's rotation; "
             f"{START[0]:.0f} January 1 if absent (UTC)",
         }
     ),
@@ -105,7 +105,8 @@ class Orbit(Table):
     ] = None
     gravitational_parameter: Annotated[float, *quantity(Gain("m^3/s^2", above=0.0, text="of the central body"))] = EARTH
     radius: Annotated[
-        float | None, *quantity(Gain("m", above=0.0, text="of the central body; known of the Sun, the planets and the Moon"))
+        float | None,
+        *quantity(Gain("m", above=0.0, text="of the central body; known for the Sun, the planets and the Moon")),
     ] = None
 
     epoch: Annotated[Any, *EPOCH_KEY] = None
@@ -154,13 +155,13 @@ class Orbit(Table):
             allowed = "position and velocity, or either altitude or semi_major_axis, with inclination"
             raise at_key(sizes[-1] if sizes else "position", allowed, getattr(self, sizes[-1]) if sizes else None)
         elif self.inclination is None:
-            raise at_key("inclination", "an angle, beside altitude or semi_major_axis", None)
+            raise at_key("inclination", "an angle, together with altitude or semi_major_axis", None)
         elif self.altitude is not None and self.eccentricity:
             raise at_key(
-                "eccentricity", "0 with an altitude, which is that of a circle; else a semi_major_axis", self.eccentricity
+                "eccentricity", "0 with an altitude, which means a circle; else a semi_major_axis", self.eccentricity
             )
         elif self.altitude is not None and self.surface is None:
-            raise at_key("radius", "the radius of the body that the altitude counts from", None)
+            raise at_key("radius", "the radius of the body above which the altitude is measured", None)
         return self
 
     @model_validator(mode="after")
@@ -181,10 +182,10 @@ class Orbit(Table):
             allowed = f"a start above the {name}'s radius of {1e-3 * self.surface:g} km; a plain number is in m"
             raise at_key(key, allowed, value)
         if too_dense(gravity, distance):
-            allowed = "a start that is not inside what it orbits; plain numbers are in m, GM in m^3/s^2"
+            allowed = "a start outside the central body; plain numbers are in m, GM in m^3/s^2"
             raise at_key(key, allowed, value)
         if norm(cross(position, velocity)) <= STRAIGHT * distance * fast:
-            raise at_key("velocity", "an orbit that passes beside the centre of attraction, not through it", list(velocity))
+            raise at_key("velocity", "an orbit that does not pass through the centre of attraction", list(velocity))
         return self
 
     def check_flight(self, duration: float) -> None:

@@ -1,5 +1,4 @@
-"""The [[part]] tables of a scenario are read: parts of any role that stand in a file of their own, here or in another
-package."""
+"""Reads the [[part]] tables of a scenario: parts of any role, each in a file of its own, here or in another package."""
 
 import csv
 from collections.abc import Mapping
@@ -28,28 +27,28 @@ from starhold.scenario.checking import free_name, in_file, nearest, show, try_la
 from starhold.scenario.schema import columns
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
-ONE = "one of each, or an estimator that takes them all"
+ONE = "one of each, or an estimator that fuses them all"
 ROLES = tuple(role for role in PACKAGES if role != "body")
-"""Roles of parts that stand in [[part]] tables; a law has its own, and so has the body."""
+"""Roles of parts in [[part]] tables; laws and bodies have tables of their own."""
 SINGLE = {"estimator": "one estimator", "target": "one target"}
-"""Roles that only one part of a loop plays."""
+"""Roles that only one part of a loop may have."""
 
 
 class PartTable(Table):
     """The keys of a part's table beside the part's own parameters."""
 
     type: str
-    name: Annotated[Name | None, Field(description="how recordings and errors call it; the type if absent")] = None
+    name: Annotated[Name | None, Field(description="its name in recordings and errors; the type if absent")] = None
 
 
 def installed() -> dict[str, Part]:
-    """The parts that may stand in [[part]] tables, by name."""
+    """Return the parts that [[part]] tables may name, by name."""
     return {name: part for role in ROLES for name, part in parts(role).items() if not part.table}
 
 
 @cache
 def part_model(part: Part, shared: tuple[str, ...]) -> type[Any]:
-    """The table of a part; shared: keys of the scenario that give parameters in its place."""
+    """Return the table of a part; shared: keys of the scenario that give parameters in its place."""
     entries: dict[str, Any] = {"type": (Literal[part.name], part.name), **columns(own_fields(part.fields(), shared))}
     title = part.name.replace("-", " ").title().replace(" ", "")
     return create_model(title, __base__=PartTable, __doc__=part.card.summary, **entries)
@@ -58,9 +57,9 @@ def part_model(part: Part, shared: tuple[str, ...]) -> type[Any]:
 def read_parts(
     tables: Any, body: str, folder: Path, where: str, shared: Mapping[str, Any], units: Any = None
 ) -> tuple[Fitted, ...]:
-    """The parts of the [[part]] tables of a file, for a body; file names in them are relative to a folder; shared: the
-    values that the file gives to all parts; units: of a body whose numbers are scaled. InputError for the first that is
-    wrong in itself; `check_fit` looks at all of them together."""
+    """Return the parts of a file's [[part]] tables, for a body; file names in them are relative to a folder; shared: the
+    values that the file gives to all parts; units: of a body whose numbers are scaled. InputError for the first invalid
+    table; `check_fit` checks all parts together."""
     if tables is None:
         return ()
     if not isinstance(tables, list):
@@ -79,7 +78,7 @@ def read_parts(
 def read_part(
     table: dict[str, Any], body: str, folder: Path, where: str, key: str, shared: Mapping[str, Any], units: Any = None
 ) -> Fitted:
-    """The part of a raw table, called `key` in errors, under the name that this gives, if any."""
+    """Return the part of a raw table, named `key` in errors, with the name from the table, if any."""
     part = in_file(table, _read, "part", folder, where, key) if "file" in table else _of_type(table, where, key)
     if part.body not in ("", body):
         raise InputError(where, key, f"{part.name}, for the body {part.body}", f"a part for {body}")
@@ -91,7 +90,7 @@ def read_part(
 
 
 def params_of(part: Part, read: Any, shared: Mapping[str, Any]) -> Any:
-    """The parameters of a part from its validated table, and from the values that the scenario gives to all parts."""
+    """Return the parameters of a part from its validated table, and from the values that the scenario gives to all parts."""
     values = values_of(part.fields(), read, shared)
     return part.params(**{name: value for name, value in values.items() if value is not None})
 
@@ -115,7 +114,7 @@ def _read(path: Path) -> Part:
 
 
 def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: str) -> dict[str, Any]:
-    """The table with the rows of CSV files in place of their names."""
+    """Return the table with the rows of CSV files in place of their names."""
     filled = dict(table)
     for item in part.fields():
         given = table.get(item.name)
@@ -146,7 +145,7 @@ def csv_lines(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def number_in(text: str) -> float | None:
-    """The number that a cell of a CSV file holds; None for words."""
+    """Return the number in a cell of a CSV file; None for words."""
     try:
         return float(text)
     except ValueError:
@@ -154,7 +153,7 @@ def number_in(text: str) -> float | None:
 
 
 def check_fit(loop: ClosedLoop, where: str) -> None:
-    """InputError where the parts of a loop do not go together."""
+    """Raise InputError where the parts of a loop do not fit together."""
     fitted = loop.parts
     for role, most in SINGLE.items():
         used = loop.used(role)
@@ -172,7 +171,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         about = one.part.about
         if about and body_of(loop.craft.gravity) != about:
             given = f"an orbit about {body_of(loop.craft.gravity) or 'an unknown body'}"
-            raise InputError(where, _key(one), given, f"one about {about}, the body of its model")
+            raise InputError(where, _key(one), given, f"an orbit about {about}, the body of its model")
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
             if need not in {*readings, CLOCK}:
@@ -181,7 +180,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
     switched = next((f for f in _acting(loop) if f.part.hook("switch") is not None), None)
     if late is not None and switched is not None:
-        allowed = f"none before {switched.called}, which takes the command at control instants alone"
+        allowed = f"none before {switched.called}, which reads the command only at control instants"
         raise InputError(where, _key(late), "an actuator whose output moves between control instants", allowed)
     if loop.used("effector") and "rate" not in loop.body.module.State._fields:
         raise InputError(
@@ -217,7 +216,7 @@ def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
         for name in sensor.part.module.Reading._fields:
             if name in sensors and name in single:
                 given = f"a second sensor of {name}, beside {sensors[name][0]}"
-                raise InputError(where, _key(sensor), given, "one of each, or an estimator that takes them all")
+                raise InputError(where, _key(sensor), given, "one of each, or an estimator that fuses them all")
             sensors.setdefault(name, []).append(sensor.called)
     for estimator in loop.used("estimator"):
         for name, key in several.items():
@@ -231,31 +230,31 @@ def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
 
 
 def _measuring(reading: str) -> str:
-    """A sensor of a reading, with examples among the installed ones."""
+    """Describe a sensor of a reading, with installed examples."""
     known = [name for name, part in parts("sensor").items() if reading in part.module.Reading._fields and not part.table]
     return f"a sensor that measures {reading}{', such as ' * bool(known)}{' or '.join(known)}"
 
 
 def _acting(loop: ClosedLoop) -> list[Fitted]:
-    """The effectors that take the command, in one mode or another."""
+    """Return the effectors that take the command, in any mode."""
     return [f for f in loop.used("effector") if f.part.flag("ACTS")]
 
 
 def _check_effectors(loop: ClosedLoop, where: str) -> None:
-    """InputError where not one effector takes the command, of those that a mode has where the law is made of modes."""
+    """Raise InputError unless exactly one effector takes the command, in each mode of a law made of modes."""
     acting, known = _acting(loop), [f.part.name for f in loop.used("effector") if can_be_inactive(f.part)]
     module: Any = loop.law.module
     if not isinstance(module, Modes):
         if len(acting) > 1:
             given = f"a second effector for the command, beside {acting[0].called}"
-            raise InputError(where, _key(acting[1]), given, 'one, or a law of type "modes" whose modes say which')
+            raise InputError(where, _key(acting[1]), given, 'one, or a law of type "modes" whose modes name theirs')
         _check_outside(loop.law, acting, where, f"law {loop.law.name}")
         return
     for mode in module.modes:
         key = f"law {loop.law.name}, mode {mode.name}: effectors"
         for name in mode.effectors or ():
             if name not in known:
-                raise InputError(where, key, show(name), nearest(name, known) if known else "no effector is there to name")
+                raise InputError(where, key, show(name), nearest(name, known) if known else "no effector can be named")
         working = [f.called for f in acting if mode.has(f.part.name)]
         if len(working) > 1:
             raise InputError(where, key, f"{' and '.join(working)}, which both take the command", "one of them")
@@ -267,9 +266,9 @@ def _check_effectors(loop: ClosedLoop, where: str) -> None:
 
 
 def _check_outside(law: Law, acting: list[Fitted], where: str, key: str) -> None:
-    """InputError where a law's torque has to come from outside, and an effector would only shift momentum."""
+    """Raise InputError where a law's torque must be external, and an effector would only exchange momentum."""
     if law.flag("FROM_OUTSIDE") and acting and not acting[0].part.flag("OUTSIDE"):
-        given = f"{law.name} with {acting[0].called}, which keep the momentum that it is to take away"
+        given = f"{law.name} with {acting[0].called}, which keep the momentum that it is to remove"
         raise InputError(where, key, given, "magnetorquers, another effector that acts from outside, or none")
 
 
@@ -278,8 +277,8 @@ def _key(fitted: Fitted) -> str:
 
 
 def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
-    """InputError where a part cannot work with its numbers, or a part's file fails: a control step is flown in plain Python,
-    which goes through all of it. `key`: what errors call the law."""
+    """Raise InputError where a part cannot work with its numbers, or a part's file fails: a control step is flown in plain
+    Python, which runs every line. `key`: the law's name in errors."""
     crafts = (loop.craft, *(event.craft for event in loop.events))
     for fitted in loop.parts:
         own_file = fitted.part.file is not None
@@ -298,7 +297,7 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
         return
     tried = replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))
     try:
-        # The step is not cached, for it is flown once.
+        # The step is not cached, because it is flown once.
         step, carry, setup = make_equations(tried.composition()), tried.carry(), tried.setup()
         for number in range(2):
             carry = step.update(carry, number, (loop.seed, 0), loop.gains, loop.known, setup)
@@ -309,21 +308,22 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
     except BaseException as error:
         if is_interrupt(error):
             raise
-        # The law's own file may be at fault; else a part's result does not fit where it is used.
+        # Either the law's own file is at fault, or a part's result does not fit where it is used.
         try_law(loop, where, key)
         guilty = next(f for f in loop.parts if f.part.file is not None)
-        allowed = "its equations must return states formed as those they are given"
+        allowed = "its equations must return states of the form of their arguments"
         raise InputError(where, _key(guilty), "", allowed) from None
 
 
 def _watched(fitted: Fitted, loop: ClosedLoop, where: str) -> Fitted:
-    """A part from a file whose every equation is checked when it is called."""
+    """Return a part from a file with every equation checked when it is called."""
     module: Any = _Watched(fitted, loop.start, where)
     return replace(fitted, part=replace(fitted.part, module=module))
 
 
 class _Watched:
-    """The module of a part from a file, whose equations raise InputError where they fail or break their role's contract."""
+    """Return the module of a part from a file, whose equations raise InputError where they fail or break their role's
+    contract."""
 
     def __init__(self, fitted: Fitted, state: Any, where: str) -> None:
         self._fitted, self._state, self._where = fitted, state, where
@@ -349,7 +349,7 @@ class _Watched:
         return called
 
     def _wrong(self, part: Part, name: str, result: Any, given: Any) -> str:
-        """Return words for the result that the equation should have, where it does not have it."""
+        """Describe the result that the equation should return, where it does not."""
         if name in VECTORS.get(part.role, ()):
             return "" if _alike(result, ZERO) else "three numbers"
         if (part.role, name) == ("effector", "inertia"):
@@ -358,7 +358,7 @@ class _Watched:
             like = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
             return "" if isinstance(result, Goal) and _alike(result, like) else "a Goal of four, three and three numbers"
         if (part.role, name) in (("effector", "rates"), ("effector", "switch"), ("environment", "update")):
-            return "" if _alike(result, given[0], name == "rates") else "numbers formed as those of the first argument"
+            return "" if _alike(result, given[0], name == "rates") else "numbers in the form of the first argument"
         if name == "record":
             return _undeclared(type(result))
         if name not in ("measure", "estimate"):
@@ -367,10 +367,10 @@ class _Watched:
         if not (isinstance(result, tuple) and len(cast(Any, result)) == 2 and isinstance(result[0], kind)):
             return f"a pair of a {kind.__name__} and the memory"
         if not _alike(result[1], given[1]):
-            return "a memory formed as the one that it is given"
+            return "a memory in the form of the one passed in"
         for item, value in cast(Any, result[0])._asdict().items():
             if item in self._state._fields and not _alike(value, getattr(self._state, item)):
-                return f"{item} formed as that of the body's state"
+                return f"{item} in the form of the body's state"
         return _undeclared(kind) if name == "estimate" or is_recorded(part) else ""
 
 
@@ -379,11 +379,11 @@ VECTORS = {
     "effector": ("reaction", "momentum", "applied"),
     "actuator": ("command", "rates"),
 }
-"""Equations that give three numbers."""
+"""Equations that return three numbers."""
 
 
 def _undeclared(kind: Any) -> str:
-    """Return words for what recordings need and a kind of tuple lacks."""
+    """Describe what recordings need and a kind of tuple lacks."""
     try:
         quantities(kind)
     except Exception:
@@ -392,7 +392,7 @@ def _undeclared(kind: Any) -> str:
 
 
 def _alike(one: Any, other: Any, still: bool = False) -> bool:
-    """Whether two states have one form; still: None in the first stands for what does not change."""
+    """Return whether two states have the same form; still: None in the first means unchanged."""
     if still and one is None:
         return True
     if isinstance(one, tuple):
@@ -402,8 +402,8 @@ def _alike(one: Any, other: Any, still: bool = False) -> bool:
 
 
 def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
-    """JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file; shared:
-    keys of its scenarios that give parameters to all parts."""
+    """Return JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file;
+    shared: keys of its scenarios that give parameters to all parts."""
     schemas = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
     for table in schemas:
         table["required"] = sorted({"type", *table.get("required", [])})

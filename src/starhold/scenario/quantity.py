@@ -14,11 +14,11 @@ from starhold.scenario.tables import refuse
 from starhold.scenario.units import shown, to_either, to_number
 
 LEAST, MOST = 1e-30, 1e30
-"""Sizes of quantities that files may hold, beside zero; of a vector or matrix the size of its largest entry."""
+"""The least and the greatest size of nonzero quantities in files; for a vector or matrix the size of its largest entry."""
 PLAIN = {"rad": (math.tau, "deg"), "T": (1e-3, "nT"), "T/sqrt(Hz)": (1e-6, "nT/sqrt(Hz)")}
-"""By unit: the largest plain number that is taken, and the unit that a larger one may be meant in."""
+"""By unit: the largest plain number that is accepted, and the unit that was probably meant with a larger one."""
 MOST_WHOLE = 2**53
-"""Up to here floats hold every whole number."""
+"""Up to this size floats represent every whole number."""
 
 
 Annotations: TypeAlias = tuple[BeforeValidator, WithJsonSchema, Gain]
@@ -36,7 +36,7 @@ def declared(field: FieldInfo) -> Gain | None:
 
 
 def quantity_or(word: str, meaning: float, gain: Gain) -> Annotations:
-    """The annotations for a quantity in whose place a word may stand."""
+    """The annotations for a quantity or a word in its place."""
     read, schema = reader(gain), _schema(gain)
     described = {"anyOf": [{"const": word}, *schema["anyOf"]], "description": schema["description"]}
     return BeforeValidator(lambda value: meaning if value == word else read(value)), WithJsonSchema(described), gain
@@ -54,7 +54,7 @@ def raw(text: str) -> tuple[BeforeValidator, WithJsonSchema]:
 
 
 def _raw(value: Any) -> Any:
-    """The value, if it is what may stand for a number or numbers of another key."""
+    """Return the value, if it may represent a number or numbers of another key."""
     if isinstance(value, list | tuple):
         return [_raw(item) for item in cast(list[Any], value)]
     if isinstance(value, bool) or not isinstance(value, int | float | str):
@@ -74,8 +74,8 @@ def any_quantity(gain: Gain) -> Annotations:
 
 
 def scaled(kind: Literal["length", "velocity", "acceleration", "time", "rate"], gain: Gain) -> Annotations:
-    """The annotations for scaled numbers: plain ones are scaled, strings with the gain's unit become so. The SI value
-    of one unit stands in the validation's context, under the name of its kind; the bounds are of scaled numbers."""
+    """The annotations for scaled numbers: plain ones are scaled already, strings with the gain's unit are converted. The SI
+    value of one unit is in the validation's context, under the name of its kind; the bounds apply to scaled numbers."""
     read, schema = reader(gain), _schema(gain)
     schema["description"] = f"{gain.text} (scaled, or with a unit such as {gain.unit})"
 
@@ -130,17 +130,17 @@ def _to_numbers(value: Any, gain: Gain, worth: float) -> Any:
 
 
 def plain(gain: Gain) -> tuple[float, str]:
-    """The largest plain number that is taken, and the unit that a larger one may be meant in."""
+    """Return the largest plain number that is accepted, and the unit that was probably meant with a larger one."""
     return gain.plain or PLAIN.get(gain.unit, (math.inf, ""))
 
 
 def ask_for_unit(value: float, unit: str, within: str, other: str) -> str:
-    """The text that asks for the unit of a plain number far from any of its kind; other: the unit that may be meant."""
+    """Return the text that asks for the unit of an implausible plain number; other: the unit probably meant."""
     return f'a plain number is in {unit}, {within}; with a unit it is "{value:g} {other}" or "{value:g} {unit}"'
 
 
 def _check_size(value: Any) -> None:
-    """ValueError for numbers whose powers overflow or vanish, which are no sizes of anything that flies."""
+    """Raise ValueError for numbers whose powers overflow or underflow, which no flying craft has."""
     size = float(np.max(np.abs(np.asarray(value, dtype=float))))
     if math.isfinite(size) and size and not LEAST <= size <= MOST:
         raise ValueError(f"0, or between {LEAST:g} and {MOST:g} in size")

@@ -1,4 +1,4 @@
-"""A scenario file is read; every error in it is reported in one line."""
+"""Reads a scenario file; every error in it is reported in one line."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from starhold.scenario.schema import APART
 from starhold.scenario.writing import toml_text
 
 LONGEST_PATH = 200
-"""Characters of a path that errors show whole."""
+"""The most characters of a path that errors show."""
 WHERE = "scenario"
-"""The name, in errors, of a scenario that comes from no file."""
+"""The name in errors of a scenario that is not from a file."""
 
 
 @dataclass(frozen=True, repr=False)
 class LawEntry:
-    """A law with its gains, under the name the file gives it."""
+    """A law with its gains and its name in the file."""
 
     name: str
     law: Law
     gains: Any
     options: Any
-    """The values of the keys that a body adds to the gains of law tables, a NamedTuple."""
+    """The values of the keys that a body adds to law tables beside gains, a NamedTuple."""
     form: str | None = None
     spec: Any = None
-    """The design form that gave the gains, and its inputs; None where the file gives the gains themselves."""
+    """The design form of the gains, and its inputs; None where the file gives the gains themselves."""
     targets: tuple[Fitted, ...] = ()
     """The targets of a law's modes where these have their own, one each."""
 
@@ -51,8 +51,8 @@ class LawEntry:
 
 @dataclass(frozen=True, repr=False)
 class Scenario:
-    """A scenario file read and checked: how its body is read and built, its tables, its laws with their gains, its
-    text, its name in errors, and the folder that file names in it are relative to."""
+    """A scenario file, read and checked: its body, its tables, its laws with their gains, its text, its name in errors, and
+    the folder to which its file names are relative."""
 
     hooks: Body
     table: Any
@@ -65,7 +65,7 @@ class Scenario:
     parts: tuple[Fitted, ...] = ()
     """The parts that [[part]] tables give."""
     supposed: Scenario | None = None
-    """The tables that laws take for true and are designed for, without laws, where [nominal] gives others."""
+    """The tables that laws assume and are designed for, without laws, where [nominal] gives others."""
 
     @property
     def name(self) -> str:
@@ -79,22 +79,22 @@ class Scenario:
 
     @cached_property
     def made(self) -> Made:
-        """The numbers that the tables make. InputError where no body has them."""
+        """The numbers that the tables define. InputError where no body has them."""
         return self.hooks.make(self.table, self.where)
 
     @property
     def craft(self) -> Any:
-        """The body's numbers, which fly."""
+        """The numbers of the body that flies."""
         return self.made.craft
 
     @property
     def known(self) -> Scenario:
-        """The scenario as laws take it and are designed for it."""
+        """The scenario that laws assume and are designed for."""
         return self.supposed or self
 
     @property
     def nominal_craft(self) -> Any:
-        """The body's numbers as laws take them; None where those are the ones that fly."""
+        """The body's numbers in the nominal model; None where those are the ones that fly."""
         return None if self.supposed is None else self.supposed.craft
 
     def __repr__(self) -> str:
@@ -103,60 +103,60 @@ class Scenario:
 
     @shortly
     def with_(self, changes: Mapping[str, Any]) -> Scenario:
-        """The scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m s"};
-        the key of a law's or a part's table is its name, or "law[1]" by its place; None removes a key. InputError as
+        """Return the scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m
+        s"}; a law's or a part's table is found by its name, or by its index as "law[1]"; None removes a key. InputError as
         for a file."""
         return changed(self, changes)
 
     def _of(self, tables: Mapping[str, Any]) -> Scenario:
-        """The scenario of other raw tables, read where this one was."""
+        """Return the scenario of other raw tables, read like this one."""
         return read_tables(tables, toml_text(tables), self.where, self.folder, self.allow_unstable)
 
     @shortly
     def pick(self, name: str | None) -> LawEntry:
-        """The law of this name, the first without one; InputError names the nearest when there is none."""
+        """Return the law of this name, by default the first; InputError names the nearest where there is none."""
         names = [entry.name for entry in self.laws]
         if name is not None and name not in names:
             raise InputError(self.where, "law", name, nearest(name, names))
         return self.laws[0 if name is None else names.index(name)]
 
     def about(self, body: str) -> Scenario:
-        """The scenario itself; InputError unless it is about the body of this name."""
+        """Return the scenario itself; InputError unless it is about the body of this name."""
         if self.body != body:
             raise InputError(self.where, self.hooks.marker, f"a scenario of a {self.body}", f"here one of a {body}")
         return self
 
 
 def builtin_names() -> list[str]:
-    """The scenarios that come with starhold."""
+    """Return the names of the built-in scenarios."""
     folder = resources.files("starhold.scenario") / "builtin"
     return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
 def builtin_text(name: str) -> str:
-    """The text of a built-in scenario."""
+    """Return the text of a built-in scenario."""
     return (resources.files("starhold.scenario") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def open_scenario(source: Scenario | str | Path) -> Scenario:
-    """The scenario itself, or that of a file or of a built-in name as `load` reads it."""
+    """Return the scenario itself, or the one that `load` reads from a file or a built-in name."""
     return source if isinstance(source, Scenario) else load(source)
 
 
 def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
-    """The scenario in a file, or the built-in one of that name. InputError says what is wrong with it, which includes
-    gains that a law's own check finds unstable, unless they are allowed."""
+    """Read the scenario in a file, or the built-in one of that name. InputError states its first error; gains that a law's
+    own check finds unstable are errors unless allowed."""
     return parse(*_read_text(source), allow_unstable)
 
 
 def _read_text(source: str | Path) -> tuple[str, str, Path]:
-    """The text of a file or of a built-in scenario, its name in errors, and its folder."""
+    """Return the text of a file or of a built-in scenario, its name in errors, and its folder."""
     path, where = Path(source), cut(str(source), LONGEST_PATH)
     try:
         if not path.is_file() and str(source) in builtin_names():
             return builtin_text(str(source)), str(source), Path()
         with path.open(encoding="utf-8") as file:
-            # No more than the limit, for a device has no end.
+            # No more than the limit, because a device may be endless.
             return file.read(LONGEST_TEXT + 1), where, path.parent
     except FileNotFoundError:
         known = nearest(where, builtin_names())
@@ -167,22 +167,22 @@ def _read_text(source: str | Path) -> tuple[str, str, Path]:
 
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
-    """The scenario of a TOML text; `where` names it in errors."""
+    """Read the scenario of a TOML text; `where` names it in errors."""
     return read_tables(read_toml(text, where), text, where, folder, allow_unstable)
 
 
 @shortly
 def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_unstable: bool = False) -> Scenario:
-    """The scenario of tables as a file would hold them, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law":
-    [{"type": "pd", ...}]}: strings, numbers, truths, dates, lists and tables; tuples and NumPy arrays count as lists, a
-    Rotation of SciPy as the quaternion of an attitude, and None as left out. File names in it are relative to `folder`.
-    InputError says what is wrong, as for a file. A scenario's `with_` gives others like it, and its `text` is the file."""
+    """Make a scenario from tables as in a file, {"name": "mine", "spacecraft": {"inertia": [2, 3, 4]}, ..., "law": [{"type":
+    "pd", ...}]}: strings, numbers, booleans, dates, lists and tables; tuples and NumPy arrays count as lists, a SciPy
+    Rotation as the quaternion of an attitude, and None as absent. File names in it are relative to `folder`. InputError as
+    for a file. The scenario's `with_` makes variants, and its `text` is the file."""
     written = plain(tables, WHERE, "")
     return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
 
 
 def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:
-    """The scenario of the raw tables that a text holds."""
+    """Return the scenario of a text's raw tables."""
     body = body_of(data, where, folder)
     data = with_orbit(with_files(data, folder, where), folder, where)
     # First of all, for it scales the numbers of the other tables.
@@ -206,11 +206,11 @@ def _tables(body: Body, data: Mapping[str, Any], where: str, context: Any) -> An
 
 
 def _supposed(scenario: Scenario, data: Mapping[str, Any], context: Any) -> Scenario:
-    """The scenario with the tables of [nominal] in place of its own, which laws take for true."""
+    """Return the scenario with the tables of [nominal] in place of its own, which laws assume."""
     given, known = scenario.table.nominal, [*scenario.hooks.modelled, *scenario.hooks.designed]
     for name in given:
         if name not in known:
-            allowed = nearest(name, known) if known else "none, for laws of this body know their craft"
+            allowed = nearest(name, known) if known else "none, because laws of this body know their craft"
             raise InputError(scenario.where, f"nominal.{name}", "a table that laws are not designed for", allowed)
     other = {name: table for name, table in data.items() if name != "nominal"} | given
     try:
@@ -222,7 +222,7 @@ def _supposed(scenario: Scenario, data: Mapping[str, Any], context: Any) -> Scen
 
 
 def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[str]) -> LawEntry:
-    """The law of a raw table, for a scenario that as yet has none."""
+    """Return the law of a raw table, for a scenario that has no laws yet."""
     body, where = scenario.hooks, scenario.where
     reads = read_modes if has_modes(data, body) else read_gains
     law, form, table, spec, gains, targets = reads(data, scenario, context, key)

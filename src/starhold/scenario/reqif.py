@@ -15,7 +15,7 @@ from starhold.scenario.checking import show
 
 _TAGS = re.compile(r"<[^>]*>")
 _HOUSE = uuid.UUID("6f0c2b0e-95a7-4a2f-9a44-0f4f3b5b7a11")
-"""The name space of identifiers that are made here, so that the same requirements get the same ones."""
+"""The name space of new identifiers, so that equal requirements get equal ones."""
 ENUMERATION, XHTML = "ENUMERATION", "XHTML"
 
 
@@ -27,7 +27,7 @@ def _module(name: str, where: str) -> Any:
 
 
 def _parsed(data: bytes, where: str) -> Any:
-    """The bundle of a file. InputError where it is no ReqIF."""
+    """Return the bundle of a file. InputError where it is not ReqIF."""
     parser = _module("parser", where)
     try:
         bundle = parser.ReqIFParser.parse_from_string(data.decode("utf-8-sig"))
@@ -35,19 +35,19 @@ def _parsed(data: bytes, where: str) -> Any:
         _ = [*content.spec_objects], [*content.spec_types]
         return bundle
     except Exception as error:
-        # The package raises whatever befalls it.
+        # The package raises exceptions of any kind.
         why = " ".join(str(error).split())[:80] or type(error).__name__
-        raise InputError(where, "", f"no ReqIF that is understood: {why}", "a ReqIF file with SPEC-OBJECTS") from None
+        raise InputError(where, "", f"not readable as ReqIF: {why}", "a ReqIF file with SPEC-OBJECTS") from None
 
 
 def read(data: bytes, where: str) -> list[dict[str, str]]:
-    """The objects of a file in its order, as rows of texts by the long names of their attributes. An object without an
-    attribute for its id has its identifier as "id", one without a parent that above it in the hierarchy as "parent"."""
+    """Return the objects of a file in order, as rows of texts by the long names of their attributes. An object without an id
+    attribute has its identifier as "id", one without a parent attribute the object above it in the hierarchy as "parent"."""
     return [row for _, row in _rows(_parsed(data, where).core_content.req_if_content)]
 
 
 def _rows(content: Any) -> list[tuple[Any, dict[str, str]]]:
-    """The objects with their rows; see `read`."""
+    """Return the objects with their rows; see `read`."""
     from starhold.scenario.requirement_files import key_of
 
     names = {one.identifier: one.long_name or one.identifier for one in _definitions(content)}
@@ -75,7 +75,7 @@ def _definitions(content: Any) -> Iterator[Any]:
 
 
 def _text(attribute: Any, words: Mapping[str, str]) -> str:
-    """The value of an attribute as a text: of an enumeration its words, of formatted text that without its marks."""
+    """Return the value of an attribute as text: an enumeration by its words, formatted text without its markup."""
     kind, value = attribute.attribute_type.name, attribute.value
     if kind == ENUMERATION:
         return ", ".join(words.get(one, one) for one in value)
@@ -83,7 +83,7 @@ def _text(attribute: Any, words: Mapping[str, str]) -> str:
 
 
 def _places(content: Any) -> Iterator[tuple[str | None, Any]]:
-    """The places of the hierarchies of all specifications, each with the object above it."""
+    """Yield the nodes of the hierarchies of all specifications, each with the object above it."""
 
     def walk(places: Any, above: str | None) -> Iterator[tuple[str | None, Any]]:
         for place in places or ():
@@ -95,8 +95,8 @@ def _places(content: Any) -> Iterator[tuple[str | None, Any]]:
 
 
 def written(rows: Sequence[Mapping[str, str]], title: str, original: bytes | None, where: str) -> str:
-    """Rows as the text of a ReqIF file; with an original its content, in which what differs in the rows is replaced and what
-    it lacks is added. InputError where the original is none, or a formatted text or a choice would have to change."""
+    """Write rows as the text of a ReqIF file; with an original, only what differs in the rows is replaced and what is
+    missing is added. InputError where the original is not ReqIF, or formatted text or a choice would have to change."""
     bundle = _parsed(_empty(title) if original is None else original, where)
     content = bundle.core_content.req_if_content
     there = {dict(keyed(row))["id"]: (one, row) for one, row in _rows(content)}
@@ -109,7 +109,7 @@ def written(rows: Sequence[Mapping[str, str]], title: str, original: bytes | Non
 
 
 def keyed(row: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """The row by keys of requirements where columns hold those."""
+    """Return the row by keys of requirements, where columns are such keys."""
     from starhold.scenario.requirement_files import key_of
 
     return ((key_of(name) or name, text) for name, text in row.items())
@@ -120,19 +120,21 @@ def _now() -> str:
 
 
 def _name(*parts: str) -> str:
-    # What XML takes for an identifier begins with a letter or this.
+    # XML identifiers begin with a letter or this.
     return f"_{uuid.uuid5(_HOUSE, ' '.join(parts))}"
 
 
 def _put(content: Any, one: Any, column: str, text: str, where: str) -> None:
-    """Give an object this text in the column, for which its type gets an attribute where it has none."""
+    """Set this text of an object in the column; its type gets an attribute for it if it has none."""
     from starhold.scenario.requirement_files import key_of
 
     kind = next(kind for kind in content.spec_types if kind.identifier == one.spec_object_type)
     named = (d for d in kind.attribute_definitions or () if column in (d.long_name, key_of(d.long_name or "")))
     definition = next(named, None) or _defined(content, kind, column, where)
     if definition.attribute_type.name in (ENUMERATION, XHTML):
-        raise InputError(where, f"{one.identifier}.{column}", show(text), "what the original has, for it is no plain text")
+        raise InputError(
+            where, f"{one.identifier}.{column}", show(text), "the value of the original, because it is not plain text"
+        )
     if definition.identifier in one.attribute_map:
         one.attribute_map[definition.identifier].value = text
         return
@@ -144,7 +146,7 @@ def _put(content: Any, one: Any, column: str, text: str, where: str) -> None:
 
 
 def _defined(content: Any, kind: Any, column: str, where: str) -> Any:
-    """A new attribute of a type, of plain text."""
+    """Make a new plain-text attribute of a type."""
     string = next((one for one in content.data_types if type(one).__name__.endswith("String")), None)
     if string is None:
         types = _module("models.reqif_data_type", where)
@@ -162,7 +164,7 @@ def _defined(content: Any, kind: Any, column: str, where: str) -> Any:
 
 
 def _added(content: Any, title: str, called: str, where: str) -> Any:
-    """A new object of the first type of objects, at the end of the first specification."""
+    """Make a new object of the first object type, at the end of the first specification."""
     kind = next(one for one in content.spec_types if type(one).__name__ == "ReqIFSpecObjectType")
     make: Callable[..., Any] = _module("models.reqif_spec_object", where).ReqIFSpecObject
     one = make(_name(title, called), [], kind.identifier, last_change=_now())
@@ -176,7 +178,7 @@ def _added(content: Any, title: str, called: str, where: str) -> Any:
 
 
 def _empty(title: str) -> bytes:
-    """A file with one type of objects and one specification, without objects."""
+    """Make a file with one object type and one specification, without objects."""
     names = {what: _name(title, what) for what in ("header", "string", "kind", "document", "whole")}
     text = (resources.files("starhold.scenario") / "empty.reqif").read_text(encoding="utf-8")
     return text.format(title=escape(title), now=_now(), **names).encode()

@@ -1,6 +1,5 @@
-"""The [[requirement]] tables of a scenario: what is required of a flight, and how that is to be verified.
-
-Limits carry the unit of their metric, so they stay here as the file has them; `studies.requirements` reads them.
+"""The [[requirement]] tables of a scenario: what is required of a flight, and the method of verification. Limits are in the
+unit of their metric, so they stay as in the file; `studies.requirements` reads them.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ METHODS_OF: Mapping[str, tuple[Method, ...]] = MappingProxyType(
         "record": ("inspection",),
     }
 )
-"""The methods that have a use for a key; any other key goes with all of them."""
+"""The methods that use a key; any other key applies to all methods."""
 _IN_IDS = "-_. /:#()+{}"
 
 
@@ -46,20 +45,22 @@ Id: TypeAlias = Annotated[str, AfterValidator(_check_id)]
 
 
 class RequirementTable(Table):
-    """A requirement, with the method that verifies it; without a method it is as those are that have it as parent."""
+    """A requirement, with the method that verifies it; without a method, the requirements derived from it decide."""
 
-    id: Annotated[Id | None, Field(description="how tables, columns and other tools call it; the metric if absent")] = None
+    id: Annotated[Id | None, Field(description="its name in tables, columns and other tools; the metric if absent")] = None
     text: Annotated[str, Field(description="the requirement in words")] = ""
     method: Annotated[Method | None, Field(description="how it is verified")] = None
     metric: Annotated[
-        str | None, Field(description="what is bounded: a metric as summaries name them, lost, or exclusion-cone")
+        str | None, Field(description="the bounded quantity: a metric of summaries, lost, or exclusion-cone")
     ] = None
     at_most: Annotated[Any, *raw("the greatest value allowed, in the metric's unit")] = None
     at_least: Annotated[Any, *raw("the least value allowed, in the metric's unit")] = None
-    after: Annotated[Any, *raw("the time from which on it is required, since the start or since the mode began")] = None
+    after: Annotated[Any, *raw("the time from which it is required, since the start or since the mode began")] = None
     in_mode: Annotated[str | None, Field(description="the mode of the law in which it is required")] = None
     window: Annotated[Any, *raw("the two times between which it is required")] = None
-    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="body axis that keeps out of a cone"))] = None
+    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="body axis that must stay out of a cone"))] = (
+        None
+    )
     direction: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="inertial axis of that cone"))] = None
     share: Annotated[
         float, *quantity(Gain("1", above=0.0, at_most=1.0, text="of the runs that must keep it, such as 99.73 %"))
@@ -71,12 +72,12 @@ class RequirementTable(Table):
     parent: Annotated[Id | None, Field(description="the id of the requirement that it is derived from")] = None
     rationale: Annotated[str, Field(description="why it is required")] = ""
     file: Annotated[str | None, Field(description="a CSV or ReqIF file of requirements, relative to this one")] = None
-    attributes: dict[str, str] = Field(default={}, description="what else another tool says of it, kept as it is")
+    attributes: dict[str, str] = Field(default={}, description="attributes of another tool, kept unchanged")
 
     @model_validator(mode="after")
     def _has_a_metric(self) -> RequirementTable:
         if self.metric is None and self.method not in (None, "inspection"):
-            raise at_key("metric", f'this key is required with method = "{self.method}"', None)
+            raise at_key("metric", f'this key, required with method = "{self.method}"', None)
         if self.metric is None and self.id is None:
             raise at_key("id", "an id, where there is no metric", None)
         return self
@@ -127,15 +128,15 @@ def column_of(table: RequirementTable) -> str:
 
 
 def without_requirements(given: Any, method: Method) -> Any:
-    """A raw table, refused where it holds the requirements that [[requirement]] tables of a method are now."""
+    """Return a raw table; refuse it where it holds requirements that now belong in [[requirement]] tables of a method."""
     if isinstance(given, dict) and "requirement" in given:
         raise told_at("requirement", "an old key", f'[[requirement]] tables with id, metric and method = "{method}"')
     return cast(Any, given)
 
 
 def check_family(requirements: Sequence[RequirementTable]) -> None:
-    """Refuse requirements with equal ids, without regard to case, for columns have these names and SQL ignores it; parents
-    that are none of them; and those without a method that nothing decides."""
+    """Refuse requirements with equal ids, ignoring case, because columns have these names and SQL ignores it; unknown
+    parents; and those without a method from which none is derived."""
     ids = [requirement.called.casefold() for requirement in requirements]
     parents = {one.called: one.parent for one in requirements}
     for number, one in enumerate(requirements, 1):

@@ -1,4 +1,4 @@
-"""Requirements are read from and written to files of other tools: CSV of a spreadsheet or of DOORS, and ReqIF."""
+"""Reads and writes requirements in files of other tools: CSV of a spreadsheet or of DOORS, and ReqIF."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ALIASES = {
     "object_text": "text",
     "reqif.text": "text",
 }
-"""Other tools call some of them by these names, in lower case with underscores."""
+"""Other tools' names for some of them, in lower case with underscores."""
 NUMBERS = ("at_most", "at_least", "after", "share", "confidence")
 LISTS = ("window", "axis", "direction")
 _COMMA = re.compile(r"(?<=\d),(?=\d)")
@@ -33,14 +33,14 @@ SUFFIXES = (".csv", ".reqif")
 
 
 def key_of(column: str) -> str | None:
-    """The key of a requirement that a column of this name holds; None for any other."""
+    """Return the key of a requirement for a column of this name, or None."""
     name = re.sub(r"[\s-]+", "_", column.strip().casefold())
     name = ALIASES.get(name, name)
     return name if name in KEYS else None
 
 
 def read_requirement_file(path: Path) -> list[dict[str, Any]]:
-    """The raw [[requirement]] tables in a CSV or ReqIF file. InputError where it is none, or holds anything else."""
+    """Return the raw [[requirement]] tables in a CSV or ReqIF file. InputError where it cannot be read as one."""
     where = str(path)
     try:
         data = path.read_bytes()
@@ -57,8 +57,8 @@ def read_requirement_file(path: Path) -> list[dict[str, Any]]:
 
 def write_requirement_file(tables: Sequence[RequirementTable], path: Path, original: Path | None = None) -> None:
     """Write requirements as CSV or ReqIF, by the file's suffix, with their attributes. original: a ReqIF file whose content
-    is kept, with what differs in the requirements put in its place. InputError for another suffix, and where an original is
-    none or cannot be changed so."""
+    is kept, except for requirements that differ. InputError for another suffix, and where the original is not ReqIF or
+    cannot be changed so."""
     rows = [_row(table) for table in tables]
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES or (original is not None and suffix != ".reqif"):
@@ -88,7 +88,7 @@ def _csv_rows(data: bytes, where: str) -> list[dict[str, str]]:
     except UnicodeDecodeError:
         raise InputError(where, "", "text in another encoding", "CSV in UTF-8") from None
     head = text.partition("\n")[0]
-    # The separator that splits the heading into the most columns that are known.
+    # The separator that splits the heading into the most known columns.
     separator = max(",;\t", key=lambda one: sum(key_of(name.strip('" \r')) is not None for name in head.split(one)))
     try:
         lines = [line for line in csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True) if any(line)]
@@ -100,20 +100,20 @@ def _csv_rows(data: bytes, where: str) -> list[dict[str, str]]:
         raise InputError(where, "", "no column id" if columns else "an empty file", f"columns such as {', '.join(KEYS[:5])}")
     for place, name in enumerate(known):
         if name in known[:place]:
-            raise InputError(where, show(columns[place]), "a second column for the same", "one column for each key")
+            raise InputError(where, show(columns[place]), "a second column for the same key", "one column for each key")
     rows: list[dict[str, str]] = []
     for number, line in enumerate(lines[1:], 1):
         if len(line) > len(columns) and any(line[len(columns) :]):
             raise InputError(where, f"requirement {number}", f"{len(line)} cells", f"{len(columns)}, as the heading has")
         row = dict(zip(columns, line, strict=False))
-        # Where cells are separated by semicolons, a comma may be that of a number.
+        # With semicolons as separators, a comma may be a decimal comma.
         pairs = ((name, cell, separator == ";" and key_of(name) in NUMBERS) for name, cell in row.items() if cell.strip())
         rows.append({name: _COMMA.sub(".", cell) if decimal else cell for name, cell, decimal in pairs})
     return rows
 
 
 def _table(row: Mapping[str, str], key: str, where: str) -> dict[str, Any]:
-    """The raw table of a row of texts."""
+    """Return the raw table of a row of texts."""
     table: dict[str, Any] = {}
     more: dict[str, str] = {}
     for column, text in row.items():
@@ -140,14 +140,14 @@ def _number(text: str) -> float | str:
 
 
 def _row(table: RequirementTable) -> dict[str, str]:
-    """The texts of a requirement by column, without what is not given."""
+    """Return the texts of a requirement by column, without absent values."""
     given = {key: getattr(table, key) for key in KEYS if key in table.model_fields_set and getattr(table, key) is not None}
     row = {key: value if isinstance(value, str) else json.dumps(value) for key, value in given.items()}
     return {"id": table.called} | row | dict(table.attributes)
 
 
 def with_files(data: Mapping[str, Any], folder: Path, where: str) -> dict[str, Any]:
-    """Raw tables of a scenario with the requirements of files in place of the tables that name these."""
+    """Return the raw tables of a scenario with the requirements of files in place of the tables that name them."""
     given = data.get("requirement")
     if not isinstance(given, list):
         return dict(data)
@@ -159,9 +159,7 @@ def with_files(data: Mapping[str, Any], folder: Path, where: str) -> dict[str, A
         key = f"requirement[{number}]"
         if len(table) > 1:
             other = next(name for name in table if name != "file")
-            raise InputError(
-                where, f"{key}.{other}", "a key beside a file", "the file alone, which holds whole requirements"
-            )
+            raise InputError(where, f"{key}.{other}", "a key beside a file", "only the file, which holds whole requirements")
         if not isinstance(table["file"], str):
             raise InputError(where, f"{key}.file", show(table["file"]), "the name of a CSV or ReqIF file")
         tables += read_requirement_file(folder / table["file"])

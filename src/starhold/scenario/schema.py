@@ -20,24 +20,24 @@ from starhold.scenario.requirement import RequirementTable, check_family
 from starhold.scenario.tables import Name, Table, at_key, own_fields
 
 APART = ("law", "part")
-"""Arrays of tables that are read one by one, each by the type that it names."""
+"""Arrays of tables that are read one by one, each by its type."""
 MOST_STEPS = 1e12
-"""Beyond this many control steps their count is lost in rounding, and no run would end."""
+"""Beyond this many control steps rounding loses their count, and no run would end."""
 
 
 class ScenarioTable(Table):
-    """A whole file but for its laws: a body's own class adds its tables, a `simulation` among them."""
+    """A whole file without its laws: a body's own class adds its tables, including a `simulation`."""
 
-    name: Annotated[Name, Field(description="how results and folders are called")]
+    name: Annotated[Name, Field(description="name of results and folders")]
     description: Annotated[str, Field(description="a sentence for the report")] = ""
-    requirement: list[RequirementTable] = Field(default=[], description="what is required, and how that is verified")
+    requirement: list[RequirementTable] = Field(default=[], description="what is required, and how it is verified")
     campaign: CampaignTable | None = None
     nominal: dict[str, dict[str, Any] | list[dict[str, Any]]] = Field(
         default={},
-        description="tables that laws take for true and are designed for, in place of the file's own of that name",
+        description="tables that laws assume and are designed for, in place of the file's own of that name",
     )
     SHARED: ClassVar[Mapping[str, Any]] = MappingProxyType({})
-    """The keys that give a number to all parts that declare it as `shared`, with the default of each."""
+    """Return the keys that give a number to all parts that declare it as `shared`, with the default of each."""
 
     @model_validator(mode="after")
     def _requirements_fit(self) -> ScenarioTable:
@@ -55,7 +55,7 @@ class LawTable(Table):
     """The keys of every law table beside the law's own gains; a body's own class adds to them."""
 
     type: str
-    name: Annotated[Name | None, Field(description="how tables and folders call it; the type if absent")] = None
+    name: Annotated[Name | None, Field(description="its name in tables and folders; the type if absent")] = None
 
 
 class Timing(Table):
@@ -82,7 +82,7 @@ class Timing(Table):
 
     @property
     def steps(self) -> int:
-        """Control steps of a run."""
+        """The number of control steps of a run."""
         return round(self.duration / self.control_period)
 
 
@@ -92,9 +92,7 @@ class SeededTiming(Timing):
     seed: Annotated[int, *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="of all random numbers"))] = 1
     run: Annotated[
         int,
-        *quantity(
-            Gain("1", at_least=0, at_most=2**53, whole=True, text="of a campaign: each has random numbers of its own")
-        ),
+        *quantity(Gain("1", at_least=0, at_most=2**53, whole=True, text="in a campaign: each has its own random numbers")),
     ] = 0
 
     @model_validator(mode="after")
@@ -108,7 +106,7 @@ class SeededTiming(Timing):
 
 
 def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
-    """The keys, for pydantic's `create_model`, of a table that takes the declared parameters of a law or another part."""
+    """Return the keys, for pydantic's `create_model`, of a table with the declared parameters of a law or another part."""
     keys: dict[str, Any] = {}
     for item in declared:
         written = item.default if item.required else item.written(item.default)
@@ -121,7 +119,7 @@ def columns(declared: Iterable[Parameter]) -> dict[str, Any]:
 
 @cache
 def law_model(law: Law, form: str | None, base: type[LawTable], shared: tuple[str, ...]) -> Any:
-    """The table of a law, or of one of its design forms; `base` has what tables of such laws share; shared: keys of the
+    """Return the table of a law, or of one of its design forms; `base` has the keys common to such laws; shared: keys of the
     scenario that give gains in its place."""
     entries: dict[str, Any] = {"type": (Literal[law.name], law.name)}
     if form is not None:

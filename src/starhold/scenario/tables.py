@@ -1,4 +1,4 @@
-"""The base of all tables of a scenario file, how they refuse, and the parameters that a scenario gives to all its parts."""
+"""The base of all tables of a scenario file, their errors, and the parameters that a scenario gives to all its parts."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated, Any, TypeAlias
@@ -21,17 +21,17 @@ Flag: TypeAlias = Annotated[bool, Field(strict=True)]
 
 
 def refuse(reason: str) -> PydanticCustomError:
-    """An error whose text says what is allowed."""
+    """Return an error whose text says what is allowed."""
     return PydanticCustomError("quantity", "{reason}", {"reason": reason})
 
 
 def at_key(key: str, reason: str, value: Any) -> PydanticCustomError:
-    """An error about one key of a table that is read."""
+    """Return an error about one key of a table that is read."""
     return PydanticCustomError("quantity_at", "{reason}", {"reason": reason, "key": key, "found": value})
 
 
 def told_at(key: str, given: str, allowed: str) -> PydanticCustomError:
-    """An error about one key of a table that is read, whose value is described already."""
+    """Return an error about one key of a table that is read, with a description of its value."""
     return PydanticCustomError("told_at", "{reason}", {"reason": allowed, "key": key, "found": given})
 
 
@@ -40,7 +40,7 @@ _RESULTS = (".json", ".html", ".nc", ".png", ".csv")
 
 
 def check_name(name: str) -> str:
-    """The name; an error where it could lead elsewhere, or be markup or a file of results."""
+    """Return the name; raise an error where it could be a path, markup or a file of results."""
     sound = bool(name) and all(c.isalnum() or c in "-_. " for c in name) and name == name.strip(" .")
     if not sound or len(name) > LONGEST_NAME or name.lower().endswith(_RESULTS):
         allowed = "letters, digits and, between them, '-', '_', '.' and spaces"
@@ -49,36 +49,36 @@ def check_name(name: str) -> str:
 
 
 Name: TypeAlias = Annotated[str, AfterValidator(check_name)]
-"""The name of a scenario or a law: it names folders, and stands in tables and pages."""
+"""The name of a scenario or a law, which also names folders and appears in tables and pages."""
 
 
 def own_fields(declared: Iterable[Parameter], shared: Collection[str]) -> list[Parameter]:
-    """The parameters that a table of their own gives, in a scenario with these shared keys."""
+    """Return the parameters of a part's own table, in a scenario with these shared keys."""
     return [item for item in declared if item.gain.shared not in shared]
 
 
 def values_of(declared: Iterable[Parameter], read: Any, shared: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters by name, from a validated table and the values of the shared keys."""
+    """Return the parameters by name, from a validated table and the values of the shared keys."""
     return {
         item.name: shared[item.gain.shared] if item.gain.shared in shared else getattr(read, item.name) for item in declared
     }
 
 
 def shared_values(declared: Iterable[Parameter], values: Iterable[Any], shared: Collection[str]) -> dict[str, Any]:
-    """The values of the shared keys by which a scenario gives these parameters."""
+    """Return the values of the shared keys that give these parameters."""
     return {item.gain.shared: value for item, value in zip(declared, values, strict=True) if item.gain.shared in shared}
 
 
 def refuse_own(
     table: Mapping[str, Any], declared: Iterable[Parameter], shared: Collection[str], where: str, key: str
 ) -> None:
-    """InputError where a raw table has a parameter that the scenario gives; `key`: what errors call the table."""
+    """Raise InputError where a raw table has a parameter that the scenario gives; `key`: the table's name in errors."""
     for item in declared:
         if item.name in table and item.gain.shared in shared:
             raise InputError(where, f"{key}.{item.name}", "a key that the whole flight shares", shared_key(item.gain.shared))
 
 
 def shared_key(shared: str) -> str:
-    """The name of a shared key in errors: "epoch in [orbit]"."""
+    """Return the name of a shared key in errors: "epoch in [orbit]"."""
     table, _, name = shared.rpartition(".")
     return f"{name} in [{table}], which gives it to all parts"

@@ -1,5 +1,5 @@
-"""Texts such as "0.01 N m" become numbers. Number and unit are read here, by a grammar that computes nothing; the units
-library only gives the worth of these units."""
+"""Turns texts such as "0.01 N m" into numbers. Number and unit are parsed here, by a grammar that evaluates nothing; the
+units library only gives the conversion factors."""
 
 import hashlib
 import re
@@ -9,9 +9,9 @@ from functools import cache
 from typing import Any
 
 LONGEST = 100
-"""Characters that a quantity may have."""
+"""The most characters of a quantity."""
 MOST_POWER = 9
-"""A unit's largest exponent, in all."""
+"""The largest total exponent of a unit."""
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:_\d+)*(?:\.(?:\d+(?:_\d+)*)?)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _OVER = re.compile(r"(?:1\s*)?/\s*")
 _FACTOR = re.compile(
@@ -23,7 +23,7 @@ _HALVES = re.compile(r"\^\((-?[13579])/2\)")
 _JOINT = re.compile(r"\s*[*·⋅/]\s*|\s+|[.-]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOGETHER = re.compile(r"(?P<force>[nuµμmkM]?N)m(?P<time>s?)|(?P<mass>k?g)m")
-"""Units written together, as in mNm, Nms and kgm², which the library takes for something else."""
+"""Units written together, as in mNm, Nms and kgm², which the library misreads."""
 DECIBEL = "dB"
 _SHARES = {"%": "percent", "percent": "percent", "ppm": "ppm"}
 
@@ -45,12 +45,12 @@ COMMON = {
     ("mA m^2", "A m^2"): 1e-3,
     ("nT", "T"): 1e-9,
 }
-"""The worth of units that most files have, as the library has it, to the last bit. That takes long to load."""
+"""The factors of common units, equal to the library's to the last bit; the library takes long to load."""
 
 
 def to_number(text: str, unit: str) -> float:
-    """The worth of a text such as "20 mN m" in a unit such as "N m"; of "6 dB" the ratio of amplitudes, where the unit is
-    "1". ValueError says what is allowed."""
+    """Return the value of a text such as "20 mN m" in a unit such as "N m"; for "6 dB" the amplitude ratio, where the unit
+    is "1". ValueError says what is allowed."""
     text = text.strip()
     number = _NUMBER.match(text)
     if number is None or len(text) > LONGEST:
@@ -66,7 +66,7 @@ def to_number(text: str, unit: str) -> float:
 
 
 def to_either(text: str, unit: str, also: str) -> float:
-    """The worth of a text in a unit, or in another one of which the number is the same; ValueError names both."""
+    """Return the value of a text in a unit, or in another unit with the same number; ValueError names both."""
     for wanted in (unit, also):
         with suppress(ValueError):
             return to_number(text, wanted)
@@ -74,14 +74,14 @@ def to_either(text: str, unit: str, also: str) -> float:
 
 
 def apart(text: str) -> tuple[float, str]:
-    """The number and the unit of a text that `to_number` takes, as they are written."""
+    """Return the number and the unit of a text that `to_number` accepts, as written."""
     number = _NUMBER.match(text.strip())
     assert number is not None
     return float(number[0]), text.strip()[number.end() :].strip()
 
 
 def shown(unit: str) -> str:
-    """The name of a unit in messages."""
+    """Return the name of a unit in messages."""
     return "no unit" if unit == "1" else unit
 
 
@@ -91,7 +91,7 @@ def _allowed(unit: str) -> str:
 
 @cache
 def _powers(given: str, unit: str) -> dict[str, float]:
-    """The units of a text with their exponents; `unit` is the one that errors name."""
+    """Return the units of a text with their exponents; `unit` is the one that errors name."""
     given = re.sub(f"[{'⁰¹²³⁴⁵⁶⁷⁸⁹⁻'}]+", lambda raised: "^" + raised[0].translate(_RAISED), given)
     given = re.sub(r"\s*(?:\*\*|\^)\s*", "^", given)
     given = _HALVES.sub(lambda halves: f"^{int(halves[1]) / 2}", given)
@@ -102,7 +102,7 @@ def _powers(given: str, unit: str) -> dict[str, float]:
 
 
 def _read(given: str, unit: str) -> dict[str, float]:
-    """Factors from left to right; of a group in parentheses, which has none within but a root's, all."""
+    """Yield factors from left to right; of a group in parentheses, which contains no other than a root's, all."""
     powers: defaultdict[str, float] = defaultdict(int)
     over = _OVER.match(given)
     sign, place = (-1, over.end()) if over else (1, 0)
@@ -127,7 +127,7 @@ def _read(given: str, unit: str) -> dict[str, float]:
 
 
 def _split(name: str) -> list[str]:
-    """The units that a name is made of; an exponent after it belongs to the last."""
+    """Return the units in a compound name; an exponent after it belongs to the last."""
     together = _TOGETHER.fullmatch(name)
     if together is None:
         return [name]
@@ -136,7 +136,7 @@ def _split(name: str) -> list[str]:
 
 def _convert(value: float, powers: dict[str, float], unit: str) -> float:
     if unit == "1":
-        # An angle is not a pure number here, though it is one in the library.
+        # An angle is not dimensionless here, although it is in the library.
         if not powers:
             return value
         if not powers.keys() <= _SHARES.keys() or sum(powers.values()) != 1:
@@ -151,13 +151,13 @@ def _convert(value: float, powers: dict[str, float], unit: str) -> float:
             raise ValueError(f"a quantity in {unit}")
         return float(registry.convert(value, given, wanted))
     except pint.UndefinedUnitError as error:
-        raise ValueError(f"a quantity in {shown(unit)}; {error.unit_names} is no unit that is known") from None
+        raise ValueError(f"a quantity in {shown(unit)}; {error.unit_names} is not a known unit") from None
     except (pint.PintError, OverflowError, ZeroDivisionError):
         raise ValueError(f"a quantity in {shown(unit)}") from None
 
 
 def _angle_fits(given: Any, wanted: Any) -> bool:
-    """Whether radians stand where they are wanted; 1/s will do for rad/s, but Hz, which may count turns, will not."""
+    """Return whether radians appear where they must; 1/s is accepted for rad/s, but Hz, which may count turns, is not."""
     roots = [unit_registry().get_root_units(units)[1] for units in (given, wanted)]
     angle, wanted_angle = (root._units.get("radian", 0) for root in roots)
     if wanted_angle == 0 or angle == wanted_angle:
@@ -181,7 +181,7 @@ def _container(powers: dict[str, float]) -> Any:
 
 @cache
 def unit_registry() -> Any:
-    """The registry of units (pint), read from a cache on the disk where there can be one.
+    """Return the registry of units (pint), read from a cache on the disk where possible.
 
     Pint's own cache folder is shared by every environment of the user, and its entries name files of the environment that
     wrote them: when that one is deleted, all others fail. So this environment has a folder of its own."""

@@ -1,6 +1,5 @@
-"""The values that keys of a scenario hold, and those that numbers with units mean there.
-
-Keys are told as `Scenario.with_` takes them. Values are validated ones: SI or scaled, as plain numbers in the file would be.
+"""The values of a scenario's keys, and of numbers with units there. Keys are written as for `Scenario.with_`. Values are
+validated: SI or scaled, like plain numbers in the file.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,35 +29,35 @@ from starhold.scenario.tables import Table, refuse_own
 SHARED = ("name", "description", "requirement", "campaign", "simulation", "certify")
 """Tables and keys that all runs of a campaign share."""
 STRUCTURE = ("type", "name", "form", "file")
-"""Keys that say what a table is."""
+"""Keys that identify a table."""
 PAIRS = {"attitude": "angles", "angles": "attitude"}
-"""Keys of which a table has one: giving this takes that away."""
+"""Alternative keys of a table: giving one removes the other."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A key of a scenario in which runs may differ, with all that is known of it; it can be sent to other processes."""
+    """A key of a scenario in which runs may differ, with its properties; it can be sent to other processes."""
 
     where: str
-    """How errors call the scenario."""
+    """The scenario's name in errors."""
     key: str
     path: tuple[str | int, ...]
     gain: Gain | None
-    """Its declaration; None for a word or a truth."""
+    """Its declaration; None for a word or a boolean."""
     value: Any
-    """A number, tuples of numbers, a word or a truth; None where the file has none."""
+    """A number, tuples of numbers, a word or a boolean; None where the file has none."""
     shape: tuple[int, ...]
     """() a number, (n,) a vector or a diagonal, (n, n) a matrix."""
     worth: float
-    """The unit of a scaled number in SI; else 1."""
+    """The SI value of a scaled number's unit; else 1."""
     displaced: str | None
-    """A key that is taken away where this one is given."""
+    """The key that is removed where this one is given."""
     table: str
-    """How [campaign.over] calls its dispersion: by this key, or by several."""
+    """The name of its dispersion in [campaign.over]: this key, or several."""
 
     @property
     def wordy(self) -> bool:
-        """Whether it holds a word or a truth."""
+        """Whether it holds a word or a boolean."""
         return self.gain is None or bool(self.gain.choices)
 
     @property
@@ -75,24 +74,24 @@ class Place:
         return Gain(above=gain.above, at_least=gain.at_least, at_most=gain.at_most)
 
     def change(self, value: Any) -> dict[str, Any]:
-        """The change that gives the key this plain value, for `Scenario.with_`."""
+        """Return the change that gives the key this plain value, for `Scenario.with_`."""
         return {self.key: self._written(value)} | ({} if self.displaced is None else {self.displaced: None})
 
     def _written(self, value: Any) -> Any:
-        """The value as a file may hold it: with its unit where a plain number would be asked for it."""
+        """Return the value as a file may hold it: with its unit where a plain number would be questioned."""
         if isinstance(value, list):
             return [self._written(item) for item in cast(list[Any], value)]
         large = self.gain is not None and isinstance(value, float) and abs(value) > plain(self.gain)[0]
         return f"{value!r} {self.gain.unit}" if self.gain is not None and large else value
 
     def refuse(self, name: str, given: str, allowed: str) -> InputError:
-        """An error about the dispersion of the key, or about a parameter of it."""
+        """Return an error about the dispersion of the key, or about a parameter of it."""
         key_text = f'campaign.over."{self.table}"'
         return InputError(self.where, f"{key_text}.{name}" if name else key_text, given, allowed)
 
 
 def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> Any:
-    """The validated form of a value that fits the key's shape. InputError where the scenario refuses it there."""
+    """Return the validated form of a value that fits the key's shape. InputError where the scenario refuses it there."""
     try:
         return locate(scenario.with_(place.change(value)), place.key).value
     except InputError as error:
@@ -103,8 +102,8 @@ def accepted(scenario: Scenario, place: Place, value: Any, name: str = "") -> An
 
 
 def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) -> NDArray[np.float64]:
-    """Numbers (of the key's shape) of a raw value that need not be within the key's bounds, such as a standard deviation; in
-    the key's unit, or in the one given. InputError calls it by `name`."""
+    """Return the numbers (of the key's shape) of a raw value that need not be within the key's bounds, such as a standard
+    deviation; in the key's unit, or in the one given. `name`: its name in errors."""
     gain = place.gain or Gain()
     read: Callable[..., Any] = reader(Gain(gain.unit, also=gain.also) if unit is None else Gain(unit))
     worth = place.worth if unit is None else 1.0
@@ -116,7 +115,7 @@ def width_at(place: Place, raw: Any, name: str = "", unit: str | None = None) ->
             allowed = error.message().removeprefix("must be ")
             shares = isinstance(item, str) and item.rstrip().endswith(("%", "percent", "ppm")) and unit is None
             shares = shares and not place.wordy and place.table == place.key
-            hint = "; shares of what the file has take relative = true" if shares else ""
+            hint = "; for shares of the file's value use relative = true" if shares else ""
             raise place.refuse(name, show(item), f"{allowed}{hint}") from None
 
     return np.array(_each(_filled(place, raw, place.shape, name), number), dtype=float)
@@ -127,7 +126,7 @@ def _each(raw: Any, number: Callable[[Any], float]) -> Any:
 
 
 def _filled(place: Place, raw: Any, shape: Sequence[int], name: str) -> Any:
-    """The raw value as lists of this shape; a single one stands for all."""
+    """Return the raw value as lists of this shape; a single number applies to all."""
     if not isinstance(raw, list | tuple):
         return raw if not shape else [_filled(place, raw, shape[1:], name) for _ in range(shape[0])]
     items = cast(Sequence[Any], raw)
@@ -139,7 +138,7 @@ def _filled(place: Place, raw: Any, shape: Sequence[int], name: str) -> Any:
 
 
 def locate(scenario: Scenario, key: str) -> Place:
-    """The place of a key. InputError where there is no such key, or none in which runs of a campaign may differ."""
+    """Return the place of a key. InputError where there is no such key, or where runs of a campaign may not differ in it."""
     names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
     key_text = f'campaign.over."{cut(key, 200)}"'
     try:
@@ -152,7 +151,7 @@ def locate(scenario: Scenario, key: str) -> Place:
 
 
 def _no(given: str, allowed: str) -> InputError:
-    """An error about a key that leads nowhere; `locate` says which."""
+    """Return an error about an invalid key; `locate` says which."""
     return InputError("", "", given, allowed)
 
 
@@ -181,11 +180,11 @@ def _locate(scenario: Scenario, key: str, path: tuple[str | int, ...]) -> Place:
 
 
 _Held: TypeAlias = tuple[type[Table], Callable[[str], Any], tuple[str | int, ...]]
-"""The model of a table, the values of its keys, and what is left of a path."""
+"""The model of a table, the values of its keys, and the rest of a path."""
 
 
 def _table_of(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
-    """The table that a path leads to. InputError where it leads to none, or ends there."""
+    """Return the table on a path. InputError where there is none, or where the path ends there."""
     if path[0] in ("law", "part"):
         return _of_array(scenario, path)
     table: Any = scenario.table
@@ -214,7 +213,7 @@ def _numbered(there: Sequence[Any], name: str, after: Sequence[str | int]) -> An
 
 
 def _is_table(model: type[Any], name: str | int) -> bool:
-    """Whether a key is that of a table, or of an array of tables, whether or not there is one."""
+    """Return whether a key is that of a table, or of an array of tables, present or not."""
     left: list[Any] = [model.model_fields[str(name)].annotation]
     while left:
         kind = left.pop()
@@ -225,7 +224,7 @@ def _is_table(model: type[Any], name: str | int) -> bool:
 
 
 def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
-    """The table of a law or a part that a path leads to."""
+    """Return the table of a law or a part on a path."""
     array, after, shared = str(path[0]), path[1:], tuple(scenario.table.SHARED)
     if len(after) < 2:
         raise _no("a whole table", f"a key of one, such as {array}.NAME.KEY")
@@ -245,7 +244,7 @@ def _of_array(scenario: Scenario, path: tuple[str | int, ...]) -> _Held:
 
 
 def _of_mode(entry: LawEntry, numbers: dict[str, Any], after: tuple[str | int, ...], shared: tuple[str, ...]) -> _Held:
-    """The table of a mode, or of a condition of it, that a path leads to."""
+    """Return the table of a mode, or of one of its conditions, on a path."""
     laws = [law for _, law, _ in mode_laws(entry.law, entry.gains)]
     law, way = _numbered(laws, "mode", after or ("",)), after[1:]
     model, begun = law_model(law, None, ModeTable, shared), f"mode[{int(after[0]) + 1}]."
@@ -266,7 +265,7 @@ def _of_monitor(monitors: Sequence[Monitor], numbers: dict[str, Any], after: tup
 
 
 def _plainly(gain: Gain | None, value: Any) -> Any:
-    """Numbers in tuples, and the word itself in place of its number."""
+    """Return numbers as tuples, and the word itself in place of its number."""
     if gain is not None and gain.choices and isinstance(value, int):
         return gain.choices[value]
     return _tuples(value.tolist()) if isinstance(value, np.ndarray) else value
@@ -277,7 +276,7 @@ def _tuples(value: Any) -> Any:
 
 
 def _formed(gain: Gain | None, value: Any, raw: Any) -> tuple[Any, tuple[int, ...]]:
-    """The value and its shape; of a matrix what the file gives: all of it, or its diagonal."""
+    """Return the value and its shape; for a matrix as in the file: all of it, or its diagonal."""
     if gain is None or len(gain.shape) < 2:
         return value, () if gain is None else gain.shape
     rows = isinstance(raw, list) and any(isinstance(row, list) for row in cast(list[Any], raw))
@@ -291,16 +290,16 @@ def _formed(gain: Gain | None, value: Any, raw: Any) -> tuple[Any, tuple[int, ..
 
 
 def _component(value: Any, shape: tuple[int, ...], rest: Sequence[str | int]) -> Any:
-    """One component of a vector."""
+    """Return one component of a vector."""
     if len(shape) != 1 or len(rest) != 1 or not isinstance(rest[0], int):
-        raise _no("a value that is no vector" if len(shape) != 1 else "no component of a vector", "the whole key")
+        raise _no("a value that is not a vector" if len(shape) != 1 else "an index outside the vector", "the whole key")
     if not 0 <= rest[0] < shape[0]:
         raise _no("no such component", f"1 to {shape[0]}")
     return None if value is None else value[rest[0]]
 
 
 def _raw_at(tables: Any, path: Sequence[str | int]) -> Any:
-    """The value that raw tables have at a path, None where they have none."""
+    """Return the value of raw tables at a path, or None."""
     here: Any = tables
     for part in path:
         try:

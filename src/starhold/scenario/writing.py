@@ -1,4 +1,4 @@
-"""Laws and parts are written as TOML."""
+"""Writes laws and parts as TOML."""
 
 import json
 import math
@@ -20,7 +20,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Tables as TOML that reads back as the same; InputError where a text holds half a character."""
+    """Write tables as TOML that reads back the same; InputError where a text holds half a character."""
     lines = [f"{_key(name)} = {_value(item)}" for name, item in tables.items() if not _is_table(item)]
     for name, item in tables.items():
         if _is_table(item):
@@ -44,19 +44,19 @@ def _value(value: Any) -> str:
             value.encode()
         except UnicodeEncodeError:
             raise InputError("", "", json.dumps(value), "text of whole characters") from None
-        # JSON's strings are TOML's, but for a character that JSON leaves as it is.
+        # JSON's strings are TOML's, except for a character that JSON leaves unescaped.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(name)} = {_value(item)}" for name, item in value.items()) + "}"
     if isinstance(value, list):
         return f"[{', '.join(map(_value, value))}]"
-    # Finite floats, infinity and NaN are written alike in both languages but for capitals.
+    # Finite floats, infinity and NaN are written alike in both languages except for capitals.
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def law_table(law: Law, gains: Any) -> str:
-    """A [[law]] table with these gains, exact: floats are written so that they read back as the same numbers; without
-    gains that the scenario gives to all parts."""
+    """Write a [[law]] table with these gains, exactly: floats read back as the same numbers; without gains that the scenario
+    gives to all parts."""
     which = f'type = "{law.name}"' if law.file is None else f"file = {json.dumps(str(law.file))}"
     lines = ["[[law]]", which]
     for item, value in _own(law.fields(), gains, body_for(law).tables.SHARED):
@@ -66,7 +66,7 @@ def law_table(law: Law, gains: Any) -> str:
 
 
 def scenario_with(law: Law, gains: Any) -> str:
-    """A small scenario of the body that a law is for, which holds this law alone, and the sensors that it reads."""
+    """Write a small scenario of a law's body, with this law alone and the sensors that it reads."""
     body, sensors = body_for(law), telling(law.reads)
     given = shared_values(law.fields(), gains, body.tables.SHARED)
     orbits = bool(given) or any("two-body" in sensor.part.needs for sensor in sensors)
@@ -81,8 +81,8 @@ def scenario_with(law: Law, gains: Any) -> str:
 
 
 def part_table(part: Part, params: Any) -> dict[str, Any]:
-    """A [[part]] table with these parameters, without infinite and empty ones, and those that the scenario gives to
-    all parts."""
+    """Write a [[part]] table with these parameters, without infinite and empty ones and those that the scenario gives to all
+    parts."""
     table: dict[str, Any] = {"type": part.name} if part.file is None else {"file": str(part.file)}
     body = bodies().get(part.body or "rigid-body")
     for item, value in _own(part.fields(), params, body.tables.SHARED if body else ()):
@@ -93,10 +93,10 @@ def part_table(part: Part, params: Any) -> dict[str, Any]:
 
 
 def _own(declared: list[Field], values: Iterable[Any], shared: Collection[str]) -> list[tuple[Field, Any]]:
-    """The parameters, with their values, that a table of their own gives."""
+    """Return the parameters of a part's own table, with their values."""
     return [(item, value) for item, value in zip(declared, values, strict=True) if item.gain.shared not in shared]
 
 
 def template_text(body: str) -> str:
-    """A commented scenario, of the body of this name, that runs as it is and names every key."""
+    """Return a commented scenario, of the body of this name, that runs as it is and names every key."""
     return bodies()[body].template

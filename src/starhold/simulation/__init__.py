@@ -1,1 +1,1 @@
-"""Flies closed loops: one lane, recorded (`lane`), or many abreast (`lanes`)."""
+"""Flies closed loops: one lane, recorded (`lane`), or many in parallel (`lanes`)."""

@@ -1,4 +1,4 @@
-"""Loops that differ only in numbers fly as batches, a vector of lanes at a time; each is recorded as `fly` does it."""
+"""Loops that differ only in numbers fly as batches, a vector of lanes at a time; each is recorded as by `fly`."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -18,9 +18,9 @@ from starhold.simulation.lanes import RunningBatch, ThreadPool, stacked
 from starhold.trace.machine import aligned, widest
 
 FEW = 3
-"""Up to this many loops are flown one by one, which takes less time than compiling a kernel for lanes."""
+"""Up to this many loops are flown one by one, which is faster than compiling a kernel for lanes."""
 MOST = 2**26
-"""Numbers that the samples of a vector of lanes may have; longer flights are flown one by one."""
+"""The most numbers in the samples of a vector of lanes; longer flights are flown one by one."""
 
 
 class Flying(NamedTuple):
@@ -37,8 +37,8 @@ def fly_batched(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> list[Any]:
-    """The results of `use(number, samples, carry)` for each flight, in order: samples (number, sample) and carry as
-    `fly` gives them, the same bits. Loops of one form fly together, whatever their numbers; the others one by one."""
+    """Return the results of `use(number, samples, carry)` for each flight, in order, with the samples (number, sample) and
+    carry of `fly`, bit for bit. Loops of one form fly together, whatever their numbers; the others one by one."""
     groups: dict[Any, list[int]] = {}
     for number, flight in enumerate(flights):
         groups.setdefault(kernel_key(flight), []).append(number)
@@ -63,7 +63,7 @@ def fly_batched(
 
 
 def kernel_key(flight: Flying) -> Any:
-    """A key that is equal for flights that one kernel serves with the same tables."""
+    """Return a key that is equal for flights that one kernel serves with the same tables."""
     loop, cut = flight.loop, flight.loop.phases(flight.steps)
     phases = [(p.first, p.last, form(Numbers.of(p))) for p in cut]
     tables = [np.array(table.cells).tobytes() for phase in cut for table in buffers(phase.setup)]
@@ -108,7 +108,7 @@ def _together(group: Sequence[Flying], numbers: Sequence[int], use: Callable[...
 
 
 class _Vector:
-    """A vector of lanes on their way."""
+    """A vector of lanes in flight."""
 
     def __init__(self, flights: Sequence[Flying], phases: Sequence[Any], kernels: Sequence[Kernel], size: int) -> None:
         self.phases, self.kernels, self.size, self.width = phases, kernels, size, len(flights)
@@ -124,7 +124,7 @@ class _Vector:
         self.lost_row = places(self.like).lost_at
 
     def fly(self, numbers: Sequence[Numbers]) -> Callable[[int], tuple[NDArray[np.float64], Any]]:
-        """Fly to the end; returns a function that gives samples and carry of a lane."""
+        """Fly to the end; return a function that gives samples and carry of a lane."""
         for place, values in enumerate(numbers):
             now = self.phases[0][place]
             for lane in range(self.width):
@@ -173,12 +173,12 @@ Array = NDArray[np.float64]
 
 
 PIECES = 2
-"""Pieces of a batch for each thread; few, for each is called once a window."""
+"""Pieces of a batch for each thread; few, because each is called once a window."""
 
 
 class Metered(NamedTuple):
-    """The results of flights: where each lane ended (numbers, lanes), its notes (numbers, lanes), and the noted numbers
-    of windows (windows, quantities, lanes)."""
+    """The results of flights: the final states of the lanes (numbers, lanes), their notes (numbers, lanes), and the notes of
+    windows (windows, quantities, lanes)."""
 
     ends: Array
     notes: Array
@@ -197,13 +197,13 @@ def begin_metered(
     rows: Sequence[int],
     pool: ThreadPool,
 ) -> Callable[..., Metered]:
-    """Begin to fly lanes through phases, and note the instant after the last step too, at which a command is decided
-    and not flown. Returns a function that waits for the end and reports progress.
+    """Begin to fly lanes through phases, noting also the instant after the last step, whose command does not fly. Return a
+    function that waits for the end and reports progress.
 
-    carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on;
-    noted: notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless
-    it is 0, the last, which takes the last instant in, at the end of the flight or after it; rows: noted numbers that
-    begin anew in each window, at 0."""
+    carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on; noted:
+    notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless it is 0, the
+    last, which includes the last instant, at the end of the flight or after it; rows: notes that restart at 0 in each
+    window."""
     batch = RunningBatch(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:
         for observer in observers:

@@ -1,4 +1,4 @@
-"""One trajectory is flown and its samples are labelled."""
+"""Flies one trajectory and labels its samples."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Progress: TypeAlias = Callable[[int, int], None]
-"""Called with the number of steps done and the number of all."""
+"""Called with the number of steps done and their total."""
 
 PULSE = 0.1
 """Seconds of work between two reports of progress."""
 
 IN_MEMORY = 2**28
-"""Bytes of samples that are held in memory; more of them lie in a temporary file."""
+"""The most bytes of samples that are kept in memory; more go to a temporary file."""
 
 
 class Variable(NamedTuple):
@@ -59,9 +59,9 @@ class Recording:
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Recording:
-        """The recording of a Dataset that `dataset` gave. ValueError for one that is no run."""
+        """Return the recording of a Dataset from `dataset`. ValueError for one that is not a run."""
         if not {"body", "control_period", "record_every"} <= set(dataset.attrs) or "time" not in dataset:
-            raise ValueError("not a run: a Dataset of `simulate`, or of a run.nc, is wanted")
+            raise ValueError("not a run; give a Dataset of `simulate`, or of a run.nc")
         arrays = {str(name): dataset[name].to_numpy() for name in ("time", *dataset.data_vars)}
         columns = {
             str(name): Quantity(values.attrs["units"], values.attrs["long_name"], *map(str, values.dims[1:]))
@@ -70,20 +70,20 @@ class Recording:
         return cls(arrays, dict(dataset.attrs), columns, dataset["time"].attrs.get("units", "s"))
 
     def until(self, time: float) -> Recording:
-        """The recording up to a time, its first sample at least."""
+        """Return the recording up to a time, at least its first sample."""
         kept = max(1, int(np.searchsorted(self["time"], time * (1.0 + 1e-9), side="right")))
         return replace(self, arrays={name: values[:kept] for name, values in self.arrays.items()})
 
     def dataset(self) -> xr.Dataset:
-        """The recording as a Dataset with units."""
-        # Loaded here, for it takes longer than most flights, and measuring and drawing do without.
+        """Return the recording as a Dataset with units."""
+        # Loaded here, because it takes longer than most flights, and measuring and drawing do not need it.
         import xarray as xr
 
         data, coords = self.variables()
         return xr.Dataset(data, coords, self.attrs)
 
     def variables(self) -> tuple[dict[str, Variable], dict[str, Variable]]:
-        """The recorded variables, and their coordinates, by name."""
+        """Return the recorded variables, and their coordinates, by name."""
         data: dict[str, Variable] = {}
         columns = {name: quantity for name, quantity in self.columns.items() if name in self.arrays}
         for name, (unit, meaning, dimension) in columns.items():
@@ -114,7 +114,7 @@ def simulate(
 def fly(
     loop: ClosedLoop, steps: int, record_every: int = 1, run: int | None = None, progress: Progress | None = None
 ) -> tuple[NDArray[np.float64], Carry]:
-    """The samples (number, sample) of a trajectory, one row for each number of a sample, and the carry at its end."""
+    """Return the samples (number, sample) of a trajectory, one row for each number of a sample, and its final carry."""
     like, phases = loop.carry(), loop.phases(steps)
     width = len(flatten(make_step(loop.composition()).sample(like, 0, loop.setup())))
     samples = _room(steps, record_every, width)
@@ -129,16 +129,16 @@ def fly(
         done += count
         if progress is not None:
             progress(done, steps)
-            # Chunks grow until each takes about a pulse; the result does not depend on where they end.
+            # Chunks grow until each takes about the reporting interval; the result does not depend on where they end.
             chunk = max(1, int(chunk * min(8.0, PULSE / max(time.perf_counter() - begun, 1e-9))))
         lost_at = state_of(carry, like).lost_at
         if lost_at == 0.0:
-            # Nothing was decided; the only sample is the start.
+            # No command was decided; the only sample is the start.
             samples[0] = flatten(make_step(loop.composition()).sample(like, 0, loop.setup()))
         if lost_at >= 0.0:
             return samples[: max(1, int(np.ceil(lost_at / record_every)))].T, state_of(carry, like)
     if steps % record_every == 0 and phases:
-        # The last sample shows the next command; the step that follows is flown for it and forgotten.
+        # The last sample shows the next command; the step after it is flown for that and discarded.
         flight.fly(phases[-1], carry.copy(), steps, 1)
     return samples.T, state_of(carry, like)
 
@@ -151,7 +151,7 @@ class _Flight:
         self._ready: dict[int, tuple[Arguments, Kernel]] = {}
 
     def _prepared(self, phase: Any) -> tuple[Arguments, Kernel]:
-        """Arguments and kernel of a phase, made once for all the chunks that it is flown in."""
+        """Return arguments and kernel of a phase, made once for all its chunks."""
         if phase.first not in self._ready:
             numbers = Numbers.of(phase)
             kernel = make_kernel(one, self.loop.composition(), 1, self.like, numbers, self.loop.substeps)
@@ -199,8 +199,8 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
 
 
 def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
-    """The recorded quantities in the order of samples: name, quantity and how many numbers it has. Those of sensors and of
-    an estimator are called after the part; so are those of effectors where a name would stand twice."""
+    """Return the recorded quantities in the order of samples: name, quantity and its number of components. Names of sensors'
+    and an estimator's quantities begin with the part's name; so do those of effectors where a name would occur twice."""
     sample = make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())
     body_sample, records, readings, estimate = sample
     effectors = [f for f in loop.used("effector") if f.part.hook("record") is not None]
@@ -225,7 +225,7 @@ def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
 
 def _room(steps: int, record_every: int, width: int) -> NDArray[np.float64]:
     """Return the storage of a run's samples, a row each: memory or, for many samples, an unnamed file that the system caches
-    as far as memory allows. Refused if the disk has no room for that file, or if measuring the samples would fill memory."""
+    as memory allows. Refused if the disk has no room for that file, or if measuring the samples would fill memory."""
     count = steps // record_every + 1
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 2**33
     # Measuring holds a dozen numbers of each sample at a time.

@@ -19,8 +19,8 @@ from starhold.simulation.lane import Progress
 from starhold.trace.machine import aligned, widest
 
 PIECES = 4
-"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect. Each flies what all
-lanes share, too."""
+"""Pieces of a batch for each thread; between them progress is reported and an interrupt takes effect. Each piece also flies
+the numbers that all lanes share."""
 
 
 class ThreadPool:
@@ -37,7 +37,7 @@ class ThreadPool:
         self._pool.shutdown(cancel_futures=True)
 
     def share(self, work: Callable[[range], None], count: int, pieces_each: int = PIECES) -> Callable[..., None]:
-        """Call work(piece) on `count` blocks, divided into `pieces_each` pieces for each thread. The function returned waits
+        """Call work(piece) on `count` blocks, divided into `pieces_each` pieces for each thread. The returned function waits
         for the end and reports progress."""
         size = max(1, -(-count // (self.threads * pieces_each)))
         begun: list[Future[None]] = [
@@ -63,7 +63,7 @@ class Batch:
     like: Any
 
     def state(self, lane: int) -> Any:
-        """The state of the body in a lane."""
+        """Return the state of the body in a lane."""
         return unflatten(self.states[:, lane], self.like)
 
 
@@ -79,10 +79,10 @@ def simulate_many(
 ) -> Batch:
     """Fly `loop` from each of many states for `steps` control periods.
 
-    starts: states of the body, or an array (numbers of a state, lanes), with the effectors' below or without; first_run:
-    the run number of lane 0, which with the seed fixes its random numbers; phases: those of the loop, `loop.phases(steps)`,
-    with an array (lanes,) in place of every number that differs between lanes, whole numbers excepted, see `stacked`;
-    width: lanes in flight at once on a core.
+    starts: states of the body, or an array (numbers of a state, lanes), with or without the effectors' below; first_run: the
+    run number of lane 0, which with the seed fixes its random numbers; phases: those of the loop, `loop.phases(steps)`, with
+    an array (lanes,) in place of every number that differs between lanes, whole numbers excepted, see `stacked`; width:
+    lanes in flight at once on a core.
 
     The result is the same, bit for bit, for any number of threads and any width, and equals that of `simulate` lane by lane
     until the motion diverges."""
@@ -107,7 +107,7 @@ def simulate_many(
 
 class RunningBatch:
     """A batch of lanes in flight: the carry of each, in blocks of `width` lanes, and the observer's notes on it. `alike` are
-    the places of the carry's numbers that are equal in all lanes, bit for bit, and stay so: they are flown once for all.
+    the indices of the carry's numbers that are equal in all lanes, bit for bit, and stay so: they are flown once for all.
 
     carries: (numbers, lanes), see `carry_columns`; first_run: the run number of lane 0, or those of all lanes (lanes,);
     noted: (numbers, lanes)."""
@@ -151,7 +151,7 @@ class RunningBatch:
         return blocks
 
     def copy(self) -> Self:
-        """A batch that flies on by itself."""
+        """Return a batch that continues independently."""
         other = copy(self)
         other.x, other.noted, other._ready = self.room(self.x.shape[1]), self.room(self.noted.shape[1]), {}
         other.x[:], other.noted[:] = self.x, self.noted
@@ -162,11 +162,11 @@ class RunningBatch:
         return np.ascontiguousarray(blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)[:, : self.lanes])
 
     def carries(self) -> NDArray[np.float64]:
-        """The numbers that each lane carries now, (numbers, lanes)."""
+        """Return the numbers that each lane carries now, (numbers, lanes)."""
         return self.unpacked(self.x)
 
     def notes(self) -> NDArray[np.float64]:
-        """The numbers that have been noted of each lane, (numbers, lanes)."""
+        """Return the notes of each lane, (numbers, lanes)."""
         return self.unpacked(self.noted)
 
     def fly(
@@ -192,7 +192,7 @@ class RunningBatch:
         memories |= {"carry": part, "noted": self.noted[piece.start : piece.stop], "own": varying[piece.start : piece.stop]}
         memories |= {"shared": arguments.shared, "tables": arguments.tables}
         run = self.first_run + piece.start * self.width
-        # Without a step they are looked at all the same.
+        # They are observed even without a step.
         for step in range(begin, max(end, begin + 1), CHUNK):
             memories["common"] = np.ascontiguousarray(part[0, alike, 0])
             for half in halves:
@@ -210,13 +210,13 @@ class RunningBatch:
                 self.alike = tuple(row for row in self.alike if row not in self.rows.state.rate)
             more = (self.like, numbers, self.loop.substeps, observer, self.runs)
             halves, self.alike = make_halves(self.loop.composition(), self.width, self.alike, *more)
-            # The key's objects are kept, lest others get their ids.
+            # The key's objects are kept, so that no others get their ids.
             kept = (phase, observer)
             self._ready[key] = (kept, halves, list(self.alike), arguments, self._packed(arguments.rows(self.lanes)), turn)
         return self._ready[key]
 
     def _turned(self, phase: Phase) -> Any:
-        """A function that gives the body's rates in the lanes of a piece at the start of a phase."""
+        """Return a function that gives the body's rates in the lanes of a piece at the start of a phase."""
         size = self.count * self.width
 
         def whole(leaf: Any) -> Any:
@@ -236,7 +236,7 @@ class RunningBatch:
 
 
 def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:
-    """The carry at the start of each lane, one column a lane, from its state (numbers of a state, lanes). phase: the first,
+    """Return the initial carry, one column for each lane, from its state (numbers of a state, lanes). phase: the first,
     where numbers of it differ between lanes."""
     lanes = start.shape[1]
     varies = phase is not None and any(isinstance(leaf, np.ndarray) for leaf in leaves((phase.gains, phase.nominal)))
@@ -261,7 +261,7 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
 
 
 def _differ(loop: ClosedLoop) -> bool:
-    """Whether the initial memories of a loop depend on the body's initial state."""
+    """Return whether the initial memories of a loop depend on the body's initial state."""
     starting = [f.part for f in (*loop.used("sensor"), *loop.used("estimator")) if f.part.hook("remember")]
     return bool(starting or loop.carry().memories.readings or loop.carry().memories.estimate) or (
         loop.aims and loop.target.part.flag("FOLLOWS")
@@ -269,9 +269,9 @@ def _differ(loop: ClosedLoop) -> bool:
 
 
 def stacked(values: Sequence[Any]) -> Any:
-    """One structure for many lanes from one of each: numbers that differ become arrays (lanes,).
-
-    Raises ValueError where more than numbers differ: the form, whole numbers, tables."""
+    """Stack the structures of many lanes into one: numbers that differ become arrays (lanes,). ValueError where more than
+    numbers differ: the form, whole numbers, tables.
+    """
     first = values[0]
     if isinstance(first, (tuple, list)):
         if any(type(value) is not type(first) or len(value) != len(first) for value in values):

@@ -1,4 +1,4 @@
-"""A closed loop is flown control step by control step, with commands of its own law or from outside."""
+"""Flies a closed loop control step by control step, with commands of its own law or from outside."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LAST = 1 << 40
 
 @dataclass(frozen=True)
 class Readings:
-    """The flight software reads these numbers at a control instant, in SI units, or arrays (lanes,) of many flights."""
+    """The numbers that flight software reads at a control instant, in SI units, or arrays (lanes,) of many flights."""
 
     time: float
     """Time since the start (s)."""
@@ -38,7 +38,7 @@ class Readings:
 
     @cached_property
     def measurement(self) -> Any:
-        """The loop's own law is given this: errors of attitude and rate, with the target's motion."""
+        """The inputs of the loop's own law: errors of attitude and rate, with the target's motion."""
         return self._part(0)
 
     @cached_property
@@ -57,7 +57,7 @@ class Readings:
 
 
 def sensed_of(loop: ClosedLoop) -> tuple[Any, Any, Any]:
-    """Return what the law of a loop is given at the start: its measurement, the readings of the sensors, the estimate."""
+    """Return the inputs of a loop's law at the start: its measurement, the readings of the sensors, the estimate."""
     first = loop.phases(1)[0]
     step = make_step(loop.composition())
     return step.sense(loop.carry(), 0, (loop.seed, loop.run), first.gains, first.nominal, first.setup)[:3]
@@ -69,12 +69,12 @@ def _shaped(numbers: NDArray[np.float64], like: Any) -> Any:
 
 
 class Stepper:
-    """One flight of a closed loop, or many at once, a control step at a call.
-
-    A flight that is given the commands of its own law, or none, has the bits of `simulate`."""
+    """One flight of a closed loop, or many at once, one control step per call. A flight with the commands of its own law, or
+    none, has the bits of `simulate`.
+    """
 
     def __init__(self, loop: ClosedLoop, lanes: int | None = None, record: bool = True) -> None:
-        """lanes: how many flights, None for one whose numbers have no axis of lanes; record: whether samples are kept."""
+        """lanes: the number of flights, None for one without an axis of lanes; record: whether samples are kept."""
         self.loop, self.lanes, self.record = loop, lanes, record
         self._step, self._like = make_step(loop.composition()), loop.carry()
         self._phases = loop.phases(LAST)
@@ -85,11 +85,10 @@ class Stepper:
         self.reset()
 
     def reset(self, seed: int | None = None, run: int | None = None, start: Any = None) -> Readings:
-        """Begin again, and tell what is read at the start.
-
-        seed, run: of the random numbers, the scenario's if None; many flights have the runs from `run` on; start: another
-        state of the body, as `state` has it, whose numbers may be arrays (lanes,). ValueError for another shape and for what
-        is not finite."""
+        """Begin again, and return the initial readings. seed, run: of the random numbers, the scenario's if None; many
+        flights have the runs from `run` on; start: another state of the body, like `state`, whose numbers may be arrays
+        (lanes,). ValueError for another shape and for what is not finite.
+        """
         loop, lanes = self.loop, self.lanes or 1
         self.seed, self.run = loop.seed if seed is None else seed, loop.run if run is None else run
         given = flatten(loop.start if start is None else start)
@@ -131,7 +130,7 @@ class Stepper:
 
     @property
     def truth(self) -> NDArray[np.float64]:
-        """The numbers of the body's true state and of the effectors' in a row, (numbers,) or (numbers, lanes)."""
+        """The numbers of the true states of body and effectors in a row, (numbers,) or (numbers, lanes)."""
         return self._read("carry")[: len(flatten((self._like.state, self._like.effectors)))]
 
     @property
@@ -145,10 +144,10 @@ class Stepper:
         return self._read("carry")[self._batch.rows.lost_at] >= 0.0
 
     def step(self, command: ArrayLike | None = None) -> Readings:
-        """Fly one control period, and tell what is read at its end.
-
-        command: held over the period, (3,) or (lanes, 3), and saturated as the loop saturates its law's (N m, or the body's
-        unit); None: what the loop's own law commands. ValueError for a command that is not finite or of another shape."""
+        """Fly one control period, and return the readings at its end. command: held over the period, (3,) or (lanes, 3), and
+        saturated like the law's own (N m, or the body's unit); None: the command of the loop's own law. ValueError for a
+        command that is not finite or of another shape.
+        """
         if command is not None:
             wanted = np.asarray(command, dtype=float)
             shape = (3,) if self.lanes is None else (self.lanes, 3)
@@ -171,21 +170,21 @@ class Stepper:
             self._made(phase, True)
 
     def close(self, command: ArrayLike | None = None) -> None:
-        """Record this instant with the command that would be given now, and stay. ValueError as of `step`."""
+        """Record this instant with the command that would be given now, without a step. ValueError as in `step`."""
         ahead = self.copy()
         ahead.step(command)
         self._ending = ahead._rows[-1] if self.record else None
 
     def copy(self) -> Self:
-        """Another flight that goes on from here by itself."""
+        """Return another flight that continues independently from here."""
         other = copy(self)
         other._hold(self._batch.copy())
         other._rows = list(self._rows)
         return other
 
     def samples(self, record_every: int = 1, lane: int = 0) -> tuple[NDArray[np.float64], Any]:
-        """The samples (number, sample) since the start, and the carry at the end, as `fly` gives them; without the last
-        instant where its command would have come from outside. ValueError where nothing was recorded."""
+        """Return the samples (number, sample) since the start, and the final carry, like `fly`; without the last instant if
+        its command would have come from outside. ValueError where nothing was recorded."""
         if self._closed and self._ending is None:
             self.close()
         rows = self._rows if self._ending is None else [*self._rows, self._ending]
@@ -202,16 +201,16 @@ class Stepper:
         return label(self.loop, *self.samples(lane=lane), 1)
 
     def dataset(self, lane: int = 0) -> xr.Dataset:
-        """The recording as a Dataset with units, as `simulate` gives it."""
+        """Return the recording as a Dataset with units, like `simulate`."""
         return self.recording(lane).dataset()
 
     def _read(self, name: str) -> NDArray[np.float64]:
-        """A copy of what lies in a memory, (numbers,) or (numbers, lanes)."""
+        """Return a copy of the contents of a memory, (numbers,) or (numbers, lanes)."""
         blocks = self._memories[name]
         return blocks[0, :, 0].copy() if self.lanes is None else self._batch.unpacked(blocks)
 
     def _enter(self) -> None:
-        """Begin the phase of this step, where one begins."""
+        """Begin the phase of this step, if one begins."""
         if self.steps != self._phases[self._phase].last:
             return
         self._phase += 1

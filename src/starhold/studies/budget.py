@@ -55,15 +55,15 @@ if TYPE_CHECKING:
 
 LOOP, TOGETHER, COMBINED = "the loop itself", "all together", "root sum square"
 SMALL = math.radians(5.0)
-"""Rotation vectors up to here add up, to less than a twentieth of their size."""
+"""Rotation vectors up to this size (rad) add, to within a twentieth of their size."""
 MOST = 5_000_000
-"""Errors that are kept of one flight of all runs."""
+"""The most errors that are kept of one batch of runs."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How errors are taken: from which time on (s), over windows of which length (s), how far apart windows start for drift
-    (s), the share of the errors that a level keeps and how the share is meant, the number of runs, and the line of sight."""
+    """How errors are sampled: from which time on (s), the length of windows (s), the separation of windows for drift (s),
+    the share of the errors below a level and its statistical interpretation, the number of runs, and the line of sight."""
 
     start: float
     window: float
@@ -76,62 +76,62 @@ class Settings:
 
 @dataclass(frozen=True)
 class Contribution:
-    """One row of a budget: a source, the loop without any, their root sum square, or all of them together."""
+    """One row of a budget: a source, the loop without sources, the root sum square of sources, or all of them together."""
 
     name: str
     kind: Literal["loop", "source", "combined", "together"]
     figures: Mapping[str, Mapping[str, Figures]]
     """Level, mean and standard deviation (rad) of an index ("APE", "MPE", "RPE", "PDE"; with an estimator "AKE", "MKE",
-    "RKE", "KDE" of its error) about an axis ("x", "y", "z", "angle" about whatever, "line of sight" with a boresight)."""
+    "RKE", "KDE" of its error) about an axis ("x", "y", "z", "angle" for any axis, "line of sight" with a boresight)."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """The pointing errors of a law by source. Levels are about the line of sight where there is one, else of the angle about
-    any axis."""
+    """The pointing errors of a law by source. Levels are those of the line of sight where there is one, else of the total
+    angle."""
 
     scenario: str
     law: str
     settings: Settings
     rows: tuple[Contribution, ...]
-    """The loop itself, each source, their root sum square, all together."""
+    """Rows: the loop itself, each source, their root sum square, all together."""
     required: Mapping[str, float]
     """The largest level (rad) of an index that is allowed, by the index."""
     proof: ProvedPointing | None = None
-    """The proved bound of the pointing error holds here, with each source's share of it, where a proof was asked for."""
+    """The proved bound of the pointing error, with each source's share, where a proof was requested."""
 
     @property
     def axis(self) -> str:
-        """The axis that levels are about."""
+        """The axis of the levels."""
         return ANGLE if self.settings.boresight is None else LINE
 
     @property
     def indices(self) -> tuple[str, ...]:
-        """The indices that there are."""
+        """The indices present."""
         return tuple(self.rows[0].figures)
 
     @property
     def met(self) -> bool:
-        """Whether all together keep what is required."""
+        """Whether all sources together meet the requirement."""
         return all(self.level(TOGETHER, index) <= most for index, most in self.required.items())
 
     def row(self, name: str) -> Contribution:
-        """The row of this name. KeyError where there is none."""
+        """Return the row of this name. KeyError where there is none."""
         rows = {row.name: row for row in self.rows}
         return rows[name]
 
     def level(self, name: str, index: str) -> float:
-        """The level of an index (rad) in the row of this name."""
+        """Return the level of an index (rad) in the row of this name."""
         return self.row(name).figures[index][self.axis].level
 
     def table(self) -> DataFrame:
-        """A table with a row for each source, index and axis: level, mean and standard deviation (rad)."""
+        """Return a table with a row for each source, index and axis: level, mean and standard deviation (rad)."""
         from starhold.studies.frames import frame_of
 
         return frame_of(self.records())
 
     def summary(self) -> dict[str, Any]:
-        """All numbers as JSON has them: settings, and levels (rad) by source and index."""
+        """Return all numbers in the types of JSON: settings, and levels (rad) by source and index."""
         proof = {} if self.proof is None else {"proof": asdict(self.proof)}
         return {
             **proof,
@@ -147,7 +147,7 @@ class Budget:
         }
 
     def records(self) -> list[dict[str, Any]]:
-        """The rows of `table`."""
+        """Return the rows of `table`."""
         return [
             {"source": row.name, "kind": row.kind, "index": index, "axis": axis, **figures._asdict()}
             for row in self.rows
@@ -157,7 +157,7 @@ class Budget:
 
 
 class Source(NamedTuple):
-    """Something that disturbs a loop, and the changes of a scenario that take it away."""
+    """A source of error in a loop, and the changes of the scenario that remove it."""
 
     name: str
     without: Mapping[str, Any]
@@ -166,11 +166,11 @@ class Source(NamedTuple):
 def study(
     scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
 ) -> Budget:
-    """Fly a law of a scenario without any source of error, with each of them alone, and with all of them; faults never come.
-
-    A source's contribution is by how much it moves the error of the loop without any, run by run and instant by instant.
-    `notice` hears the number done, that of all, and the flight that comes next. InputError where nothing disturbs the loop,
-    the windows do not fit into the run, or a motion is lost."""
+    """Fly a law of a scenario without any source of error, with each of them alone, and with all of them, always without
+    faults. A source's contribution is the difference that it makes to the error of the loop without sources, run by run and
+    instant by instant. `notice` is called with the number done, the total, and the next flight. InputError where nothing
+    disturbs the loop, the windows do not fit into the run, or a motion diverges.
+    """
     required = {one.metric.upper(): one.bound for one in check_budget(scenario)}
     scenario = faultless(scenario)
     disturbing, clock = sources(scenario), _Clock.of(scenario)
@@ -187,7 +187,7 @@ def study(
     largest = max(float(np.linalg.norm(errors, axis=-1).max()) for errors, _ in flown)
     if largest > SMALL:
         seen = f"errors up to {math.degrees(largest):.3g} deg from {clock.settings.start:g} s on"
-        warnings.warn(f"{scenario.where}: {seen}, which do not add up as small ones do", stacklevel=2)
+        warnings.warn(f"{scenario.where}: {seen}, which are too large to add linearly", stacklevel=2)
     runs, instants = flown[0][0].shape[:2]
     apart = spacing(runs, instants, clock.length)
     if apart > 1:
@@ -208,27 +208,27 @@ def study(
 
 
 def faultless(scenario: Scenario) -> Scenario:
-    """The scenario as its budget flies it."""
+    """Return the scenario as flown for its budget."""
     return scenario.about("rigid-body").with_({"fault": None, "campaign": None, "requirement": None})
 
 
 def without(scenario: Scenario, entry: LawEntry, away: Sequence[Source]) -> ClosedLoop:
-    """The loop of a law without some sources."""
+    """Return the loop of a law without some sources."""
     changes = {key: value for source in away for key, value in source.without.items()}
     gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
     return build(scenario.with_(changes), _without_effectors(entry, gone))
 
 
 def check_budget(scenario: Scenario) -> tuple[Requirement, ...]:
-    """The requirements that the budget of a scenario decides. InputError where one is about anything but the level of an
-    index, "ape" and others, that is to be at most some angle, and where an index needs an estimator that there is not."""
+    """Return the requirements that the budget of a scenario decides. InputError where one is not an upper bound on the level
+    of an index, such as "ape", and where an index needs an estimator that is absent."""
     tables = tables_of(scenario, "budget")
     known = PERFORMANCE if all(fitted.part.role != "estimator" for fitted in scenario.parts) else MEANINGS
     return at_most(scenario, tables, dict.fromkeys([index.lower() for index in known], "rad"))
 
 
 def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
-    """A law whose modes, if it has any, do not name effectors that are away."""
+    """Return a law whose modes, if any, do not name removed effectors."""
     module: Any = entry.law.module
     if not isinstance(module, Modes):
         return entry
@@ -238,8 +238,8 @@ def _without_effectors(entry: LawEntry, gone: Collection[str]) -> LawEntry:
 
 
 def sources(scenario: Scenario) -> tuple[Source, ...]:
-    """Tell what disturbs the loops of a scenario: torques, moving parts that take no command, friction of wheels, and the
-    parameters of a sensor that may be zero and are not, except times. Actuators, estimators and sampling belong to the
+    """List the sources that disturb the loops of a scenario: torques, moving parts without a command, friction of wheels,
+    and the nonzero parameters of a sensor that may be zero, except times. Actuators, estimators and sampling belong to the
     loop."""
     disturbing = [
         Source(key.replace("_", " "), {f"{name}.{key}": type(value)()})
@@ -269,10 +269,10 @@ def _smooth(scenario: Scenario) -> dict[str, Any]:
 
 
 def _errors_of(fitted: Fitted) -> dict[str, Any]:
-    """The parameters of a sensor that are errors, by name, with the zeros that remove them."""
+    """Return the parameters of a sensor that are errors, by name, with the zeros that remove them."""
     zeros: dict[str, Any] = {}
     for item, value in zip(fitted.part.fields(), fitted.params, strict=True):
-        # What has to be given may be a direction, unless zero is where its bounds begin.
+        # A required parameter may be a direction, unless its bounds begin at zero.
         absent = item.gain.at_least == 0.0 if item.required else not np.any(item.default)
         if absent and _may_be_zero(item.gain) and np.any(value):
             zeros[item.name] = [0.0] * item.gain.shape[0] if item.gain.shape else 0.0
@@ -281,12 +281,12 @@ def _errors_of(fitted: Fitted) -> dict[str, Any]:
 
 def _may_be_zero(gain: Parameter) -> bool:
     plain = not (gain.whole or gain.choices or gain.columns or len(gain.shape) > 1)
-    # Delays and intervals shape the loop: without them noise of the same size would do less, or more.
+    # Delays and intervals shape the loop: without them the same noise would have another effect.
     return plain and gain.unit != "s" and gain.above is None and (gain.at_least or 0.0) <= 0.0 <= (gain.at_most or 0.0)
 
 
 class _Clock(NamedTuple):
-    """When errors are taken: control steps of a run and of a sample, the first sample, those of a window and of a drift."""
+    """When errors are sampled: control steps of a run and a sample, the first sample, samples of a window and of a drift."""
 
     settings: Settings
     steps: int
@@ -297,7 +297,7 @@ class _Clock(NamedTuple):
 
     @classmethod
     def of(cls, scenario: Scenario) -> _Clock:
-        """The times of a scenario's [budget] table. InputError where they do not fit into its runs."""
+        """Return the times of a scenario's [budget] table. InputError where they do not fit into its runs."""
         timing, wanted = scenario.table.simulation, scenario.table.budget
         period = timing.control_period * timing.record_every
         last = (timing.steps - 1) // timing.record_every
@@ -328,7 +328,7 @@ class _Clock(NamedTuple):
 
 
 class _Noted(NamedTuple):
-    """The error of the attitude, and that of its estimate, as rotation vectors (rad, body axes)."""
+    """Return the error of the attitude, and that of its estimate, as rotation vectors (rad, body axes)."""
 
     error: Any
     knowledge: Any
@@ -336,7 +336,7 @@ class _Noted(NamedTuple):
 
 @cache
 def _note(parts: Composition, knows: bool) -> Any:
-    """The equations of the notes; one function for loops that one kernel flies."""
+    """Return the equations of the errors; one function for loops that one kernel flies."""
     read = sampled(parts)
 
     def note(seen: Any, decided: Any, carry: Any, step: Any, setup: Any, numbers: Any) -> _Noted:
@@ -348,7 +348,7 @@ def _note(parts: Composition, knows: bool) -> Any:
 
 
 def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock, name: str) -> tuple[Array, Array | None]:
-    """The errors of all runs of a loop, (runs, instants, 3), and those of the estimate, None without one."""
+    """Return the errors of all runs of a loop, (runs, instants, 3), and those of the estimate, None without one."""
     runs, (phase,) = clock.settings.runs, loop.phases(clock.steps)
     knows = hasattr(loop.carry().memories.estimate, "attitude")
     first = _Noted(ZERO, ZERO if knows else ())
@@ -364,7 +364,7 @@ def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock,
     def work(piece: range) -> None:
         done, span = 0, slice(piece.start, piece.stop)
         for place, instant in enumerate(instants):
-            # Up to the instant and the step that begins there, of which the notes are left.
+            # Up to the instant and the step that begins there, whose notes remain.
             batch.fly(phase, piece, done, instant + 1 - done)
             done = instant + 1
             noted[span, :, place] = batch.noted[span].swapaxes(1, 2)
@@ -373,7 +373,7 @@ def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock,
         pool.share(work, batch.count, 1)()
     lost = batch.carries()[places(batch.like).lost_at]
     if (lost >= 0.0).any():
-        reason = f"{name}: the motion is lost at {lost[lost >= 0.0].min() * loop.period:g} s"
+        reason = f"{name}: the motion diverges at {lost[lost >= 0.0].min() * loop.period:g} s"
         raise InputError(scenario.where, f"law.{entry.name}", reason, "a law that holds the attitude")
     errors = noted.reshape(-1, len(instants), size)[:runs]
     return errors[..., :3], errors[..., 3:] if knows else None
@@ -384,7 +384,7 @@ def _less(errors: Array | None, still: Array | None) -> Array | None:
 
 
 def _figures(clock: _Clock, errors: Array | None, knowledge: Array | None) -> dict[str, dict[str, Figures]]:
-    """The figures of each index about each axis."""
+    """Return the figures of each index about each axis."""
     settings, vectors = clock.settings, dict[str, Array]()
     if errors is not None:
         vectors |= indices(errors, clock.length, clock.apart)

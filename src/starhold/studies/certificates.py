@@ -1,4 +1,4 @@
-"""Certificates of a scenario's laws, each tried by flights."""
+"""Certificates of a scenario's laws, each tested by flights."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 class Tried(NamedTuple):
-    """A certificate, the flights that tried it (None: it claims nothing that can be flown), and for each kind of claim
-    about a set whether the scenario's start lies in it."""
+    """A certificate, the flights that tested it (None: it claims nothing that can be flown), and for each kind of claim
+    about a set whether the scenario starts inside it."""
 
     certificate: Certificate
     trial: Trial | None
@@ -30,14 +30,14 @@ class Tried(NamedTuple):
 
 
 def compare_programs(path: Path, scenario: Scenario) -> list[str]:
-    """How the proofs of a file that was checked are about other loops than a scenario has; nothing where they are not."""
+    """Describe how the proofs of a checked file are about other loops than those of a scenario; empty where they are not."""
     from starhold.certification.comparison import differences, station_differences
     from starhold.studies.bodies.rigid_body import certified_loops, handed_over
 
     content: Any = json.loads(path.read_text(encoding="utf-8"))
     if not content["claims"] or "certificates" not in content:
         raise InputError(
-            str(path), "", "no proofs about loops of a scenario", "a certificate that has some, or no --scenario"
+            str(path), "", "no proofs about loops of a scenario", "a certificate with such proofs, or no --scenario"
         )
     loops: dict[str, ClosedLoop] = {}
     ends: dict[str, Ends] = {}
@@ -69,9 +69,9 @@ def certify_scenario(scenario: Scenario, law: str | None = None) -> list[Tried]:
     study, entries = study_of(scenario.body), scenario.laws if law is None else (scenario.pick(law),)
     if scenario.supposed is not None:
         raise InputError(
-            scenario.where, "nominal", "laws that take the craft for another one", "no [nominal], to be certified"
+            scenario.where, "nominal", "a [nominal] table that differs from the craft", "no [nominal], for certification"
         )
-    # All of them before the first proof, so that what is wrong with the last is said at once.
+    # All are read before the first proof, so that an error in the last is reported at once.
     loops = [build(scenario, entry) for entry in entries]
     issued = [
         one

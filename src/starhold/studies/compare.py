@@ -1,4 +1,4 @@
-"""Flies the laws of a scenario, whatever its body is, and measures and certifies them."""
+"""Flies the laws of a scenario on any body, and measures and certifies them."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -17,12 +17,12 @@ from starhold.studies.modes import epoch_of, modes_flown
 from starhold.version import __version__
 
 Notice: TypeAlias = Callable[[str, int, int], None]
-"""Called with a law's name, the control steps done and those in all."""
+"""Called with a law's name, the control steps done and their total."""
 
 
 def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = None, process: str | None = None) -> Flight:
-    """One law of the scenario, with the loop that `build` gives for it, flown and measured; process: a program that commands
-    in place of the law."""
+    """Fly and measure one law of the scenario, in the loop that `build` gives; process: a program that commands in place of
+    the law."""
     study = study_of(scenario.body)
     progress = None if notice is None else lambda done, total: notice(entry.name, done, total)
     run, carry = _flown(scenario, loop, progress, process)
@@ -36,18 +36,18 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
 
 
 def timed(scenario: Scenario, loop: Any, flight: Flight) -> Flight:
-    """The flight with the cost of a call of its law, measured truly only on a machine that does nothing else."""
+    """Return the flight with the cost of a call of its law, which is accurate only on an idle machine."""
     return costing(flight, study_of(scenario.body).call_costs(loop, flight.recording))
 
 
 def costing(flight: Flight, costs: dict[str, float]) -> Flight:
-    """The flight with these costs of a call of its law among its metrics."""
+    """Return the flight with these costs of a call of its law among its metrics."""
     return replace(flight, metrics=flight.metrics | costs)
 
 
 def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight) -> Flight:
-    """The flight with the certificates of its law, and how it leaves their claims; without either where the law's nominal
-    model is not the craft."""
+    """Return the flight with the certificates of its law, and how it leaves their claims; without either where the law's
+    nominal model is not the craft."""
     study = study_of(scenario.body)
     certified = [] if loop.nominal is not None else study.certify(scenario, entry, loop)
     left = tuple(study.departures(issued, loop, flight.recording) for issued in certified)
@@ -55,7 +55,7 @@ def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight) -> Flight:
 
 
 def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress | None = None) -> Flight:
-    """The flight with the change of its metrics under half the integration step."""
+    """Return the flight with the change of its metrics under half the integration step."""
 
     finer = record(scenario, halved(loop), progress)
     errors = step_error(flight.recording, finer, study_of(scenario.body).state_names(finer))
@@ -70,7 +70,7 @@ def record(scenario: Scenario, loop: Any, progress: Progress | None = None, proc
 def _flown(
     scenario: Scenario, loop: Any, progress: Progress | None = None, process: str | None = None
 ) -> tuple[Recording, Any]:
-    """The run of a loop, with the commands of a process if there is one, and the carry at its end."""
+    """Fly a loop, with the commands of a process if there is one; return the run and its final carry."""
     timing = scenario.table.simulation
     if process is None:
         samples, carry = fly(loop, timing.steps, timing.record_every, progress=progress)
@@ -90,31 +90,31 @@ def _flown(
 
 
 def commanded_by(process: str, run: Recording) -> Recording:
-    """The recording of a flight whose commands came from a process, which stands among its attributes where the program of
-    the law would."""
+    """Return the recording of a flight whose commands came from a process, which is named among its attributes in place of
+    the program of the law."""
     attrs = {name: value for name, value in run.attrs.items() if name != "law_program"}
     return replace(run, attrs=attrs | {"law_process": process})
 
 
 def name_samples(scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
-    """The samples of `fly` under their names; by its attributes the run can be measured, and made again."""
+    """Name the samples of `fly`; with the attributes the run can be measured and repeated."""
     run = study_of(scenario.body).name_samples(scenario, loop, samples, carry)
     signed = {"scenario": scenario.text, "starhold_version": __version__}
     return replace(run, attrs={**signed, **run.attrs, "body": scenario.body})
 
 
 def metrics_of(run: Recording) -> dict[str, Any]:
-    """The metrics of a recorded run, without those of the law's calls."""
+    """Return the metrics of a recorded run, without those of the law's calls."""
     return study_of(run.attrs["body"]).metrics_of(run)
 
 
 def metric_set_of(run: Recording) -> MetricSet:
-    """How the metrics of a recorded run are shown."""
+    """Return how the metrics of a recorded run are shown."""
     return study_of(run.attrs["body"]).metric_set(run)
 
 
 def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
-    """Every law of the scenario flown on it, in the order of the file."""
+    """Fly every law of the scenario, in the order of the file."""
     loops = [(entry, build(scenario, entry)) for entry in scenario.laws]
     return [
         timed(scenario, loop, prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice))) for entry, loop in loops
@@ -122,7 +122,7 @@ def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
 
 
 def _law_counters(entry: Any, memory: Any) -> dict[str, Any]:
-    """The counts of an iterating law during the run: solver iterations and the calls that used up their budget."""
+    """Return the counts of an iterative law during the run: solver iterations and the calls that used up their budget."""
     counted = entry.law.counters(memory)
     if counted is None:
         return {}
@@ -139,15 +139,16 @@ Loop = TypeVar("Loop")
 
 
 def halved(loop: Loop) -> Loop:
-    """The loop with twice as many integration steps, each half as long; its control steps and random numbers stay."""
+    """Return the loop with twice as many integration steps, each half as long, and the same control steps and random
+    numbers."""
     known: Any = loop
     return replace(known, substeps=2 * known.substeps)
 
 
 def step_error(run: Recording, finer: Recording, names: Iterable[str]) -> dict[str, float | None]:
-    """Largest differences of some quantities between a run and the one of the `halved` loop: of quaternions the angle
-    between them (rad), else norms in the units of the recording. All are None if one of the two diverged before the
-    other, for from then on there is nothing to compare."""
+    """Return the largest differences of some quantities between a run and that of the `halved` loop: for quaternions the
+    angle between them (rad), else norms in the units of the recording. All are None if one of the two diverged before the
+    other, because then there is nothing to compare."""
     same = len(run["time"]) == len(finer["time"])
     return {name: _difference(run, finer, name) if same else None for name in names}
 

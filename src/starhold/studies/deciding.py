@@ -44,15 +44,15 @@ BOUNDS: Mapping[str, tuple[str, str, str]] = {
     "peak_torque": ("N m", "torque-limit", "limit"),
     "peak_wheel_momentum": ("N m s", "wheels", "wheel_momentum"),
 }
-"""The metrics that claims bound from above: unit, kind of the claim, and which of its numbers."""
+"""The metrics that claims bound from above: unit, kind of the claim, and the claim's number."""
 IDEAL = {
-    "continuous-torque": "the holding of the torque between control instants",
+    "continuous-torque": "the zero-order hold of the torque",
     UNLIMITED: "the limit of the torque",
     WHEELS: "the limits and the friction of the wheels",
     FRICTIONLESS: "the friction of the wheels",
     "settled-estimate": "the time until the estimate has settled",
 }
-"""What a claim leaves out beside parts, by its assumptions."""
+"""What a claim leaves out besides parts, by its assumptions."""
 MARGINS = {
     "gain_margin": "gain",
     "lower_gain_margin": "less",
@@ -61,12 +61,12 @@ MARGINS = {
     "crossover": "crossover",
     "sensitivity": "sensitivity",
 }
-"""The metrics of the linear loop, each the worst of the three axes, with their names among the margins of one."""
+"""The metrics of the linear loop, each for the worst of the three axes, with their names among one axis' margins."""
 OF_MARGINS = dict(zip(MARGINS, ("1", "1", "rad", "s", "rad/s", "1"), strict=True))
 
 
 def refuse_other_bodies(scenario: Scenario) -> None:
-    """InputError where a requirement asks for a method that the scenario's body does not have."""
+    """Raise InputError where a requirement names a method that the scenario's body does not have."""
     for method in ("proof", "budget", "margin"):
         for key in tables_of(scenario, method) if scenario.body != "rigid-body" else ():
             raise InputError(scenario.where, f"{key}.method", show(method), "flight, campaign or inspection, for this body")
@@ -76,23 +76,24 @@ def refuse_other_bodies(scenario: Scenario) -> None:
 
 
 def check_proofs(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]:
-    """The requirements that claims decide. InputError for a metric that none bounds from above, and for modes and times."""
+    """Return the requirements that claims decide. InputError for a metric that none bounds from above, and for modes and
+    times."""
     tables = tables_of(scenario, "proof")
     check_modes(scenario, entry, tables)
     for key, table in tables.items():
-        # A proof is about all times, however long the flight is.
+        # A proof covers all times, whatever the duration of the flight.
         times_of(scenario, key, table)
     return at_most(scenario, tables, {metric: unit for metric, (unit, _, _) in BOUNDS.items()})
 
 
 def by_proof(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, issued: Sequence[Issued] | str) -> Verdicts:
-    """The verdicts that the claims about a law's loop give: met, or not decided, for what a claim does not bound may be
-    kept all the same. A text tells why there are no claims."""
+    """Return the verdicts by the claims about a law's loop: met, or not decided, because a requirement may hold without
+    proof. A text in place of claims says why there are none."""
     tables = tables_of(scenario, "proof")
     if isinstance(issued, str):
         return {key: undecided(table, issued) for key, table in tables.items()}
     required = check_proofs(scenario, entry)
-    # What flies from later on has certificates of its own, which begin where this flight is not looked at.
+    # Later loops have certificates of their own, which begin at states that this flight does not reach.
     begun = [one for one in issued if one.step == 0 and one.before is None]
     changes = [f"what changes at {event.step * loop.period:g} s" for event in loop.events][:1]
     return {
@@ -110,12 +111,12 @@ def _proved(
     issued: Sequence[Issued],
     changes: Sequence[str],
 ) -> RequirementVerdict:
-    """The verdict of the claim that leaves out the least and keeps the limit, else of the least bound, else why there is
-    none."""
+    """Return the verdict of the claim that leaves out the least and keeps the limit, else that of the least bound, else why
+    there is none."""
     _, kind, name = BOUNDS[required.metric]
     modes, place = mode_names(entry), None
     if modes and table.in_mode is None:
-        return undecided(table, f"claims are about each mode by itself: in_mode = {modes[0]}", **limits(table, required))
+        return undecided(table, f"claims are about single modes: in_mode = {modes[0]}", **limits(table, required))
     place = modes.index(str(table.in_mode)) + 1 if modes else None
     why, verdicts = f"no claim {kind} is proved", list[RequirementVerdict]()
     for one in (one for one in issued if one.mode == place):
@@ -142,35 +143,36 @@ def _proved(
 
 
 def _open(table: RequirementTable, required: Requirement, verdict: RequirementVerdict) -> RequirementVerdict:
-    """The verdict of a bound beyond the limit, which shows nothing of the number itself."""
-    return undecided(table, f"only so much is {verdict.evidence}", number=verdict.number, **limits(table, required))
+    """Return the verdict of a bound beyond the limit, which decides nothing about the number itself."""
+    return undecided(table, f"only this bound is {verdict.evidence}", number=verdict.number, **limits(table, required))
 
 
 def _late(scenario: Scenario, key: str, table: RequirementTable, claim: Claim) -> str:
-    """Why a claim of where motions end does not speak of the time, or the tolerances, that a requirement is about; empty
-    where it does."""
+    """Say why a claim of an ultimate bound does not cover the time, or the tolerances, of a requirement; empty where it
+    does."""
     settling, begin = claim.numbers["settling"], times_of(scenario, key, table).begin
     tolerances = scenario.table.settling
     if table.metric == "settling_time":
         ends = claim.numbers["angle"] <= tolerances.attitude_tolerance and claim.numbers["rate"] <= tolerances.rate_tolerance
-        return "" if ends else "motions are not proved to end within the tolerances of [settling]"
+        return "" if ends else "the ultimate bound proved exceeds the tolerances of [settling]"
     if str(table.metric).startswith("final"):
         if table.in_mode is not None:
-            return "no last quarter of a mode is known beforehand: a peak after some time is"
+            return "the last quarter of a mode is not known beforehand; use a peak after some time"
         begin += 0.75 * (scenario.table.simulation.duration - begin)
-    return "" if settling <= begin else f"motions are proved to have ended after {settling:.6g} s, not by {begin:g} s"
+    return "" if settling <= begin else f"the ultimate bound is proved after {settling:.6g} s, not by {begin:g} s"
 
 
 # --- by margins -------------------------------------------------------------------------------------------------------
 
 
 def check_margins(scenario: Scenario) -> tuple[Requirement, ...]:
-    """The requirements that the linear loop decides. InputError for a metric that it does not have."""
+    """Return the requirements that the linear loop decides. InputError for a metric that it does not have."""
     return read_requirements(tables_of(scenario, "margin"), OF_MARGINS, scenario.where)
 
 
 def by_margins(scenario: Scenario, linear: Linear | str) -> Verdicts:
-    """The verdicts that the margins of a linear loop give, of the worst axis each. A text tells why there is no loop."""
+    """Return the verdicts by the margins of a linear loop, each for the worst axis. A text in place of the loop says why
+    there is none."""
     tables, required = tables_of(scenario, "margin"), check_margins(scenario)
     pairs = list(zip(tables.items(), required, strict=True))
     if isinstance(linear, str):
@@ -190,7 +192,8 @@ def by_margins(scenario: Scenario, linear: Linear | str) -> Verdicts:
 
 
 def by_budget(scenario: Scenario, budget: Budget | str) -> Verdicts:
-    """The verdicts that a pointing budget gives: the level of all sources together. A text tells why there is no budget."""
+    """Return the verdicts by a pointing budget: the level of all sources together. A text in place of it says why there is
+    none."""
     tables = tables_of(scenario, "budget")
     units = {f"{table.metric}": "rad" for table in tables.values()}
     pairs: Any = zip(tables.items(), at_most(scenario, tables, units), strict=True)
@@ -198,7 +201,7 @@ def by_budget(scenario: Scenario, budget: Budget | str) -> Verdicts:
         return {key: undecided(table, f"no budget: {budget}", **limits(table, one)) for (key, table), one in pairs}
     settings = budget.settings
     share = f"{100.0 * settings.confidence:.6g} % of errors from {settings.start:g} s on, {settings.runs} runs"
-    faults = ("faults, which never come in a budget",) if scenario.table.fault else ()
+    faults = ("faults, which a budget leaves out",) if scenario.table.fault else ()
     return {
         key: compared(table, one, budget.level(TOGETHER, one.metric.upper()), f"budget: {share}", left_out=faults)
         for (key, table), one in pairs

@@ -1,4 +1,4 @@
-"""A scenario is an environment of Gymnasium: what flight software reads is observed, and its command is the action."""
+"""A scenario as a Gymnasium environment: the observation is what flight software reads, the action its command."""
 
 from __future__ import annotations
 
@@ -22,36 +22,37 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Reward = Callable[[Readings, Array], Any]
-"""The reward of a control period by the readings at its end and the command, (3,) or (lanes, 3), in the body's unit."""
+"""The reward of a control period from the readings at its end and the command, (3,) or (lanes, 3), in the body's unit."""
 
 
 def error_angle(readings: Readings, command: Array) -> Any:
-    """Minus the angle to the target (rad), as it is measured or estimated."""
+    """Return minus the angle to the target (rad), as measured or estimated."""
     # Noise in its parts may make a quaternion longer than 1.
     return -2.0 * np.arccos(np.minimum(np.abs(readings.measurement.attitude[0]), 1.0))
 
 
 class _Plant:
-    """Flights of a scenario for the time that it says, and the spaces of what they take and tell."""
+    """Flights of a scenario of its duration, and their observation and action spaces."""
 
     def __init__(self, scenario: Scenario, law: str | None, reward: Reward | None, lanes: int | None) -> None:
         loop = studies.build(scenario, scenario.pick(law))
         if reward is None and not loop.aims:
-            raise InputError(scenario.where, "", "a body without an attitude", "reward = a function, for it")
+            raise InputError(scenario.where, "", "a body without an attitude", "reward = a function")
         limit = min(loop.saturation_limit(), getattr(loop.known, "torque_limit", math.inf))
         if not math.isfinite(limit):
-            raise InputError(scenario.where, "", "a command without a limit", "a limit, between which actions lie")
+            raise InputError(scenario.where, "", "a command without a limit", "a limit, which bounds actions")
         self.flight = Stepper(loop, lanes, record=False)
         self.steps, self.reward = scenario.table.simulation.steps, reward or error_angle
         self.actions = Box(-limit, limit, (3,), np.float64)
         self.observations = Box(-math.inf, math.inf, (self.flight.size,), np.float64)
 
     def begin(self, generator: np.random.Generator) -> tuple[Array, dict[str, Any]]:
-        """The first observation of flights with other random numbers."""
+        """Return the first observation of flights with other random numbers."""
         return self.flight.reset(seed=int(generator.integers(1 << 31))).numbers.T, {}
 
     def fly(self, action: Any) -> tuple[Array, Any, Any, bool, dict[str, Any]]:
-        """The observation, the reward, whether the motion diverged, whether the time is over, and what else there is."""
+        """Return the observation, the reward, whether the motion diverged, whether the time is over, and further
+        information."""
         command = np.asarray(action, dtype=float)
         readings = self.flight.step(command)
         ended = self.flight.steps >= self.steps
@@ -82,7 +83,7 @@ class Environment(gymnasium.Env[Array, Array]):
 
 
 class Environments(VectorEnv[Array, Array, Any]):
-    """Many flights side by side, which begin and end together: none begins again by itself."""
+    """A batch of flights that begin and end together: none restarts by itself."""
 
     def __init__(self, scenario: Scenario, lanes: int, law: str | None = None, reward: Reward | None = None) -> None:
         self._plant, self.num_envs = _Plant(scenario, law, reward, lanes), lanes
@@ -97,6 +98,6 @@ class Environments(VectorEnv[Array, Array, Any]):
         return self._plant.begin(self.np_random)
 
     def step(self, actions: Array) -> tuple[Array, Any, Any, Any, dict[str, Any]]:
-        """Fly one control period of each."""
+        """Fly one control period of each flight."""
         seen, reward, diverged, ended, more = self._plant.fly(actions)
         return seen, np.asarray(reward, dtype=float), diverged, np.full(self.num_envs, ended), more

@@ -1,4 +1,4 @@
-"""The failures of wheels: the control that a spacecraft has after the loss of one or two of them."""
+"""Wheel failures: the control that a spacecraft has left after the loss of one or two wheels."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ Array: TypeAlias = NDArray[np.float64]
 FULL = 0.99
 """Share of its momentum limit at which a wheel counts as saturated: beyond it the motor loses its outward torque."""
 HORIZON = 1000
-"""So many orbits ahead, growth is extrapolated; a slower one counts as none."""
+"""Growth is extrapolated over so many orbits; slower growth counts as none."""
 WEAK = 1e-3
-"""Singular values of the axes below this share of the largest belong to directions without authority."""
+"""Singular values of the axes below this share of the largest mark directions without authority."""
 SINGULAR = 1e-9
 MOST_STEPS = 2_000_000
-"""Flights are not continued beyond the scenario's duration where that takes more control steps."""
+"""The most control steps of a flight continued beyond the scenario's duration."""
 
 
 @dataclass(frozen=True)
 class Saturation:
     """When the first wheel reaches its momentum limit: the time (s) and which wheel (from 1), both None where none does; how
-    that is known ("flown", "extrapolated", "none"); and over what time (s) its growth was taken (None where flown)."""
+    that is known ("flown", "extrapolated", "none"); and the window (s) of its growth (None where flown)."""
 
     time: float | None
     wheel: int | None
@@ -53,17 +53,16 @@ class Saturation:
 
 @dataclass(frozen=True)
 class Failure:
-    """A loss of wheels, and what is left after it. What needs three axes is None where they are not left.
-
-    lost: wheels, counted from 1, none for the intact set. lacking: body directions without authority, orthonormal (n, 3).
-    condition: condition number of the working axes. authority: N m. share: of the intact authority. gains: what the law is
-    flown with, by field. eta: degree of stability (1/s), intact and after; None for a law not designed for one. settling:
-    s, None where it does not settle within the scenario's duration. diverged_at: s, None where the motion was not lost.
-    certified: the largest turn from rest (rad), and the largest rate on target (rad/s), from which no motor and no wheel is
-    proved to meet its limit on the way to the target; None where that is not proved.
-    momentum_share: largest |h| over its limit among working wheels during the flight. flown: length of the flight (s).
-    orbit: its period (s), None without one. refused: why the law cannot fly with what is left; then nothing
-    is told of a flight."""
+    """A loss of wheels, and the control left after it. Values that need three axes are None where fewer are left. lost:
+    wheels, counted from 1, none for the intact set. lacking: body directions without authority, orthonormal (n, 3).
+    condition: condition number of the working axes. authority: N m. share: of the intact authority. gains: those that fly,
+    by field. eta: degree of stability (1/s), intact and after; None for a law not designed for one. settling: s, None where
+    it does not settle within the scenario's duration. diverged_at: s, None where the motion did not diverge. certified: the
+    largest slew from rest (rad), and the largest rate on target (rad/s), for which it is proved that no motor and no wheel
+    reaches its limit on the way to the target; None where that is not proved. momentum_share: largest |h| over its limit
+    among working wheels during the flight. flown: length of the flight (s). orbit: its period (s), None without one.
+    refused: why the law cannot fly with the wheels left; then there is no flight.
+    """
 
     lost: tuple[int, ...]
     lacking: tuple[tuple[float, ...], ...]
@@ -82,11 +81,11 @@ class Failure:
     orbit: float | None = None
     refused: str = ""
     proof: ProvedPointing | None = None
-    """How near to the target the loop is proved to stay, where that was asked for."""
+    """The proved pointing bound of the loop, where it was requested."""
 
     @property
     def name(self) -> str:
-        """The lost wheels in words."""
+        """The names of the lost wheels."""
         return " and ".join(map(str, self.lost)) or "none"
 
     @property
@@ -101,12 +100,12 @@ def study(
     notice: Callable[[int, int, str], None] = lambda done, total, name: None,
     proof: bool = False,
 ) -> list[Failure]:
-    """The intact set, then every single and every double loss, flown with a law of the scenario in place of its own faults.
-
-    The loss comes at time 0 and is known at once: the torque is shared out among the wheels left and, where the law was
-    designed for a degree of stability, its gains are designed for the torque left. `notice` hears the number done, that of
-    all, and the loss that comes next. proof: prove how near to the target each loop stays, too.
-    InputError where the scenario has no wheels."""
+    """Fly the intact set, then every single and every double loss, with a law of the scenario and without the scenario's
+    faults. The loss occurs at time 0 and is known at once: the torque is allocated to the wheels left and, where the law was
+    designed for a degree of stability, its gains are designed for the torque left. `notice` is called with the number done,
+    the total, and the next loss. proof: also prove how near to the target each loop stays. InputError where the scenario has
+    no wheels.
+    """
     wheels = require_wheels(scenario)
     count = len(wheels.axes)
     losses = [lost for size in range(3) for lost in combinations(range(1, count + 1), size)]
@@ -125,12 +124,12 @@ def study(
 def study_with_proof(
     scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
 ) -> list[Failure]:
-    """The failures of `study`, with how near to the target each loop is proved to stay, which takes seconds each."""
+    """Return the failures of `study`, each with the proved pointing bound of its loop, which takes seconds."""
     return study(scenario, entry, notice, proof=True)
 
 
 def directions_lacking(axes: Array) -> Array:
-    """Orthonormal body directions (n, 3) about which wheels with these axes (k, 3) give no torque, or hardly any."""
+    """Return orthonormal body directions (n, 3) about which wheels with these axes (k, 3) give almost no torque."""
     if len(axes) == 0:
         return np.eye(3)
     directions, sizes, _ = np.linalg.svd(axes.T)
@@ -141,14 +140,14 @@ def directions_lacking(axes: Array) -> Array:
 
 
 def pick(scenario: Scenario, law: str | None) -> LawEntry:
-    """The law of this name, the first if None; InputError where the scenario has no wheels."""
+    """Return the law of this name, the first if None; InputError where the scenario has no wheels."""
     entry = scenario.pick(law)
     require_wheels(scenario)
     return entry
 
 
 def require_wheels(scenario: Scenario) -> Wheels:
-    """The wheels of a scenario; InputError where it has none."""
+    """Return the wheels of a scenario; InputError where it has none."""
     wheels = wheels_of(scenario)
     if wheels is None:
         raise InputError(scenario.where, "wheels", "no wheels", "a scenario with [wheels] or [[wheel]] tables")
@@ -156,7 +155,7 @@ def require_wheels(scenario: Scenario) -> Wheels:
 
 
 def _left(wheels: Wheels, lost: tuple[int, ...], intact: float) -> Failure:
-    """The wheels that are left, judged as when a fault is diagnosed."""
+    """Return the wheels left, with the same checks as for a diagnosed fault."""
     limits = tuple(0.0 if i in lost else limit for i, limit in enumerate(wheels.torque_limit, 1))
     axes = np.array([axis for i, axis in enumerate(wheels.axes, 1) if i not in lost])
     try:
@@ -179,7 +178,7 @@ def _designed(entry: LawEntry) -> bool:
 
 
 def _degree(scenario: Scenario, entry: LawEntry, gains: Any) -> float | None:
-    """Degree of stability (1/s) that these gains give; None for a law that is not designed for one."""
+    """Return the degree of stability (1/s) of these gains; None for a law that is not designed for one."""
     if not _designed(entry):
         return None
     moments = np.linalg.eigvalsh(tensor(scenario.craft.inertia))
@@ -193,7 +192,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     faults = [
         FaultTable(time=0.0, wheel=wheel, lost=True, action="both" if retune else "reallocate") for wheel in failure.lost
     ]
-    # What the law does about faults of the file is no matter here.
+    # The law's reaction to faults of the file does not matter here.
     plain_entry = replace(entry, options=entry.options._replace(fault_action=None))
     try:
         loop = build(replace(scenario, table=table.model_copy(update={"fault": faults})), plain_entry)
@@ -206,7 +205,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
     every, steps = table.simulation.record_every, _steps(scenario, loop, period)
     samples, carry = fly(loop, steps, every)
     recording = label(loop, samples, carry, every)
-    # A motion that is lost later is lost all the same.
+    # A motion that diverges later has diverged all the same.
     whole, settling = recording.until(table.simulation.duration), table.settling
     metrics = measure(whole, settling.attitude_tolerance, settling.rate_tolerance)
     working = [i for i in range(len(require_wheels(scenario).axes)) if i + 1 not in failure.lost]
@@ -231,7 +230,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
 
 
 def _after(loop: ClosedLoop) -> ClosedLoop:
-    """The loop that flies from the loss on, which its law knows of."""
+    """Return the loop that flies after the loss, known to its law."""
     if not loop.events:
         return loop
     last = loop.events[-1]
@@ -240,17 +239,17 @@ def _after(loop: ClosedLoop) -> ClosedLoop:
 
 def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[float, float] | None:
     if loop.nominal is not None:
-        # No claim is about a law that takes its craft for another one.
+        # No claim covers a law whose nominal model differs from the craft.
         return None
     claim = certify_law(scenario, entry, loop)[0].certificate.claim("wheels")
     if claim is None or claim.outcome != "proved":
         return None
-    # Where nothing limits the wheels no claim is made, so that the set is bounded.
+    # Wheels without limits are not claimed, so that the set is bounded.
     return claim.numbers["slew_angle"], claim.numbers["rate"]
 
 
 def _orbit_period(scenario: Scenario) -> float | None:
-    """Period of the orbit that the spacecraft starts in (s); None without one, or where it is not closed."""
+    """Return the period of the initial orbit (s); None without an orbit, or where it is not closed."""
     orbit = scenario.table.orbit
     if orbit is None:
         return None
@@ -260,8 +259,8 @@ def _orbit_period(scenario: Scenario) -> float | None:
 
 
 def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
-    """Control steps to fly: an orbit more than the scenario's where that can be, for what the wheels store swings with the
-    orbit, and over less than one orbit nobody tells that from growth."""
+    """Return the control steps to fly: an orbit more than the scenario where possible, because the wheels' momentum
+    oscillates with the orbit, and over less than one orbit this looks like growth."""
     steps = scenario.table.simulation.steps
     if period is None or loop.target.part.name == "history" or loop.remembers:
         return steps
@@ -271,9 +270,10 @@ def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:
 
 
 def saturation(times: Array, filled: Array, period: float | None) -> Saturation:
-    """When the first of some wheels is full: times (n,) (s), momenta over their limits (n, wheels), orbit period (s). Growth
-    is taken over the last orbit, or the last half of the flight where that is shorter or there is no orbit, and added to the
-    largest momentum of its sign in that time, which is right to within an orbit. Wheels in the answer count from 1."""
+    """Return when the first wheel saturates, from times (n,) (s), momenta over their limits (n, wheels) and the orbit period
+    (s). Growth over the last orbit, or the last half of the flight where that is shorter or there is no orbit, is added to
+    the largest momentum of its sign in that time, which is accurate to within an orbit. Wheels in the result count from 1.
+    """
     beyond = np.argwhere(np.abs(filled) > FULL)
     if len(beyond):
         row, wheel = beyond[0].tolist()

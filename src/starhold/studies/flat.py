@@ -1,7 +1,6 @@
-"""All numbers that a loop flies with, in one row, each with its name; and the trial whether an equation gives them.
-
-No list says which keys of a file an equation follows: scenarios with other values are built, and their numbers compared with
-those of the equation, to the last bit.
+"""All numbers of a loop, flattened into one row with names; and the test whether an equation gives them. Which keys of a
+file an equation follows is found by building scenarios with other values and comparing their numbers with those of the
+equation, to the last bit.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ Array: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Flat:
-    """A loop as the numbers that fly. form: equal for loops that one kernel flies; names and numbers, in order: of the carry
-    at the start, of each phase, and the times at which later phases begin."""
+    """A loop as a row of numbers. form: equal for loops that one kernel flies; names and numbers, in order: of the initial
+    carry, of each phase, and the times at which later phases begin."""
 
     loop: ClosedLoop
     form: Any
@@ -34,15 +33,15 @@ class Flat:
 
     @classmethod
     def of(cls, loop: ClosedLoop, steps: int, entered: bool = False) -> Flat:
-        """The numbers of a loop that flies so many control steps; `entered`: with the carry as the first phase begins, which
-        may change it."""
+        """Return the numbers of a loop that flies so many control steps; `entered`: with the carry after the first phase has
+        begun, which may change it."""
         phases = loop.phases(steps)
         carry = phases[0].entered(loop.carry()) if entered else loop.carry()
         numbers = named_numbers(loop, numbers_of(carry), phases)
         return cls(loop, kernel_key(Flying(loop, steps, 1)), tuple(numbers), np.array([*numbers.values()], dtype=float))
 
     def gives(self, other: Flat | None, numbers: Any) -> bool:
-        """Whether another loop, None for one that cannot be, is flown by this one's kernel with these numbers, to the last
+        """Return whether this loop's kernel with these numbers flies another loop (None for an impossible one), to the last
         bit."""
         if other is None or other.form != self.form:
             return False
@@ -50,13 +49,13 @@ class Flat:
         return other.numbers.shape == given.shape and other.numbers.tobytes() == given.tobytes()
 
     def places(self, name: str) -> list[int]:
-        """The places of a number of this name, in every phase that has it."""
+        """Return the indices of a number of this name, in every phase that has it."""
         return [place for place, full in enumerate(self.names) if full == name or full.endswith(f"].{name}")]
 
 
 def named_numbers(loop: ClosedLoop, carry: Sequence[Any], phases: Sequence[Phase]) -> dict[str, Any]:
-    """The numbers of a loop, or arrays (lanes,) in their places, by name: of its carry, what its buffers hold at the end; of
-    phases, those of events by their number; then the times of events, in the body's unit of time."""
+    """Yield the numbers of a loop, or arrays (lanes,) in their places, by name: of its carry, with the contents of its
+    buffers last; of phases, those of events by their number; then the times of events, in the body's unit of time."""
     names = [name for name, _ in named(loop.carry(), "")]
     numbers = dict(zip([*names, *(f"buffer[{k}]" for k in range(1, len(carry) - len(names) + 1))], carry, strict=True))
     for number, phase in enumerate(phases):
@@ -66,7 +65,7 @@ def named_numbers(loop: ClosedLoop, carry: Sequence[Any], phases: Sequence[Phase
 
 
 def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
-    """The numbers of a structure with their names, in the order of its leaves."""
+    """Yield the numbers of a structure with their names, in the order of its leaves."""
     if isinstance(value, tuple):
         fields = getattr(value, "_fields", None)
         for place, part in enumerate(value):
@@ -81,7 +80,7 @@ _OF_ONE = re.compile(r"(memories|setup)\.(estimator|target)\b")
 
 
 def shown_name(loop: ClosedLoop, name: str) -> str:
-    """The name by which tables call a number: its part first; its state and memory are set apart from its parameters."""
+    """Return the name of a number in tables: its part first, with state and memory distinct from parameters."""
 
     def called(where: str | None, fitted: Any) -> str:
         return fitted.called + {"setup": "", "memories": ".memory"}.get(where or "", ".state")

@@ -1,4 +1,4 @@
-"""One flown law with all that reports need of it."""
+"""One flown law with all that reports need."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ class Flight:
     gains: Values
     metric_set: MetricSet
     certificates: tuple[Certificate, ...] = ()
-    """All that is proved of the law on this spacecraft: as it starts, and after faults."""
+    """All that is proved of the law on this spacecraft, initially and after faults."""
     departures: tuple[Mapping[str, tuple[Departure, ...]], ...] = ()
-    """How this flight leaves the proved claims of each certificate, by their kinds."""
+    """The departures of this flight from the proved claims of each certificate, by their kinds."""
 
     modes: tuple[Begun, ...] = ()
-    """The modes that flew, one after another, of a law that has such."""
+    """The modes that flew, in order, for a law with modes."""
 
     def __repr__(self) -> str:
         shown = self.metric_set
@@ -68,13 +68,12 @@ class Flight:
 
     @property
     def lost(self) -> float | None:
-        """When the motion was lost (s), None for a run that did not diverge."""
+        """When the motion diverged (s), None for a run that did not."""
         return self.metrics.get("diverged_at")
 
     @cached_property
     def unknown(self) -> dict[str, float]:
-        """Recorded quantities that are NaN from some time on (s) to the end of a motion that was not lost, with that
-        time."""
+        """Recorded quantities that are NaN from some time (s) to the end of a motion that does not diverge."""
         run, times = self.recording, dict[str, float]()
         for name in run.columns if self.lost is None else ():
             values = np.asarray(run.arrays.get(name, 0.0))
@@ -84,12 +83,12 @@ class Flight:
         return times
 
     def left(self, certificate: int, kind: str) -> tuple[Departure, ...]:
-        """How this flight leaves a claim of one of its certificates; empty where it does not."""
+        """Return the departures of this flight from a claim of one of its certificates; empty where it keeps to it."""
         return self.departures[certificate].get(kind, ()) if self.departures else ()
 
     def results(self) -> dict[str, Any]:
-        """The content of a summary: the metrics, when modes begin and, of a certified law, each claim with its outcome, the
-        time (s) from which on this flight is not what it speaks of (None: it is throughout), and what happens then and
+        """Return the content of a summary: the metrics, when modes begin and, for a certified law, each claim with its
+        outcome, the time (s) from which it does not cover this flight (None: it covers all of it), and the reasons then and
         later."""
         claims: list[dict[str, Any]] = []
         for number, certificate in enumerate(self.certificates):

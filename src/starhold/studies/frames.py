@@ -1,4 +1,4 @@
-"""Results as tidy tables of pandas: measured numbers in columns, their subjects in rows."""
+"""Results as tidy pandas tables: measured numbers in columns, their subjects in rows."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def frame_of(rows: Sequence[dict[str, Any]]) -> DataFrame:
-    """A table of rows; None counts as missing."""
-    # Loaded here, for no command needs it.
+    """Return a table of rows; None counts as missing."""
+    # Loaded here, because no command needs it.
     import pandas as pd
 
     columns = {name: None for row in rows for name in row}
@@ -27,7 +27,7 @@ def frame_of(rows: Sequence[dict[str, Any]]) -> DataFrame:
 
 
 def to_pandas(results: Any) -> DataFrame:
-    """A run, or a list of flights, certificates, designs or margins, as a table, with units in its `attrs`; see
+    """Return a run, or a list of flights, certificates, designs or margins, as a table, with units in its `attrs`; see
     `starhold.to_pandas`."""
     if hasattr(results, "data_vars"):
         return run_frame(results)
@@ -49,7 +49,7 @@ def to_pandas(results: Any) -> DataFrame:
             rows.append({"name": item.name, "law": item.law, "form": item.form, **item.inputs, **item.gains})
         else:
             raise TypeError(
-                f"no table is made of {type(item).__name__}: a run, flights, certificates, designs or margins are wanted"
+                f"no table is made of {type(item).__name__}; give a run, flights, certificates, designs or margins"
             )
     table = frame_of(rows)
     table.attrs["units"] = units
@@ -57,7 +57,8 @@ def to_pandas(results: Any) -> DataFrame:
 
 
 def run_frame(run: xr.Dataset) -> DataFrame:
-    """A run with a row a sample: time, then every number, and every component in a column of its own, such as rate_x."""
+    """Return a run with a row for each sample: time, then every number, and every component in a column of its own, such as
+    rate_x."""
     import pandas as pd
 
     columns: dict[str, Any] = {"time": run["time"].to_numpy()}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
 
 ORDER = 4
-"""The Pade approximant that stands for a delay in continuous time has this order."""
+"""The order of the Pade approximant of a delay in continuous time."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Systems:
 
 @dataclass(frozen=True)
 class LinearLoop(Systems):
-    """A linear loop in continuous time, with a delay approximated, and as `sampled`, exact between control instants;
-    `left_out` names what flies and is not in it. `margins` of it are found by `starhold.margins`."""
+    """A linear loop in continuous time, with an approximated delay, and `sampled`, exact between control instants;
+    `left_out` names parts of the flying loop that it lacks. `starhold.margins` computes its margins."""
 
     sampled: Systems
     delay: float
@@ -46,7 +46,7 @@ class LinearLoop(Systems):
 
 
 def linear_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> Linear:
-    """The linear loop of a law of a scenario. InputError where there is none."""
+    """Return the linear loop of a law of a scenario. InputError where there is none."""
     try:
         return linearise(build(scenario, entry), delay)
     except LinearityError as error:
@@ -54,8 +54,8 @@ def linear_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> Linear
 
 
 def margins_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> list[Margins]:
-    """The margins of the linear loop of a law of a scenario; NaN, with a warning, where it is not stable. InputError where
-    there is no linear loop."""
+    """Return the margins of the linear loop of a law of a scenario; NaN, with a warning, where it is not stable. InputError
+    where there is no linear loop."""
     linear = linear_of(scenario, entry, delay)
     if not linear.is_stable:
         why = f"a pole of a step of the linear loop has size {abs(linear.poles[0]):.6g}, so the loop is not stable"
@@ -64,7 +64,7 @@ def margins_of(scenario: Scenario, entry: LawEntry, delay: float = 0.0) -> list[
 
 
 def systems_of(linear: Linear) -> LinearLoop:
-    """The linear loop as systems of python-control. InputError where that is not installed."""
+    """Return the linear loop as systems of python-control. InputError where that is not installed."""
     try:
         control = import_module("control")
     except ImportError:
@@ -96,7 +96,7 @@ def _systems(plant: System, law: System, control: Any) -> Systems:
 
 
 def _delayed(plant: System, delay: float, control: Any) -> System:
-    """The plant behind a Pade approximant of the delay of each command."""
+    """Return the plant in series with a Pade approximant of the delay of each command."""
     if delay == 0.0:
         return plant
     # Loading it takes half a second, which runs without a delay are spared.

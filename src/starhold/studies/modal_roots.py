@@ -1,4 +1,4 @@
-"""The roots of the modal law that turn fastest within a scenario's limits: the search and the fit through it."""
+"""The roots of the modal law that slew fastest within a scenario's limits: the search, and a fit of its results."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from starhold.scenario.reading import LawEntry, Scenario
 
 Notice: TypeAlias = Callable[[int, int, str], None]
 DIGITS = 6
-"""Digits of the fit as it is printed; the roots have three or four."""
+"""The printed digits of the fit; the roots have three or four."""
 PUBLISHED_FOR: dict[str, Any] = {
     "rate_limit": math.radians(30.0),
     "acceleration_limit": math.radians(50.0),
@@ -25,13 +25,13 @@ PUBLISHED_FOR: dict[str, Any] = {
     "rate_end": math.radians(0.1),
     "start_rate": (math.radians(20.0) / math.sqrt(3.0),) * 3,
 }
-"""The limits and start that the published fit was made for, with the axis along the rate."""
+"""The limits and start of the published fit, with the axis along the rate."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """A search's findings, angle by angle; the fit through it, None for too few angles; and the published one, None where
-    the limits or the start are not the published ones."""
+    """The results of a search, angle by angle; their fit, None for too few angles; and the published one, None where the
+    limits or the start are not the published ones."""
 
     results: list[Found]
     b: float
@@ -51,17 +51,19 @@ class Study:
         return np.array([math.nan if item.hard is None else item.hard.root for item in self.results])
 
     def fits(self) -> dict[str, TwoPieceFit]:
-        """The fits by the names that tables give them; empty where there are none."""
+        """The fits by their names in tables; empty where there are none."""
         both = {"fit": self.fitted, "published": self.published}
         return {name: pieces for name, pieces in both.items() if pieces is not None}
 
 
 def pick_modal(scenario: Scenario, law: str | None) -> LawEntry:
-    """The law of this name, or the first modal one. InputError where that is not modal, or the scenario has no limits."""
+    """Return the law of this name, or the first modal one. InputError where it is not modal, or without limits."""
     if scenario.table.transient is None:
         raise InputError(scenario.where, "transient", "no such table", "a [transient] table with limits")
     if scenario.table.target.mode != "inertial":
-        raise InputError(scenario.where, "target.mode", scenario.table.target.mode, '"inertial": the search turns to rest')
+        raise InputError(
+            scenario.where, "target.mode", scenario.table.target.mode, '"inertial", because the search slews to rest'
+        )
     entries = [entry for entry in scenario.laws if entry.law.name == "modal"]
     entry = scenario.pick(law) if law is not None else entries[0] if entries else None
     if entry is None or entry.law.name != "modal":
@@ -70,8 +72,8 @@ def pick_modal(scenario: Scenario, law: str | None) -> LawEntry:
 
 
 def study(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, what: None) -> Study:
-    """The search of a scenario, with a law that `pick_modal` gives, of which only b counts. `notice` hears how many angles
-    are done. InputError where no root keeps the limits from some angle."""
+    """Run the search of a scenario, with a law from `pick_modal`, of which only b matters. `notice` is called with the
+    number of angles done. InputError where no root keeps the limits from some angle."""
     table: Any = scenario.table.transient
     limits, eased = _limits(table)
     problem = problem_of(scenario, entry)
@@ -85,14 +87,14 @@ def study(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, tot
 
 
 def problem_of(scenario: Scenario, entry: LawEntry) -> SlewProblem:
-    """The slews that a scenario's search flies, faults left out."""
+    """Return the slews of a scenario's search, without faults."""
     table: Any = scenario.table.transient
     steps, ends = scenario.table.simulation.steps, (table.angle_end, table.rate_end)
     return SlewProblem(build(scenario, entry), steps, table.axis, table.start_rate, *ends, entry.gains.b)
 
 
 def _limits(table: TransientTable) -> tuple[Limits, Limits]:
-    """Hard, and with their tolerances."""
+    """Return the limits, hard and with their tolerances."""
     hard = Limits(table.rate_limit, table.acceleration_limit)
     return hard, Limits(hard.rate + table.rate_tolerance, hard.acceleration + table.acceleration_tolerance)
 
@@ -104,10 +106,10 @@ def _as_published(table: TransientTable, b: float) -> bool:
 
 
 def _unreachable(scenario: Scenario, problem: SlewProblem, angle: float, limits: Limits) -> InputError:
-    """Which limit cannot be kept from an angle."""
+    """Return the error that names the limit that cannot be kept from an angle."""
     table: Any = scenario.table.transient
     why, duration = unmet(problem, angle, table.roots, limits), f"{problem.steps * problem.loop.period:g} s"
-    ended = f"from {math.degrees(angle):.4g} deg no root that comes to its end within {duration}"
+    ended = f"from {math.degrees(angle):.4g} deg no root that settles within {duration}"
     if why.what == "end":
         text = f"a longer one, or other roots: {ended.replace(' that comes', ' comes')}"
         return InputError(scenario.where, "simulation.duration", duration, text)
@@ -122,7 +124,7 @@ def _unreachable(scenario: Scenario, problem: SlewProblem, angle: float, limits:
 
 
 def law_lines(pieces: TwoPieceFit, b: float) -> list[str]:
-    """A [[law]] table in TOML that takes its root from a fit."""
+    """Return a [[law]] table in TOML that takes its root from a fit."""
     below, above = ([float(f"{x:.{DIGITS}g}") for x in piece] for piece in (pieces.below, pieces.above))
     split = f'split = "{math.degrees(pieces.split):.{DIGITS}g} deg"'
     return ["[[law]]", 'type = "modal"', 'form = "fit"', f"below = {below}", f"above = {above}", split, f"b = {b!r}"]

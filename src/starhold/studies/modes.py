@@ -29,7 +29,7 @@ NEXT = "another mode begins"
 
 
 class Stretch(NamedTuple):
-    """A mode, counted from 1, flies from the control step `first` on until `last` (None: the end)."""
+    """A mode, counted from 1, that flies from the control step `first` to `last` (None: the end)."""
 
     mode: int
     first: int

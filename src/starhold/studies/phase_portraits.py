@@ -1,4 +1,4 @@
-"""Phase portraits of a system with the sets that were certified, one a claim."""
+"""Phase portraits of a system with its certified sets, one for each claim."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from starhold.certification.invariant.search import Candidate, Values
 from starhold.certification.invariant.theorems import common, indicator
 
 POINTS = 400
-"""Along each side of a portrait."""
+"""The number of points along each side of a portrait."""
 COARSE, STEPS = 121, 10
-"""Points where there are more than two variables, and how often a grid over the others shrinks."""
+"""The number of points with more than two variables, and how often a grid over the others shrinks."""
 AHEAD = 60.0
-"""How long a motion is followed backwards until it is on the border of the true region."""
+"""How long a motion is followed backwards until it reaches the border of the true region."""
 TINY = 1e-12
-"""Rates that count as none."""
+"""Rates below this count as zero."""
 
 
 @dataclass(frozen=True)
 class Portrait:
-    """The plane of the first two variables with what a claim says there, parameters in the middle of their intervals.
+    """The plane of the first two variables with the sets of a claim, parameters in the middle of their intervals.
 
     x, y: (n,); V: (n, n), by y, then x, with more variables the least (unstable: greatest) over them; u, v: the same shape,
     None with more; orbit: (2, points), the border of the true region, with its area; marks: states that refute; sets:
@@ -45,15 +45,15 @@ class Portrait:
 
 
 def portraits(problem: InvariantProblem, certificate: Certificate) -> list[Portrait]:
-    """A portrait of each claim, in floats."""
+    """Return a portrait of each claim, in floats."""
     pairs = zip(problem.claims, certificate.claims, strict=True)
     return [_portrait(problem, wanted, claim, problem.orbit(k)) for k, (wanted, claim) in enumerate(pairs)]
 
 
 def paths(system: System, box: Sequence[tuple[float, float]], starts: Any, length: float, steps: int = 400) -> Any:
-    """Follow motions from starts (n, N) in steps of arc length, backwards in time where the length is negative; where one
-    would turn round, as at an equilibrium, it ends. Returns (N, n, steps + 1), parameters in the middle of their
-    intervals."""
+    """Follow motions from starts (n, N) in steps of arc length, backwards in time where the length is negative; one that
+    would reverse, as at an equilibrium, ends. Return (N, n, steps + 1), with parameters in the middle of their intervals.
+    """
     what = Candidate(system, Polynomial.constant(0), tuple(box))
     moving, count = len(system.variables), np.shape(starts)[1]
     others = [np.full(count, 0.5 * (low + high)) for low, high in what.box[moving:]]
@@ -88,7 +88,7 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
     values = Values(what, points)
     shape = (len(y), len(x))
     u, v = (rate.reshape(shape) for rate in what.rates(points)[0]) if flat else (None, None)
-    # Of what is left, all of which some motions start from.
+    # The rest, from all of which some motions start.
     sign = -1.0 if wanted.theorem == "unstable" else 1.0
     V = (values.V if flat else sign * _least(what, points, len(problem.system.variables), sign)).reshape(shape)
     marks = [o.evidence["state"] for o in claim.obligations if o.outcome == "refuted"]
@@ -102,7 +102,8 @@ def _portrait(problem: InvariantProblem, wanted: WantedSet, claim: Claim, start:
 
 
 def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
-    """sign V at points (n, N), the least over the variables from the third on, by grids that shrink around what is best."""
+    """Return sign V at points (n, N), the least over the variables from the third on, by grids that shrink around the best
+    point."""
     best, values = points.copy(), np.full(points.shape[1], np.inf)
     width = np.array([0.5 * (high - low) for low, high in what.box[2:moving]])
     for step in range(STEPS):
@@ -119,7 +120,8 @@ def _least(what: Candidate, points: Any, moving: int, sign: float) -> Any:
 
 
 def _orbit(what: Candidate, start: Any) -> Any:
-    """One turn of the closed motion that the motion from a state reaches backwards in time; None where it reaches none."""
+    """Return one period of the closed orbit that the motion from a state reaches backwards in time; None where it reaches
+    none."""
     from scipy.integrate import solve_ivp
 
     others = [0.5 * (low + high) for low, high in what.box[2:]]

@@ -1,4 +1,4 @@
-"""How near to its target a loop is proved to come, and each source's share of that bound."""
+"""The proved pointing bound of a loop, and each source's share of it."""
 
 from __future__ import annotations
 
@@ -20,17 +20,16 @@ if TYPE_CHECKING:
 
 Notice: TypeAlias = Callable[[int, int, str], None]
 FOUND = ("level", "highest", "end.angle", "end.rate", "settling")
-"""The numbers of a claim that are found for the others."""
+"""The numbers of a claim that the search for the others finds."""
 
 
 @dataclass(frozen=True)
 class ProvedPointing:
-    """The bound that is proved of a loop's pointing.
-
-    text: the claim, or why there is none. angle: rad, at all times after `settling` (s); None where nothing is proved.
-    share: of orbits, None for all. left_out: parts that the claim is not about. starts_inside: whether the scenario's start
-    lies in the set from which motions are proved to come. shares: by how much (rad) the bound is lower without a source;
-    None for one that the claim does not feel, or without which no bound is found."""
+    """The proved bound of a loop's pointing. text: the claim, or why there is none. angle: rad, at all times after
+    `settling` (s); None where nothing is proved. share: of orbits, None for all. left_out: parts outside the claim.
+    starts_inside: whether the scenario starts in the certified set. shares: by how much (rad) the bound is lower without a
+    source; None for one that does not affect the claim, or without which no bound is found.
+    """
 
     text: str
     angle: float | None = None
@@ -42,11 +41,11 @@ class ProvedPointing:
 
     @property
     def sentence(self) -> str:
-        """All that is proved, in a sentence."""
+        """All that is proved, in one sentence."""
         if self.angle is None:
-            return f"Not proved to point: {self.text}."
+            return f"No pointing bound is proved: {self.text}."
         whole = "" if self.left_out else "; no part is left out"
-        outside = "" if self.starts_inside else "; the flight begins outside of the set of this claim"
+        outside = "" if self.starts_inside else "; the flight begins outside the region of this claim"
         return f"Proved: {self.text}{whole}{outside}."
 
 
@@ -56,20 +55,20 @@ def prove_pointing(
     others: Mapping[str, Callable[[], ClosedLoop]] | None = None,
     notice: Callable[[str], None] = lambda name: None,
 ) -> ProvedPointing:
-    """Prove how near to its target a loop of a scenario comes. others: by the names of sources, what makes the loop that
-    has all but this one; `notice` hears which comes next."""
+    """Prove how near to its target a loop of a scenario stays. others: by source, a function that makes the loop with all
+    but this source; `notice` is called with the next one."""
     from starhold.analysis.departure import start_inside
 
     if loop.nominal is not None:
-        return ProvedPointing("the law takes the craft for another one")
+        return ProvedPointing("the law's nominal model is not the craft that flies")
     if mode_laws(loop.law, loop.gains):
-        return ProvedPointing("claims are about each mode by itself")
+        return ProvedPointing("claims are about single modes")
     wanted = replace(wanted_of(scenario, True), alone=True)
     certificate = certify(loop, "", wanted)
     claim = certificate.claim("pointing")
     if claim is None or claim.outcome != "proved":
         reasons = [o.evidence["reason"] for one in certificate.claims for o in one.obligations if "reason" in o.evidence]
-        return ProvedPointing(next(iter(reasons), "no claim is made of such a loop"))
+        return ProvedPointing(next(iter(reasons), "no claim covers such a loop"))
     n, shares = claim.numbers, dict[str, float | None]()
     for name, make in (others or {}).items():
         notice(name)
@@ -87,8 +86,8 @@ def prove_pointing(
 
 
 def budget_with_proof(scenario: Scenario, entry: LawEntry, notice: Notice = lambda done, total, name: None) -> Budget:
-    """The budget of a law, and beside it what is proved of the pointing, with the share of each source, which takes seconds
-    each. `notice` hears the number done, that of all, and what comes next."""
+    """Return the budget of a law with the proved pointing bound and the share of each source, which take seconds each.
+    `notice` is called with the number done, the total, and the next item."""
     budget, flown = study(scenario, entry, notice), faultless(scenario)
     names = [source.name for source in sources(flown)]
     others = {one.name: partial(without, flown, entry, [one]) for one in sources(flown)}
@@ -105,7 +104,7 @@ def budget_with_proof(scenario: Scenario, entry: LawEntry, notice: Notice = lamb
 def _share(claim: Claim, other: Claim) -> float | None:
     if other.outcome != "proved" or _told(claim) == _told(other):
         return None
-    # The claim against all sources holds against fewer, too.
+    # The claim against all sources also holds against fewer.
     return max(claim.numbers["angle"] - other.numbers["angle"], 0.0)
 
 

@@ -1,5 +1,5 @@
-"""The program asks questions of a scenario's numbers before it flies them; here they become programs of the keys that a
-page moves: those of the craft and the start, and each law's own `check` and `remember`, in the words of their refusals."""
+"""Turns the checks of a scenario's numbers into programs of the keys that a page moves: the checks of the craft and the
+start, and each law's own `check` and `remember`, with the texts of their refusals."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
@@ -20,16 +20,16 @@ from starhold.trace.program import Program
 from starhold.trace.recording import MARK, Path
 
 MOST = 100
-"""Ways through a check."""
+"""The most paths through a check."""
 
 Words = list[str | tuple[int, str]]
 """The text of a refusal: pieces of text, and numbers as their place among those of the program and their format."""
 
 
 def record_check(check: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Program, list[tuple[int, Words]]] | None:
-    """Return a program of the floats of the arguments, as of `record_call`, and for each refusal the place of the number
-    that is 1 where it holds, with its text; None where the check refuses nothing on account of them. RecordingError where
-    the check does what cannot be recorded."""
+    """Return a program of the floats of the arguments, as from `record_call`, and for each refusal the index of the number
+    that is 1 where it applies, with its text; None where the check never refuses these arguments. RecordingError where the
+    check cannot be recorded."""
     refusals: list[tuple[int, Words]] = []
 
     def ways(*values: Any) -> tuple[Any, ...]:
@@ -40,7 +40,7 @@ def record_check(check: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Prog
         while left:
             turns, count = left.pop(), count + 1
             if count > MOST:
-                raise RecordingError("", "", f"more than {MOST} ways through a check", "fewer comparisons")
+                raise RecordingError("", "", f"more than {MOST} paths through a check", "fewer comparisons")
             recorder.path = path = Path(turns)
             try:
                 check(*values)
@@ -68,7 +68,7 @@ def record_check(check: Callable[..., Any], like: tuple[Any, ...]) -> tuple[Prog
 
 
 def _words(text: str, first: int) -> Words:
-    """Return the pieces of a text whose numbers lie from `first` on."""
+    """Return the pieces of a text whose numbers begin at `first`."""
     pieces: Words = []
     for turn, piece in enumerate(text.split(MARK)):
         if turn % 2:
@@ -79,14 +79,14 @@ def _words(text: str, first: int) -> Words:
     return pieces
 
 
-UNASKED = "the law checks it by means that no equation records"
+UNASKED = "the law's check of it cannot be recorded"
 NEAR, RANGE = 3.0, 10.0
-"""Factors up to which inertias, and other numbers, are moved."""
+"""The largest factors by which inertias, and other numbers, are moved."""
 
 
 class Question(NamedTuple):
-    """A program of the values of these keys, in order; for each refusal the place of the number that is 1 where it holds,
-    with its text; and the law that asks, "" for the scenario."""
+    """A program of the values of these keys, in order; for each refusal the index of the number that is 1 where it applies,
+    with its text; and the law whose check it is, "" for the scenario."""
 
     law: str
     keys: tuple[str, ...]
@@ -95,8 +95,8 @@ class Question(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """All questions; keys that cannot be moved, each with the reason; and those that can by a factor up to this alone, for
-    within it a law that no equation asks was tried."""
+    """All checks; keys that cannot be moved, each with the reason; and keys that can be moved only up to a factor, within
+    which a law with an unrecorded check was tested."""
 
     questions: tuple[Question, ...]
     fixed: dict[str, str]
@@ -104,11 +104,11 @@ class Asked(NamedTuple):
 
 
 def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str, Any]) -> Asked:
-    """The questions of a scenario whose laws have these loops, about these keys."""
+    """Return the checks of these keys by a scenario whose laws have these loops."""
     shared = {key: value for key, value in dials.items() if not key.startswith("law.")}
     questions, unasked = _recorded("", lambda values: scenario.hooks.admitted(scenario, values), shared)
     fixed, ranged = dict.fromkeys(unasked, UNASKED), dict[str, float]()
-    # First of all laws what is asked as a file is read, then what is asked as loops are built.
+    # First the checks of all laws as a file is read, then those as loops are built.
     for entry, reads in [(entry, reads) for reads in (True, False) for entry in scenario.laws]:
         check, prefix = _check(scenario, entry, loops[entry.name], reads), f"law.{entry.name}."
         gains = {key: value for key, value in dials.items() if key.startswith(prefix) and "." not in key[len(prefix) :]}
@@ -124,8 +124,8 @@ def ask(scenario: Scenario, loops: Mapping[str, ClosedLoop], dials: Mapping[str,
 
 
 def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -> Callable[[Mapping[str, Any]], None]:
-    """Return what a law asks of the gains and of the craft that it knows, under values of keys, as its file is read or its
-    memory made."""
+    """Return the checks by a law of its gains and its nominal craft, under values of keys, as its file is read or its memory
+    made."""
 
     def check(values: Mapping[str, Any]) -> None:
         gains_given = {key.rpartition(".")[2]: value for key, value in values.items() if key.startswith("law.")}
@@ -147,7 +147,7 @@ def _check(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, reads: bool) -
 def _recorded(
     law: str, check: Callable[[Mapping[str, Any]], Any], values: Mapping[str, Any]
 ) -> tuple[list[Question], list[str]]:
-    """The question that a check is, if it asks anything, and the keys that it looks at by means that cannot be recorded."""
+    """Return a check as a program, if it checks anything, and the keys that it uses in ways that cannot be recorded."""
 
     def of(keys: tuple[str, ...]) -> list[Question]:
         made = record_check(lambda given: check(dict(zip(keys, given, strict=True))), (tuple(values[key] for key in keys),))
@@ -171,7 +171,7 @@ def _recorded(
 
 
 def _takes(scenario: Scenario, check: Callable[[Mapping[str, Any]], Any], values: Mapping[str, Any]) -> bool:
-    """Whether a law takes these values, as it does where no body has them."""
+    """Return whether a law accepts these values, as it does where no body has them."""
     try:
         scenario.hooks.admitted(scenario, values)
     except InputError:
@@ -184,7 +184,7 @@ def _takes(scenario: Scenario, check: Callable[[Mapping[str, Any]], Any], values
 
 
 def _corners(value: Any, factor: float) -> Iterator[Any]:
-    """A number times and over the factor; an inertia with each axis stretched so."""
+    """Return a number multiplied and divided by the factor; an inertia with each axis scaled so."""
     if not isinstance(value, tuple):
         yield from (value / factor, value * factor)
         return

@@ -1,7 +1,5 @@
 """A scenario that flies again elsewhere with other numbers: each law's loop as a program, and the equations that give its
-numbers from values of the file's keys.
-
-What follows a key by no equation, such as a law's matrices, holds the key.
+numbers from values of the file's keys. A key whose effects no equation gives, such as a law's matrices, cannot be moved.
 """
 
 from __future__ import annotations
@@ -38,26 +36,26 @@ Array: TypeAlias = NDArray[np.float64]
 Values: TypeAlias = dict[str, Any]
 """Numbers, vectors or matrices by the keys of a file."""
 
-FAULTS = "faults change the loop on the way"
-SUPPOSED = "it takes the craft for another one"
+FAULTS = "faults change the loop in flight"
+SUPPOSED = "its nominal model is not the craft that flies"
 MODES = "its modes have gains of their own, which the page does not move"
-COMPUTED = "it enters numbers that no recorded equation gives, such as a law's matrices"
+COMPUTED = "it affects numbers that no recorded equation gives, such as a law's matrices"
 ALONE = "no value beside the file's own is allowed"
 TRIED = ((1.05, 0.97, 1.02), (1.02, 1.02, 1.02), (0.9, 0.9, 0.9))
-"""Factors by which components are changed to see what follows them: the first that the scenario takes."""
+"""Factors by which components are changed to see their effects; the first that the scenario accepts is used."""
 NUDGE = 1e-3
-"""What takes the place of a zero there."""
+"""The value that replaces a zero there."""
 
 
 @dataclass(frozen=True)
 class Reflown:
     """One law's loop, to be flown elsewhere.
 
-    program: `fly` as `kernels.one` records it; derive: the numbers at `places` among those of the carry and, after them, of
-    the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all as the scenario has them;
-    unfollowed: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: names of the
-    recorded quantities with how many numbers each has; reads: which numbers of the nominal model the law looks at, "inertia"
-    or "torque_limit"."""
+    program: `fly` as `kernels.one` records it; derive: computes the numbers at `places` among those of the carry and, after
+    them, of the shared arguments, from the values of the keys `follows`, in order; numbers, tables: all of the scenario;
+    unfollowed: why each other key is not followed; every, steps, seed, run, period: as for `fly`; columns: the recorded
+    quantities with their numbers of components; reads: the numbers of the nominal model that the law uses, "inertia" or
+    "torque_limit"."""
 
     name: str
     program: Program
@@ -79,8 +77,8 @@ class Reflown:
 
 @dataclass(frozen=True)
 class Reflight:
-    """A scenario to be flown again: keys that can be moved, with the numbers there; the laws; why a law cannot fly again;
-    and the file, with the keys' values left open, see `pieces`."""
+    """A scenario to be flown again: keys that can be moved, with their numbers; the laws; why a law cannot fly again; and
+    the file, with blanks for the keys' values, see `pieces`."""
 
     scenario: Scenario
     dials: Values
@@ -91,12 +89,12 @@ class Reflight:
     checks: Asked
 
     def changed(self, values: Mapping[str, Any]) -> Scenario:
-        """The scenario with these values at keys of `dials`, as the page's file has it."""
+        """Return the scenario with these values at keys of `dials`, as in the page's file."""
         return changed(self.scenario, _changes(self.scenario, values))
 
 
 class Piece(NamedTuple):
-    """A piece of a file: a text, or the value of a key. `only`: the key without whose move the piece is left out."""
+    """A piece of a file: a text, or the value of a key. `only`: the piece is left out unless this key is moved."""
 
     text: str = ""
     key: str = ""
@@ -104,8 +102,8 @@ class Piece(NamedTuple):
 
 
 def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Reflight:
-    """Make what flies the laws of these names again, all of the scenario if there are none, which is read and checked with
-    the others. Designed gains are held as they are: the scenario has them as numbers."""
+    """Make the programs that fly the laws of these names again, or all laws; the scenario is read and checked with all of
+    them. Designed gains stay as they are: the scenario has them as numbers."""
     explicit = _explicit(scenario)
     dials = dict(explicit.hooks.dials(explicit))
     shared = list(dials)
@@ -119,7 +117,7 @@ def reflight(scenario: Scenario, laws: Collection[str] | None = None) -> Refligh
             if _is_numbers(value) and not item.gain.whole and not item.gain.choices:
                 key = f"law.{entry.name}.{item.name}"
                 dials[key], gains[key] = value, item
-    # An attitude that is given by angles is moved as a quaternion.
+    # An attitude given by angles is moved as a quaternion.
     explicit = changed(explicit, _changes(explicit, {key: dials[key] for key in shared if key == "initial.attitude"}))
     tried = _Tried(explicit, dials)
     reflown: list[Reflown] = []
@@ -152,7 +150,7 @@ def _is_numbers(value: Any) -> bool:
 
 
 def _explicit(scenario: Scenario) -> Scenario:
-    """The scenario with the gains that forms gave written out."""
+    """Return the scenario with designed gains written as numbers."""
     if all(entry.form is None for entry in scenario.laws):
         return scenario
     changes: dict[str, Any] = {}
@@ -167,7 +165,7 @@ def _explicit(scenario: Scenario) -> Scenario:
 
 
 def _changes(scenario: Scenario, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The changes of the file that give dials these values."""
+    """Return the changes of the file that give dials these values."""
     of_law = {key: value for key, value in values.items() if key.startswith("law.")}
     return scenario.hooks.changes({key: value for key, value in values.items() if key not in of_law}) | of_law
 
@@ -180,7 +178,7 @@ class _Tried:
         self._known: dict[tuple[str, ...], tuple[Values, Scenario] | None] = {}
 
     def of(self, first: str, *more: str) -> tuple[Values, Scenario] | None:
-        """Other values of these keys, each as it may have alone, with the scenario that has them; None where no other is
+        """Return other values of these keys, each allowed by itself, with the scenario that has them; None where no other is
         allowed."""
         keys = (first, *more)
         if keys not in self._known:
@@ -200,7 +198,7 @@ def _others(value: Any) -> Iterator[Any]:
     for factors in TRIED:
         turn = iter(range(1 << 20))
         moved = mapped(value, lambda x, f=factors, t=turn: x * f[next(t) % 3] if x else NUDGE)
-        # Of a symmetric matrix another symmetric one.
+        # A symmetric matrix stays symmetric.
         if isinstance(moved, tuple) and isinstance(moved[0], tuple):
             moved = tuple(tuple(moved[min(i, j)][max(i, j)] for j in range(3)) for i in range(3))
         yield moved
@@ -213,14 +211,14 @@ def _reflown(
     flat = Flat.of(loop, steps, entered=True)
 
     def follows(*keys: str) -> bool:
-        """Whether the equation of all kept keys gives the numbers of a scenario in which these are moved."""
+        """Return whether the equation of all kept keys gives the numbers of a scenario in which these are moved."""
         if (other_values := tried.of(*keys)) is None:
             return False
         values, other = other_values
         try:
-            # Not tried out, as `build` does: only its numbers are looked at.
+            # Not flown for a step, as `build` does: only its numbers are needed.
             made = other.hooks.build(other, other.pick(entry.name))
-            # A key that goes with another has its value, unless it is moved itself.
+            # A key that follows another has its value, unless it is moved itself.
             along = {key: values[leader] for key, leader in scenario.hooks.linked.items() if leader in values}
             given = {key: (by_key | along | values)[key] for key in kept}
             return flat.gives(Flat.of(made, steps, entered=True), _given(scenario, loop, given))
@@ -228,7 +226,7 @@ def _reflown(
             return False
 
     unfollowed: dict[str, str] = {}
-    # The start is the file's own with no key moved, as with all of them given.
+    # With all keys given at their values, the start must be the file's own.
     kept = [key for key in by_key if not key.startswith("law.")]
     kept = kept if flat.gives(flat, _given(scenario, loop, {key: by_key[key] for key in kept})) else []
     unfollowed |= {key: COMPUTED for key in by_key if not key.startswith("law.") and key not in kept}
@@ -236,7 +234,7 @@ def _reflown(
     unfollowed |= {key: fixed[key] for key in kept if key in fixed}
     unfollowed |= {key: ALONE for key in kept if key not in unfollowed and not tried.of(key)}
     kept = [key for key in kept if key not in unfollowed]
-    # All at once, and those alone that others go with; one by one only where that does not do.
+    # All at once, and those alone that others follow; one by one only where that fails.
     if kept and not (follows(*kept) and all(follows(key) for key in scenario.hooks.linked.values() if key in kept)):
         unfollowed |= {key: COMPUTED for key in kept if not follows(key)}
         kept = [key for key in kept if key not in unfollowed]
@@ -272,7 +270,7 @@ def _shared(numbers: Any) -> list[Any]:
 
 
 def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Callable[[Any], list[Any]]:
-    """The equation that gives all numbers of a loop from values of these keys, in order."""
+    """Return the equation that gives all numbers of a loop from values of these keys, in order."""
     names = [item.name for item in loop.law.fields()]
 
     def numbers(values: Any) -> list[Any]:
@@ -282,7 +280,7 @@ def _equation(scenario: Scenario, loop: ClosedLoop, keys: Sequence[str]) -> Call
         moved = scenario.hooks.moved(scenario, loop, {k: v for k, v in given.items() if not k.startswith("law.")})
         setup = loop.setup()
         setup = setup._replace(limit=moved.limit)
-        # What a law remembers is made by its own means, of the file's numbers.
+        # A law computes its memory itself, from the file's numbers.
         carry = loop.carry(moved.made_with, loop.gains, loop.craft, setup)._replace(state=moved.start)
         shared = Numbers(gains, moved.nominal, moved.craft, setup)
         return [*numbers_of(carry), *_shared(shared)]
@@ -295,7 +293,7 @@ def _given(scenario: Scenario, loop: ClosedLoop, values: Values) -> list[Any]:
 
 
 def _recorded(scenario: Scenario, loop: ClosedLoop, by_key: Values) -> tuple[Program, tuple[int, ...]]:
-    """The equation as a program, which gives the numbers that depend on the values alone, and their places."""
+    """Return the equation as a program that gives only the numbers that depend on the values, and their indices."""
     equation, places = _equation(scenario, loop, list(by_key)), list[int]()
 
     def depending(values: Any) -> tuple[Any, ...]:
@@ -307,7 +305,7 @@ def _recorded(scenario: Scenario, loop: ClosedLoop, by_key: Values) -> tuple[Pro
 
 
 def _reads(program: Program, phase: Any) -> frozenset[str]:
-    """Which numbers of the nominal model a program looks at; nothing but the law does."""
+    """Return the numbers of the nominal model that a program uses; only the law does."""
     first = len(_shared(phase.gains))
     places: dict[int, str] = {}
     for name, value in phase.nominal._asdict().items():
@@ -327,7 +325,7 @@ MARK = "\ue000"
 
 
 def _pieces(scenario: Scenario, dials: Values) -> Iterator[Piece]:
-    """The scenario as a file whose values at the keys of the dials are left open."""
+    """Return the scenario as a file with blanks for the values at the keys of the dials."""
     from starhold.scenario.making import path_of
     from starhold.scenario.writing import toml_text
 

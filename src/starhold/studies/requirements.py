@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 ORBITS = re.compile(r"([0-9]+(?:\.[0-9]+)?) ?orbits?")
 """A time in orbits of the flight."""
 LOST = "lost"
-"""What may be required beside metrics, with the exclusion-cone: that the motion is not lost."""
+"""Beside metrics and the exclusion-cone it may be required that the motion is not lost."""
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """A bound of a metric, in its unit (SI), that a `share` of the flights is to keep, shown with a `confidence`. column:
-    the metric among those that are measured; at_most: whether the bound is the largest or the least value allowed."""
+    """A bound of a metric, in its unit (SI), that a `share` of the flights must keep, shown with a `confidence`. column: the
+    name of the measured metric; at_most: whether the bound is the largest or the least value allowed."""
 
     name: str
     metric: str
@@ -43,8 +43,8 @@ class Requirement:
     confidence: float
 
     def margins(self, metrics: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-        """How far each run is on the good side of the bound, in the metric's unit: kept from 0 on, minus infinity where the
-        run has no such value. Of a motion that was not lost it is 1."""
+        """Return the margin of each run, in the metric's unit: 0 or more where it keeps the bound, minus infinity where it
+        has no such value. For a motion that was not lost it is 1."""
         if self.metric == LOST:
             return np.where(np.isnan(metrics["diverged_at"]), 1.0, -np.inf)
         values = metrics[self.column]
@@ -58,19 +58,19 @@ class Requirement:
 
 
 def cones_of(tables: Iterable[RequirementTable]) -> dict[str, Cone]:
-    """The cones that requirements ask for, by the names of their metrics; axes and directions of unit length."""
+    """Return the cones of requirements, by the names of their metrics; axes and directions have unit length."""
     cones = [table for table in tables if table.metric == CONE]
     return {column_of(table): Cone(_unit(table.axis), _unit(table.direction)) for table in cones}
 
 
 def extras_of(tables: Iterable[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
-    """The metrics, or kinds of them, beyond the usual that are to be measured: those asked for, and those required."""
+    """Return the metrics, or kinds of them, to be measured beyond the usual: those requested, and those required."""
     wanted = {*more, *(extra for table in tables for extra in EXTRAS if extra in str(table.metric))}
     return tuple(extra for extra in (*EXTRAS, *sorted(wanted - {*EXTRAS})) if extra in wanted)
 
 
 def tables_of(scenario: Scenario, method: str | None) -> dict[str, RequirementTable]:
-    """The [[requirement]] tables of a scenario that have this method, by what errors call them."""
+    """Return the [[requirement]] tables of a scenario with this method, by their names in errors."""
     numbered = enumerate(scenario.table.requirement, 1)
     return {f"requirement[{number}]": table for number, table in numbered if table.method == method}
 
@@ -97,7 +97,7 @@ def read_requirements(
 
 
 def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: Mapping[str, str]) -> tuple[Requirement, ...]:
-    """The requirements of tables of methods that bound metrics from above alone, as `read_requirements` has them."""
+    """Return the requirements of methods that only bound metrics from above, as `read_requirements` does."""
     for key, table in tables.items():
         if table.at_least is not None:
             raise InputError(scenario.where, f"{key}.at_least", show(table.at_least), f"at_most, with a {table.method}")
@@ -119,7 +119,7 @@ def _bound(table: RequirementTable, unit: str, where: str, key: str, orbit: floa
     value = getattr(table, side)
     if table.metric == LOST:
         if value is not None:
-            raise InputError(where, f"{key}.{side}", show(value), "no bound, for a motion is lost or not")
+            raise InputError(where, f"{key}.{side}", show(value), "no bound, because a motion is lost or not")
         return math.nan
     if table.metric == CONE and (side == "at_most" or value is None):
         raise InputError(where, f"{key}.at_least", show(table.at_least), "the least angle between axis and direction")

@@ -28,13 +28,13 @@ def sweep(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> DataFrame:
-    """A row for each law and each of the changes, see `starhold.sweep`."""
+    """Return a row for each law and each of the changes, see `starhold.sweep`."""
     points = _points(scenario, changes)
     names = [law] if law is not None else _named(scenario, points)
     rows: list[dict[str, Any]] = []
     flown: list[Scenario] = []
     flights: list[Flying] = []
-    # All of them before the first flight, so that what is wrong with the last is said at once.
+    # All are read before the first flight, so that an error in the last is reported at once.
     for point, other in zip(points, variants(scenario, points), strict=True):
         simulation = other.table.simulation
         for name in names:
@@ -51,7 +51,7 @@ def sweep(
 
 
 def _points(scenario: Scenario, changes: Any) -> list[dict[str, Any]]:
-    """The changes one by one: given so, or every combination of the values of each key."""
+    """Return the list of changes: as given, or every combination of the values of each key."""
     if isinstance(changes, Mapping):
         columns = {key: _values(scenario, key, values) for key, values in changes.items()}
         points = [dict(zip(columns, chosen, strict=True)) for chosen in product(*columns.values())]
@@ -70,7 +70,7 @@ def _values(scenario: Scenario, key: str, values: Any) -> list[Any]:
 
 
 def _named(scenario: Scenario, points: list[dict[str, Any]]) -> list[str]:
-    """The laws that the changes are about; all where they are about none, or about some by their places."""
+    """Return the laws that the changes name; all where they name none, or name laws by index."""
     keys = {key for point in points for key in point if key.startswith("law")}
     names = [entry.name for entry in scenario.laws]
     about = [name for name in names if any(f"{key}.".startswith(f"law.{name}.") for key in keys)]

@@ -1,4 +1,4 @@
-"""The cost of laws' calls, which a copy of this process makes code of while the laws fly."""
+"""The cost of laws' calls, which a copy of this process compiles while the laws fly."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 
 class Stopwatch:
-    """A copy of this process, on systems that are quick to make one, that compiles the calls of these loops' laws at once
-    and times them when it is asked to. Leaving the context ends it."""
+    """A copy of this process, on systems that can fork, that compiles the calls of these loops' laws at once and times them
+    on request. Leaving the context ends it."""
 
     def __init__(self, scenario: Scenario, loops: Sequence[Any]) -> None:
         self._scenario, self._loops, self._child = scenario, loops, 0
-        # A copy of a process with more threads than one may wait for locks that nobody opens.
+        # A copy of a process with several threads may wait for locks that are never released.
         if not sys.platform.startswith("linux") or active_count() > 1:
             return
         (requests, request), (answers, answer) = os.pipe(), os.pipe()
@@ -54,13 +54,13 @@ class Stopwatch:
                     pipe.close()
 
     def timed(self, place: int, flight: Flight) -> Flight:
-        """Return the flight of the loop at this place, counted from 0, with the cost of a call of its law. Nothing else is
-        to be computed meanwhile."""
+        """Return the flight of the loop with this index, from 0, with the cost of a call of its law. Nothing else should run
+        meanwhile."""
         if self._child:
             run = flight.recording
-            # No more than can be timed is sent.
+            # Only what can be timed is sent.
             begun = {name: values[:CALLS] if np.ndim(values) else values for name, values in run.arrays.items()}
-            # Where it has died, what it died of is met here.
+            # If it has died, the cause is raised here.
             with suppress(EOFError, OSError):
                 pickle.dump((place, replace(run, arrays=begun)), self._requests)
                 self._requests.flush()
@@ -69,8 +69,8 @@ class Stopwatch:
 
 
 def _serve(scenario: Scenario, loops: Sequence[Any], requests: BinaryIO, answer: BinaryIO) -> None:
-    """Time what is asked for until this process is ended."""
-    # Ctrl-C and the like end the process that this is a copy of, and that ends this one.
+    """Time calls on request until this process is ended."""
+    # Ctrl-C and the like end the original process, and that ends this one.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     try:
@@ -82,5 +82,5 @@ def _serve(scenario: Scenario, loops: Sequence[Any], requests: BinaryIO, answer:
             pickle.dump(study.call_costs(loops[place], recording), answer)
             answer.flush()
     finally:
-        # Nothing that the other process has begun is ended twice.
+        # Exit handlers of the original process must not run twice.
         os._exit(1)

@@ -1,4 +1,4 @@
-"""Whether requirements are met: verdicts with the number, its limit and what they rest on; those that one flight gives."""
+"""Verdicts on requirements, with the number, its limit and the evidence; and those by one flight."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Outcome: TypeAlias = Literal["met", "missed", "not decided"]
 WORST: tuple[Outcome, ...] = ("met", "not decided", "missed")
 """Outcomes, the worst last."""
 DEARER, ELSEWHERE = ("proof", "campaign", "budget", "margin"), "left to starhold verify"
-"""The methods for which one flight is not enough, and what is said of them where there is only that."""
+"""The methods for which one flight is not enough, with the text shown in their place."""
 
 
 @dataclass(frozen=True)
@@ -54,41 +54,41 @@ class RequirementVerdict:
     rationale: str = ""
     typed_unit: str = ""
     scale: float = 1.0
-    """The unit that the limit is typed in, and the worth of a unit of SI in it."""
+    """The unit in which the limit is typed, and the value of one SI unit in it."""
 
     @property
     def margin(self) -> float | None:
-        """How far the number is on the good side of the limit."""
+        """Return how far the number is on the good side of the limit."""
         if self.number is None or self.limit is None:
             return None
         return self.limit - self.number if self.at_most else self.number - self.limit
 
     @property
     def sentence(self) -> str:
-        """The verdict, with what it leaves out: a verdict without that would say more than is known."""
+        """The verdict, with what it leaves out, so that it claims no more than is known."""
         return f"{self.verdict}, leaving out {'; '.join(self.left_out)}" if self.left_out else self.verdict
 
 
 def undecided(table: RequirementTable, why: str, **known: Any) -> RequirementVerdict:
-    """The verdict that nothing decides a requirement, with the reason."""
+    """Return the verdict that a requirement is not decided, with the reason."""
     return verdict_on(table, "not decided", why, **known)
 
 
 def limits(table: RequirementTable, required: Requirement) -> dict[str, Any]:
-    """The fields of a verdict that tell its limit, in its unit and in the one that is typed."""
+    """Return the fields of a verdict that state its limit, in its unit and in the typed one."""
     fields: dict[str, Any] = {"limit": required.bound, "unit": required.unit, "at_most": required.at_most}
     typed = table.at_most if required.at_most else table.at_least
     if isinstance(typed, str) and required.bound:
         number, unit = apart(typed)
         if unit == DECIBEL:
-            # Margins of decibels are no differences of ratios: they are shown as ratios.
+            # Margins in decibels are not differences of ratios: they are shown as ratios.
             return fields
         fields |= {"typed_unit": unit, "scale": number / required.bound}
     return fields
 
 
 def verdict_on(table: RequirementTable, verdict: Outcome, evidence: str, **known: Any) -> RequirementVerdict:
-    """The verdict on the requirement of a table; known: number, limit, unit and others of its fields."""
+    """Return the verdict on the requirement of a table; known: number, limit, unit and other fields."""
     stated = {"metric": table.metric or "", "parent": table.parent or "", "rationale": table.rationale}
     fields: dict[str, Any] = stated | known
     return RequirementVerdict(table.called, table.text, table.method or "", verdict, evidence, **fields)
@@ -97,15 +97,15 @@ def verdict_on(table: RequirementTable, verdict: Outcome, evidence: str, **known
 def compared(
     table: RequirementTable, required: Requirement, number: float | None, evidence: str, **known: Any
 ) -> RequirementVerdict:
-    """The verdict of a number, which misses the limit where it is None or not a number."""
+    """Return the verdict for a number, which misses the limit where it is None or NaN."""
     there = None if number is None or math.isnan(number) else float(number)
     decided = verdict_on(table, "missed", evidence, number=there, **limits(table, required) | known)
     return replace(decided, verdict="met") if decided.margin is not None and decided.margin >= 0.0 else decided
 
 
 def in_order(scenario: Scenario, decided: Mapping[str, RequirementVerdict]) -> tuple[RequirementVerdict, ...]:
-    """The verdicts in the order of the file: those decided, by what errors call the tables, and those without a method,
-    which are as the worst of those derived from them."""
+    """Return the verdicts in the order of the file: those decided, by the tables' names in errors, and those of requirements
+    without a method, which take the worst verdict of those derived from them."""
     tables = {f"requirement[{place}]": table for place, table in enumerate(scenario.table.requirement, 1)}
     by_id = {tables[key].called: verdict for key, verdict in decided.items()}
 
@@ -122,8 +122,8 @@ def in_order(scenario: Scenario, decided: Mapping[str, RequirementVerdict]) -> t
 
 
 def verdicts_of_flight(scenario: Scenario, flight: Flight) -> tuple[RequirementVerdict, ...]:
-    """The verdicts on a scenario's requirements that a flight of one of its laws gives, and records of inspections: nothing
-    is flown or proved, and what needs other methods is left to `starhold verify`. InputError as `check_flight` has it."""
+    """Return the verdicts on a scenario's requirements by a flight of one of its laws, and by records of inspections:
+    nothing is flown or proved, and other methods are left to `starhold verify`. InputError as from `check_flight`."""
     entry = scenario.pick(flight.name)
     decided = by_flight(scenario, entry, flight.recording) | by_inspection(scenario)
     others = {key: table for method in DEARER for key, table in tables_of(scenario, method).items()}
@@ -134,7 +134,7 @@ def verdicts_of_flight(scenario: Scenario, flight: Flight) -> tuple[RequirementV
 
 
 def by_inspection(scenario: Scenario) -> dict[str, RequirementVerdict]:
-    """The verdicts of requirements that are inspected: met where the file of the record is there."""
+    """Return the verdicts of requirements by inspection: met where the file of the record exists."""
     return {key: _inspected(scenario, table) for key, table in tables_of(scenario, "inspection").items()}
 
 
@@ -145,7 +145,7 @@ def _inspected(scenario: Scenario, table: RequirementTable) -> RequirementVerdic
         with (scenario.folder / table.record).open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except (OSError, ValueError):
-        return undecided(table, f"its record {table.record} is not there")
+        return undecided(table, f"its record {table.record} is missing")
     return verdict_on(table, "met", f"as by record {table.record}, SHA-256 {digest}")
 
 
@@ -153,8 +153,8 @@ def _inspected(scenario: Scenario, table: RequirementTable) -> RequirementVerdic
 
 
 def check_flight(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]:
-    """The requirements that one flight of a law decides. InputError for a metric that the body's flights do not have, a
-    limit in another unit, a mode that the law does not have, and times that are not within the flight."""
+    """Return the requirements that one flight of a law decides. InputError for a metric that the body's flights lack, a
+    limit in another unit, a mode that the law lacks, and times outside the flight."""
     tables, study = tables_of(scenario, "flight"), study_of(scenario.body)
     check_modes(scenario, entry, tables)
     loop = build(scenario, entry)
@@ -168,22 +168,22 @@ def check_flight(scenario: Scenario, entry: LawEntry) -> tuple[Requirement, ...]
 
 
 def mode_names(entry: LawEntry) -> list[str]:
-    """The names of a law's modes; none of a law without."""
+    """Return the names of a law's modes, if any."""
     module: Any = entry.law.module
     return [mode.name for mode in module.modes] if isinstance(module, Modes) else []
 
 
 def check_modes(scenario: Scenario, entry: LawEntry, tables: Mapping[str, RequirementTable]) -> None:
-    """InputError where a requirement is about a mode that the law does not have."""
+    """Raise InputError where a requirement is about a mode that the law does not have."""
     names = mode_names(entry)
     for key, table in tables.items():
         if table.in_mode is not None and table.in_mode not in names:
-            allowed = nearest(table.in_mode, names) if names else f"no mode, for the law {entry.name} has none"
+            allowed = nearest(table.in_mode, names) if names else f"no mode, because the law {entry.name} has none"
             raise InputError(scenario.where, f"{key}.in_mode", show(table.in_mode), allowed)
 
 
 class Times(NamedTuple):
-    """From when until when something is required (s), since the flight or the mode began."""
+    """The times (s) between which something is required, since the flight or the mode began."""
 
     begin: float = 0.0
     end: float = math.inf
@@ -195,7 +195,7 @@ class Times(NamedTuple):
 
 
 def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: float = math.inf) -> Times:
-    """The times of a requirement. InputError where they are none, or not within a flight of such a duration (s)."""
+    """Return the times of a requirement. InputError where they are invalid, or outside a flight of this duration (s)."""
 
     def seconds(name: str, value: Any) -> float:
         try:
@@ -219,7 +219,7 @@ def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: fl
 
 
 def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, RequirementVerdict]:
-    """The verdicts that a recorded flight of a law gives. InputError as `check_flight` has it."""
+    """Return the verdicts by a recorded flight of a law. InputError as from `check_flight`."""
     tables = tables_of(scenario, "flight")
     if not tables:
         return {}
@@ -253,7 +253,7 @@ def _flown(
         verdict = "met" if lost is None else "missed"
         return verdict_on(table, verdict, flight if lost is None else f"{flight}, which is lost")
     if not parts and lost is None:
-        return undecided(table, f"{flight}: it has no such time", **limits(table, required))
+        return undecided(table, f"{flight}: it does not reach that time", **limits(table, required))
     values: list[Any] = [part.get(required.column) for part in parts]
     if not values or None in values:
         return compared(table, required, None, f"{flight}: {'it is lost' if lost is not None else 'there is no such value'}")
@@ -261,8 +261,8 @@ def _flown(
 
 
 def _parts(run: Recording, times: Times, mode: int | None) -> list[Recording]:
-    """The parts of a recording, of two samples at least, that lie within times since its start, or since a mode,
-    counted from 1, began."""
+    """Return the parts of a recording, of at least two samples, within times since its start, or since a mode, counted from
+    1, began."""
     attrs, time = run.attrs, run["time"]
     clock, period, every = attrs.get("time_unit_s", 1.0), attrs["control_period"], attrs["record_every"]
     spans = [(0, None)]

@@ -20,7 +20,7 @@ _HEAD = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 
 
 def check(text: str, where: str, folder: Any) -> dict[str, Any]:
-    """Tell whether a text is a scenario that can be flown and verified, with its name and laws, or what is wrong, where."""
+    """Return whether a text is a scenario that can be flown and verified, with its name and laws, or its first error."""
     try:
         scenario = parse(text, where, folder)
         for entry in scenario.laws:

@@ -1,4 +1,4 @@
-"""A circle about a libration point is kept by sunlight: formulas give its demands on the control and on the sail.
+"""Formulas for a circle about a libration point kept by sunlight: its demands on the control and on the sail.
 
 The circle lies across the X axis, so that the solar cells see the Sun past the body in front of it, and is flown at a
 constant rate. Rates here are in units of Omega, accelerations in scaled units a unit of the circle's radius, unless
@@ -60,7 +60,7 @@ def rates_held(resource: float, plant: Libration) -> tuple[float, float] | None:
 
 
 def time_on_limit(resource: float, rate: float, plant: Libration) -> float:
-    """Return the part of a revolution in which a circle a unit in radius demands more than this control acceleration."""
+    """Return the share of a revolution in which a circle of unit radius demands more than this control acceleration."""
     turning = rate * plant.rate
     least = plant.stiffness - plant.rate**2 - turning * turning
     # |u|2 is peak2 sin2 + least2 cos2 of the phase.
@@ -83,18 +83,18 @@ def required(
 def peak_required(
     rate: float, radius: float, plant: Libration, field: Field = linear, centre: float = 0.0, push: float = 0.0
 ) -> float:
-    """Return the largest control acceleration (scaled) round the circle, next to a steady push along X (scaled), by
-    going round it in steps."""
+    """Return the largest control acceleration (scaled) around the circle, in addition to a steady push along X (scaled), by
+    steps around it."""
     phases: list[float] = np.linspace(0.0, 2.0 * math.pi, 3601).tolist()
     steady = (push, 0.0, 0.0)
     return max(norm(subtract(required(phase, rate, radius, plant, field, centre), steady)) for phase in phases)
 
 
 class Deficit(NamedTuple):
-    """A deficit says what is left when the control lacks a part of the circle's demand: the largest radius held by
-    formula (m), the part of the Sun seen there, the largest radius when the sail loses that light too (m; 0 for none),
-    the rates at which the full circle is still held (Omega; None for none), and the part of a revolution with the
-    control on its limit there."""
+    """The effects of a control that falls short of the circle's demand: the largest radius held by formula (m), the share of
+    the Sun seen there, the largest radius when the sail loses that light too (m; 0 for none), the rates at which the full
+    circle is still held (Omega; None for none), and the part of a revolution with the control on its limit there.
+    """
 
     missing: float
     radius: float
@@ -138,8 +138,7 @@ class Station:
 
     @property
     def clear_radius(self) -> float:
-        """Return the distance from the X axis (m) from which on the whole Sun is seen; 0 where nothing stands in front of
-        it."""
+        """Return the distance from the X axis (m) from which the whole Sun is seen; 0 where nothing occults it."""
         plant = self.plant
         if plant.from_smaller <= 0.0:
             return 0.0
@@ -175,7 +174,8 @@ class Station:
         return self.peak(rate) / (self.pressure * ball(mirror, min(self.diffuse, 1.0 - mirror)).radius)
 
     def margin(self, area: float, mass: float, rate: float | None = None) -> float:
-        """Return how many times the circle's demand a sail of this area (m2) gives a craft of this mass (kg)."""
+        """Return the control from a sail of this area (m2) on a craft of this mass (kg), as a multiple of the circle's
+        demand."""
         return area / (mass * self.area_per_mass(rate))
 
     def peak_full(self, field: Field) -> float:
@@ -205,7 +205,7 @@ class Station:
         """Return the largest radius at which a sail holds the circle in the light of that place, if in the light of the
         planned circle it holds `radius`."""
         here = self.light(self.radius)
-        # The light grows with the radius, so going on from above the steps only ever shrink, towards the largest answer.
+        # The light increases with the radius, so steps from above only shrink, towards the largest solution.
         largest = radius if radius <= self.radius else radius / here
         for _ in range(10_000):
             before, largest = largest, radius * self.light(largest) / here

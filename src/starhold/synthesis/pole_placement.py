@@ -1,4 +1,4 @@
-"""Poles are placed exactly by multi-level decomposition: u = -K x gives A - B K any spectrum, for any controllable A, B.
+"""Places poles exactly by multi-level decomposition: u = -K x gives A - B K any spectrum, for any controllable A, B.
 
 Level k is a pair A_k (n_k, n_k), B_k; the first is A, B. Its inputs act through r_k = rank B_k independent directions, the
 columns of R_k: Bhat_k = B_k R_k has full column rank r_k. With P_k the annihilator of B_k (full row rank, P_k B_k = 0),
@@ -50,7 +50,7 @@ NEAR = 1e-2
 """Poles that differ by less than this share of themselves are measured together."""
 
 ALLOWED = 1e-6
-"""Largest error of the poles reached, relative, that is not refused."""
+"""The largest relative error of the poles reached that is accepted."""
 
 GIVEN = 1e-9
 """Relative tolerance for the annihilators to annihilate, and for directions to count as independent."""
@@ -98,12 +98,12 @@ class _Level(NamedTuple):
 
 
 def levels(A: ArrayLike, B: ArrayLike) -> list[int]:
-    """Tell how many poles each level takes, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as of `place`."""
+    """Return how many poles each level takes, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as of `place`."""
     return [len(level.rows) for level in _decomposed(*_pair(A, B), None, None)[0]]
 
 
 def is_stable(poles: ArrayLike) -> bool:
-    """Tell whether all poles have a negative real part."""
+    """Return whether all poles have a negative real part."""
     return bool((np.real(poles) < 0.0).all())
 
 
@@ -173,7 +173,7 @@ def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
 
 
 def displacement(A: ArrayLike, B: ArrayLike, K: ArrayLike, poles: ArrayLike) -> float:
-    """Tell how far the eigenvalues of A - B K are from poles (n,), relative, to first order, with no rounding but K's.
+    """Return how far the eigenvalues of A - B K are from poles (n,), relative, to first order, with no rounding but K's.
 
     Simple poles: the largest distance, by the pole's size. Poles closer than NEAR, equal ones above all, are no such smooth
     functions of K, but the polynomial with these roots is: of k of them, about their mean, the change of its coefficient of

@@ -1,4 +1,4 @@
-"""Gains of feedback on rate and quaternion follow from requirements: bandwidth and damping, or when the loop settles.
+"""Gains of feedback on rate and quaternion from requirements: bandwidth and damping, or a settling time.
 
 The linear loop J a'' + k_rate a' + k_attitude a/2 = 0 (a an angle, q = a/2) has about a principal axis of moment J_i the
 natural frequency sqrt(k_attitude/(2 J_i)) and the damping ratio k_rate/sqrt(2 J_i k_attitude): with one number for all axes
@@ -30,25 +30,27 @@ from starhold.synthesis.start import Start
 from starhold.trace.calling import Compiled
 
 STEPS = 4000
-"""Integration steps of a turn that is tried, and at most so many times MOST of them."""
+"""The integration steps of a trial slew, and the largest multiple of them."""
 MOST = 64
 RESOLVED = 0.4
-"""Part of the fastest time constant that a step may be."""
+"""The largest step as a share of the fastest time constant."""
 ON_TARGET = Goal((1.0, 0.0, 0.0, 0.0), ZERO, ZERO)
 IN_HAND = 0.99
 """Share of the required settling time that designs use: with a held torque the loop settles a little later."""
 
 TORQUE = Gain("N m", above=0.0, text="largest norm; all that is available if absent")
 MOMENTUM = Gain("N m s", above=0.0, text="of the wheels; all available if absent")
-TURN = Gain("1", shape=(4,), spread=False, text="turn from the target to the body at the start; the scenario's if absent")
+TURN = Gain(
+    "1", shape=(4,), spread=False, text="rotation from the target to the body at the start; the scenario's if absent"
+)
 RATE = Gain("rad/s", shape=(3,), spread=False, text="relative rate then; the scenario's if absent")
-STORED = Gain("N m s", shape=(3,), spread=False, text="by wheels then, body axes; the scenario's if absent")
+STORED = Gain("N m s", shape=(3,), spread=False, text="in wheels then, body axes; the scenario's if absent")
 ANGLE_LEFT, RATE_LEFT = (Gain(unit, above=0.0, text="that of [settling] if absent") for unit in ("rad", "rad/s"))
-"""The declarations of what every form that settles in time may be given."""
+"""The inputs common to all forms with a settling time."""
 
 
 class Bandwidth(NamedTuple):
-    """The form asks for the natural frequency and damping of the linear loop: exact about the axis of the largest moment of
+    """The form takes the natural frequency and damping of the linear loop: exact about the axis of the largest moment of
     inertia, more about the others."""
 
     bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
@@ -75,7 +77,7 @@ Spec = TypeVar("Spec", bound=NamedTuple)
 
 
 def complete(spec: Spec, start: Callable[[], Start]) -> Spec:
-    """Return the inputs of a form; one that settles in time is completed from the scenario's start."""
+    """Return the inputs of a form; one for a settling time is completed from the scenario's start."""
     left = [name for name in Start.__dataclass_fields__ if getattr(spec, name, 0) is None]
     return spec._replace(**{name: getattr(start(), name) for name in left}) if left else spec
 
@@ -115,7 +117,7 @@ def settle(
     """Return the gains of the least scale x (1/s) that settle in time, and their slew.
 
     gains_of(x): the gains; rate_of(gains): the fastest rate (1/s) of the loop, which the integration must resolve.
-    ValueError names the possible time where the torque or the momentum does not allow the required one."""
+    ValueError states the shortest time where the torque or the momentum does not allow the required one."""
     if any(getattr(spec, name, 0) is None for name in Start.__dataclass_fields__ if name != "wheel_momentum"):
         raise ValueError("a design that settles in time needs the start, the tolerances and the torque")
     if not any(spec.attitude):
@@ -252,7 +254,7 @@ def _flight(torque: Callable[..., Any], count: int, wheels: bool, like: _Like) -
             return (renormalise(after[0]), *after[1:]), *notes
 
         state, last, most, momentum = repeat(count, turn, begun, -1.0, 0.0, 0.0)
-        # Lost, or still outside at the end.
+        # Diverged, or still outside at the end.
         q, w, _ = state
         there = less(dot(vector_part(q), vector_part(q)), ends[0])
         there = where(there, where(less(dot(w, w), ends[1]), last, float(count)), float(count))
@@ -305,7 +307,7 @@ def explained(craft: Craft, k_rate: float, k_attitude: float) -> list[tuple[str,
 
 
 def slew_figures(turn: Turn) -> list[tuple[str, Any]]:
-    """Return figures of the slew by which a design that settles in time is judged."""
+    """Return the figures of merit of a slew designed for a settling time."""
     return [
         ("settles after (s)", turn.time),
         ("largest torque (N m)", turn.torque),

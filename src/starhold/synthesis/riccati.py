@@ -1,5 +1,4 @@
-"""The Riccati equation of regulators is solved at rest on target, for any inertia and any weights, and its solution is
-judged.
+"""Solves the Riccati equation of regulators at rest on target, for any inertia and any weights, and checks the solution.
 
 State (w; q) of body rate (rad/s) and the quaternion's vector part, J w' = u, q' = w/2, cost x'Qx + u'Ru: Q is (6, 6)
 with the rate first, R (3, 3). Weights and moments may span so many orders of magnitude that doubles lose every digit on
@@ -22,7 +21,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.floating[Any]]
 
 BITS = 400
-"""Working precision: rates of a loop and gains may each span a hundred binary digits, and their products are solved for."""
+"""The working precision: rates of a loop and gains may each span a hundred binary digits, and the equations contain
+products."""
 
 AGREED = 1e-40
 """Newton's steps end when no entry of P moves by more than this share of the scale of its row and column."""
@@ -56,7 +56,7 @@ def linear_model(inertia: Array) -> tuple[Array, Array]:
 
 
 def is_full(inertia: Array) -> bool:
-    """Tell whether any entry off the diagonal is not zero."""
+    """Return whether any entry off the diagonal is not zero."""
     return bool(np.count_nonzero(inertia - np.diag(np.diagonal(inertia))))
 
 

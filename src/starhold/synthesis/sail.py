@@ -1,5 +1,5 @@
-"""Sunlight gives the control: the force on a flat reflecting panel, how to set a panel to get a wanted force, the set
-of available forces, and how much of the Sun can be seen past a body in front of it.
+"""Control by sunlight: the force on a flat reflecting panel, the panel setting for a force, the set of available forces, and
+the visible share of the Sun behind a body.
 
 Light travels along +X (at L1 and L2 the X axis of `libration`). A panel is set by its area, by the cone angle between
 the light and the panel's normal on its dark side, and by the clock angle of that normal about X, from Y towards Z.
@@ -29,8 +29,8 @@ MIRROR_CENTRE = 4.0 / 3.0 * math.sqrt(2.0 / 3.0)
 
 class Sail(NamedTuple):
     """A sail has the pressure of sunlight on a black surface facing it (N/m2), area (m2), mass of the craft (kg), and the
-    parts of the light that are reflected as by a mirror and in all directions; the rest is absorbed, and given off on both
-    sides alike."""
+    parts of the light that are reflected as by a mirror and in all directions; the rest is absorbed, and emitted equally on
+    both sides."""
 
     pressure: float
     area: float
@@ -40,7 +40,7 @@ class Sail(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """A setting is the area turned to the Sun (m2), cone angle (rad, 0 to pi/2) and clock angle (rad, -pi to pi)."""
+    """A setting: the area used (m2), cone angle (rad, 0 to pi/2) and clock angle (rad, -pi to pi)."""
 
     area: float
     cone: float
@@ -155,7 +155,7 @@ def lean_of(cone: float, specular: float, diffuse: float) -> float:
 
 def widest_cosine(specular: float, diffuse: float) -> float:
     """Return the cosine of the cone angle at which the force leans farthest from the light. Beyond it the same directions
-    come again, with less force."""
+    recur, with less force."""
     a, b, e = 1.0 - specular, 2.0 * specular, LAMBERT * diffuse
     # The sign of d(lean)/d(cone) is that of (b2 + 2ab) c2 + (2be + ae) c + e2 - ab, which grows with c.
     if e * e >= a * b:

@@ -1,4 +1,4 @@
-"""The work of a program is bounded: every address lies within its memory, and no more is done than is counted here.
+"""Bounds the work of a program: every address lies within its memory, and no more operations are done than are counted here.
 
 Addresses are made of counts and counters alone, so they are polynomials in them. A polynomial that is linear in a
 counter is greatest at an end of the counter's range, which is a polynomial in the counters of the loops around: so the
@@ -289,7 +289,7 @@ class _Walk:
         return total
 
     def _note(self, s: Op, known: dict[str, Form]) -> None:
-        """Remember the form of an index, or for a truth about two of them that of their difference."""
+        """Remember the form of an index, or for a comparison of two that of their difference."""
         if s.operation.name in ("index_plus", "index_minus", "index_product", "same_index"):
             a, b = (self._form(value, known) for value in s.args)
             if s.operation.name == "index_plus":

@@ -1,4 +1,5 @@
-"""Equations meet handles while they are recorded, which note what is done to them, and refuse what cannot be noted."""
+"""Handles take the place of values while equations are recorded; they note the operations on them, and refuse what cannot be
+noted."""
 
 from __future__ import annotations
 
@@ -31,7 +32,7 @@ class Handle:
     def __bool__(self) -> bool:
         if self.recorder.path is None or self.kind != TRUTH:
             refuse(
-                "an `if`, `while`, `and`, `or` or `not` on a truth that is not known yet",
+                "an `if`, `while`, `and`, `or` or `not` on a boolean that is not known yet",
                 "where(truth, a, b), both, either, opposite",
             )
         return self.recorder.path.turn(self)

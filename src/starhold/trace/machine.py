@@ -37,16 +37,16 @@ FEW = 16
 
 
 def widest(carried: int, noted: int = 0) -> int:
-    """Return the number of lanes in flight at once on this processor that fly fastest, where each carries so many numbers,
-    and so many are noted of it along the way: two of its widest registers for a number where there are 32 of them and
-    nothing is noted, or where there are few numbers; else one."""
+    """Return the fastest number of lanes in flight at once on this processor, where each carries so many numbers and has so
+    many notes: two of the widest registers for a number where there are 32 of them and nothing is noted, or where there are
+    few numbers; else one."""
     if _is_wide():
         return 8 if noted else 16
     return 8 if carried + noted <= FEW else 4
 
 
 def _is_wide() -> bool:
-    """Tell whether there are 32 registers of 512 bits."""
+    """Return whether there are 32 registers of 512 bits."""
     return bool(_llvm().get_host_cpu_features().get("avx512f"))
 
 
@@ -64,7 +64,7 @@ def load(program: Program, width: int, passes: bool | None = None) -> Callable[.
     module.verify()
     if passes:
         options = llvm.create_pipeline_tuning_options(speed_level=3)
-        # It pays for the matrices of a law that solves a program, and costs where vectors have three components.
+        # It pays for the matrices of a law that solves an optimization, and costs where vectors have three components.
         options.slp_vectorization = width == 1 and calls
         builder = llvm.create_pass_builder(machine, options)
         builder.getModulePassManager().run(module, builder)

@@ -143,7 +143,7 @@ def reads(block: Block) -> Iterator[Value]:
 
 
 def writes(block: Block) -> bool:
-    """Tell whether a block, or a function that it calls, writes to memory."""
+    """Return whether a block, or a function that it calls, writes to memory."""
     return any(isinstance(s, Store) or (isinstance(s, Call) and writes(s.function.body)) for s in statements(block))
 
 

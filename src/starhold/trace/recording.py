@@ -43,7 +43,7 @@ RESERVED = frozenset(_WORDS.split())
 
 
 MARK = "\u241e"
-"""This stands on both sides of a number's place and format in a text that a check made of recorded numbers."""
+"""The delimiter on both sides of a number's index and format in a text that a check makes from recorded numbers."""
 
 _CONSTANTS = {NUMBER: (float, int), TRUTH: (bool,), WORD: (int,), INDEX: (int,), STATIC: (int,)}
 
@@ -82,15 +82,15 @@ class _Names:
 
 
 class Path:
-    """One way through the comparisons of a check: the given answers, then no to all others. `truths` and `taken` are
-    the comparisons met with the answers that they got; `numbers` those that appear in a text."""
+    """One path through the comparisons of a check: the given answers, then no to all others. `truths` and `taken` are the
+    comparisons met with their answers; `numbers` those that appear in a text."""
 
     def __init__(self, turns: Sequence[bool]) -> None:
         self.taken, self._turns = list[bool](), turns
         self.truths, self.numbers = list[Handle](), list[Handle]()
 
     def turn(self, truth: Handle) -> bool:
-        """Return the answer to a comparison on this way; one that was met before has the same."""
+        """Return the answer to a comparison on this path; the same comparison always has the same answer."""
         known = next((place for place, met in enumerate(self.truths) if met.ref == truth.ref), None)
         if known is not None:
             return self.taken[known]
@@ -110,7 +110,7 @@ class Recorder:
     def __init__(self) -> None:
         self.memories: list[Memory] = []
         self.path: Path | None = None
-        """The way that a check takes through its comparisons, where one is recorded."""
+        """The path of a check through its comparisons, if one is recorded."""
         self._functions: dict[Any, tuple[Function, list[int], Any]] = {}
         self._open: list[list[Any]] = [[]]
         self._seen: list[dict[Any, Handle]] = [{}]

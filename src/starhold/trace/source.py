@@ -64,7 +64,7 @@ def operator_of(text: str) -> str:
 
 
 def _stands(inner: str, outer: str, place: int) -> bool:
-    """Tell whether an operand needs no parentheses; they are also written where only a compiler's warning asks for them."""
+    """Return whether an operand needs no parentheses; they are also written where only a compiler's warning requires them."""
     if outer == _CALL:
         return True
     if outer in _BITS:
@@ -118,7 +118,7 @@ class Source(ABC):
         return "\n".join([*self._opening(), *self.lines]) + "\n"
 
     def is_main(self, function: Function) -> bool:
-        """Tell whether a function is the one to call."""
+        """Return whether a function is the one to call."""
         return function.name == self.program.main.name
 
     def _touched(self, function: Function) -> list[Memory]:
@@ -162,7 +162,7 @@ class Source(ABC):
         return [name]
 
     def _halves(self, kind: str) -> int:
-        """Tell how many parts a value has."""
+        """Return how many parts a value has."""
         return len(self._parts("", kind))
 
     def _texts_of_parts(self, value: Value, kind: str) -> list[str]:

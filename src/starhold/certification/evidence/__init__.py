@@ -1,1 +1,1 @@
-"""Guesses of the evidence that the kernel asks for. Nothing here is trusted."""
+"""Guesses of the evidence that the kernel needs. Nothing here is trusted."""

@@ -1,4 +1,4 @@
-"""Finds the claims about where an attitude loop's motions end and which limits they keep: levels of V, and evidence."""
+"""Finds the claims about ultimate bounds and limits of an attitude loop's motions: levels of V, and evidence."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ SAMPLED, SLIDING = "stays stable between samples", "reaches its surface"
 ANY_ANGLE = 7
 """An angle (rad) that no turn exceeds."""
 LEANS = 4e-3
-"""The share of the law's own V that a mixed term takes."""
+"""The share of the law's own V that a cross term takes."""
 FASTER = 1.0 + 1e-2
-"""How much faster than the least bound a rate is told to be at most."""
+"""The factor between the least bound of a rate and the claimed one."""
 BISECTIONS = 6
 """Of a level, between it and four times it."""
 NEAR = 1.1
-"""How many times the least level those of other limits may be, to be looked at again."""
+"""Levels of other limits up to so many times the least are examined again."""
 LEAST_TURN = 1e-12
 """The turn (rad) that a set holds if it is to hold a smaller one: no sum of squares tells those from none."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]
-"""Shares of a largest level that are given away, for at the largest the matrices are singular."""
+"""Shares by which a largest level is reduced, because there the matrices are singular."""
 
 
 @dataclass
 class Loop(RecordedLoop):
-    """A recorded loop whose claims are searched for; `alone`: of those nothing but where motions end."""
+    """A recorded loop whose claims are sought; `alone`: only the ultimate bound."""
 
     alone: bool = False
 
     def show_end(self, turn: float | None = None) -> None:
-        """Find where motions end, by the law's own V or by the kinetic energy in its place. turn: what the set within the
-        limits is to hold (rad)."""
+        """Find the ultimate bound of motions, by the law's own V or by the kinetic energy in its place. turn: the rotation
+        that the set within the limits must contain (rad)."""
         V, signs = self.lyapunov(), sign_words(self.loop)
         try:
             self.form(V)
@@ -64,7 +64,7 @@ class Loop(RecordedLoop):
             own = signs if theorem == CONVERGES else []
             more: dict[str, Any] = widths if own else {}
             if SHORTEST in own:
-                # Below V where the sign changes.
+                # Below the V at which the sign changes.
                 level = Fraction(self.cap(theorem, own, V) * (1.0 - float(GIVEN_AWAY[0])))
                 more = {"level": level, **self.contents(self.form(V), level)}
             if self.try_to_show(self.claim(theorem, [*words, *own], V, **more), self.scales(V)):
@@ -111,7 +111,7 @@ class Loop(RecordedLoop):
         return shown
 
     def show_bounded(self, words: list[str], widths: dict[str, Any], turn: float | None) -> None:
-        """Find a set in which the law's own V decreases, for the rate is bounded there, and a set within limits."""
+        """Find a set in which the law's own V decreases, because the rate is bounded there, and a set within limits."""
         own = self.form(self.lyapunov())
         if not (np.linalg.eigvalsh(curvature(own, "w"))[0] > 0.0 > own.terms.get(("q0",), 0)):
             return
@@ -125,7 +125,7 @@ class Loop(RecordedLoop):
                 return
 
     def highest_decreasing(self, theorem: str, words: list[str], V: str, widths: dict[str, Any]) -> Fraction | None:
-        """Return about the largest level up to which V decreases, where the quaternion's sign changes too."""
+        """Return about the largest level up to which V decreases, also where the quaternion's sign changes."""
 
         def decreases(level: float) -> bool:
             told = widths | self.slowly(V, Fraction(level))
@@ -154,12 +154,12 @@ class Loop(RecordedLoop):
         return Fraction(low)
 
     def slowly(self, V: str, level: Fraction) -> dict[str, Any]:
-        """Return the rate that is not exceeded on a set, a little more."""
+        """Return a bound of the rate on a set, with a small margin."""
         slowest = float(np.linalg.eigvalsh(curvature(self.form(V), "w"))[0])
         return {"fastest": sqrt(2.0 * float(level) / slowest) * FASTER}
 
     def descent_of(self, words: list[str], s: float, epsilon: float) -> Squares:
-        """Return what has to be shown of V'."""
+        """Return the obligation about V'."""
         claim = self.claim(STRICTLY, words, self.crossed(s, epsilon))
         return descent(obligations(claim, self.by_digest)[0])
 
@@ -174,14 +174,14 @@ class Loop(RecordedLoop):
         if not self.limits:
             return False
         if "fastest" not in numbers and SHORTEST not in words:
-            # A law that clips may keep its limits everywhere.
+            # A law that saturates may keep its limits everywhere.
             claim = self.claim(theorem, words, V, **numbers)
             if "V is non-increasing" not in obligations(claim, self.by_digest)[0]:
                 if self.try_to_show(claim, self.scales(V)):
                     return True
                 if "limit.norm" in numbers:
                     # Sums of squares with all axes' cases, and every direction, take too long.
-                    self.failed[f"{theorem}, limits"] = "the norm of a clipped torque is not looked at"
+                    self.failed[f"{theorem}, limits"] = "the norm of a clipped torque is not examined"
                     return False
         claim = self.claim(theorem, words, V, level=1, **numbers)
         cap = self.cap(theorem, words, V)
@@ -197,7 +197,7 @@ class Loop(RecordedLoop):
             lower = Fraction(float(level * (1 - share)))
             held = self.contents(form, lower)
             if turn is not None and held["angle"] < turn:
-                self.failed[f"{theorem}, limits"] = "the set that was found does not hold the turn"
+                self.failed[f"{theorem}, limits"] = "the set found does not contain the turn"
                 break
             told = numbers | held | ({} if turn is None else {"angle": max(turn, LEAST_TURN)})
             if "fastest" in numbers:
@@ -225,7 +225,7 @@ class Loop(RecordedLoop):
             if isinstance(o, Squares) and o.p.names and name.startswith(("torque", "norm", "motor", "wheel"))
         ]
         if "V is non-increasing" not in wanted:
-            # What is clipped may hold at any level.
+            # A limit on a clipped torque may hold at any level.
             limits = [o for o in limits if squares(replace(o, known=o.known[:-1]), self.scales(V)) is None]
         level = cap
         for _ in range(3):
@@ -258,7 +258,7 @@ class Loop(RecordedLoop):
 
 
 def descent(wanted: Mapping[str, Obligation]) -> Squares:
-    """Return what has to be shown of V'. RefusedError for a law that has cases."""
+    """Return the obligation about V'. RefusedError for a law that has cases."""
     found = wanted.get("V is non-increasing")
     if not isinstance(found, Squares):
         raise RefusedError("the law switches")

@@ -1,4 +1,4 @@
-"""Finds all claims about an attitude loop that the kernel can be shown; here those near rest and on sliding surfaces."""
+"""Finds all claims about an attitude loop that the kernel can check; here those near rest and on sliding surfaces."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -31,13 +31,13 @@ from starhold.kernel.rules import Contracts, Definite, Squares
 from starhold.parts.craft import tensor
 
 ENDING = (CONVERGES, EVENLY, STRICTLY)
-"""Theorems about where motions of the given body end."""
+"""Theorems about ultimate bounds for the given body."""
 LIMITS = {"limit", "limit.norm", "motors.0"}
 
 
 def find_claims(subject: Subject, turn: float | None = None, tolerance: float | None = None) -> Loop:
-    """Find the claims that can be proved: where motions end, for other inertias, within limits, between samples. turn: what
-    the set within the limits is to hold (rad); tolerance: of the inertia, the largest unless told."""
+    """Find the claims that can be proved: the ultimate bound, for other inertias, within limits, between samples. turn: the
+    rotation that the set within the limits must contain (rad); tolerance: of the inertia, by default the largest."""
     loop, flown = Loop(subject), subject.loop
     if not flown.remembers:
         if flown.law.lyapunov is not None:
@@ -53,8 +53,9 @@ def find_claims(subject: Subject, turn: float | None = None, tolerance: float | 
 
 
 def find_taken_over(subject: Subject, rate: float | None, angle: float | None) -> Loop | None:
-    """Find the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) end on target,
-    and the one between samples; None where it is not known from where motions end, or no rate is told that this needs."""
+    """Find the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) converge to the
+    target, and the one between samples; None where no region of attraction is known, or where it needs a bound of the rate.
+    """
     loop = Loop(subject, alone=True)
     loop.show_end()
     found = next((c for c in loop.claims if c["theorem"] in ENDING and not LIMITS & c["numbers"].keys()), None)
@@ -103,7 +104,7 @@ def find_sampled(loop: Loop) -> None:
     ):
         return
     if radius >= 1.0:
-        loop.failed[SAMPLED] = "the torque is held for too long"
+        loop.failed[SAMPLED] = "the control period is too long"
         return
     other = longest_stable(floats(J.a) + float(h) * floats(damping), floats(damping), floats(K.a), float(h))
     for share in (1e-9, 1e-7, 1e-5, 1e-3):
@@ -113,7 +114,7 @@ def find_sampled(loop: Loop) -> None:
 
 
 def longest_stable(J: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64], period: float) -> float:
-    """Return a period near the longest, from a stable one on, that floats find all stable up to."""
+    """Return a period near the longest up to which, from a stable one on, floats find all periods stable."""
     pull = np.asarray(np.linalg.solve(J, np.hstack([C, K])), dtype=np.float64)
     low, high = period, 2.0 * period
     while settles(pull, high) and high < 1e12 * period:
@@ -159,7 +160,7 @@ def signed(loop: Loop, told: dict[str, Any]) -> dict[str, Any]:
 
 
 def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
-    """Return the numbers of where motions end in a boundary layer."""
+    """Return the numbers of the ultimate bound in a boundary layer."""
     J, K, more = tensor(loop.loop.craft.inertia), tensor(loop.loop.gains.surface_gain), 1.0 + 1e-6
     reach = np.array(loop.loop.gains.switching_gain)
     slope, bound = reach / layer, np.array(m)
@@ -185,11 +186,11 @@ def fraction(x: Any) -> Fraction:
 
 
 KNOWN = 18
-"""So many of the monomials of V' are enough."""
+"""The number of monomials of V' that suffice."""
 LESS = (1e-3, 3e-3, 1e-2)
-"""Shares of the largest tolerance that are given away."""
+"""Shares by which the largest tolerance is reduced."""
 CALM = (0.5, 0.25, 0.12, 0.06, 0.03)
-"""Shares of the mixed term in V that are tried."""
+"""Shares of the cross term in V that are tried."""
 
 
 def find_near(loop: Loop, tolerance: float | None = None) -> None:
@@ -218,7 +219,7 @@ def find_near(loop: Loop, tolerance: float | None = None) -> None:
         found = solved(posed(base.p, [-A, -mixed], others, z), scales)
         pairs = [] if found is None else [(found[0], found[1])]
         if pairs and HYSTERESIS in sign_words(loop.loop):
-            # With less of the mixed term the set is larger.
+            # With a smaller cross term the set is larger.
             for epsilon in (share * pairs[0][1] for share in CALM):
                 found = solved(posed(base.p + mixed * Fraction(epsilon), [-A], others, z), scales)
                 pairs += [] if found is None else [(found[0], epsilon)]
@@ -237,7 +238,7 @@ def three_digits(x: float) -> float:
 
 
 def falling(loop: Loop, words: list[str], s: float, epsilon: float, tolerance: float) -> Squares:
-    """Return what has to be shown of V', less what is known of the inertia."""
+    """Return the obligation about V', less what is known of the inertia."""
     more = {"tolerance": tolerance, "lean": epsilon, "inertia.most": 1}
     claim = loop.claim(NEARBY, words, loop.crossed(s, epsilon), **more)
     found = descent(obligations(claim, loop.by_digest)[0])

@@ -1,4 +1,4 @@
-"""Finds the evidence for what a theorem asks to be shown about a claim."""
+"""Finds the evidence for a theorem's obligations about a claim."""
 
 import json
 import warnings
@@ -27,7 +27,7 @@ class NotFoundError(Exception):
 
 
 def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
-    """Return a claim as the kernel has it, with the evidence that theorems ask for themselves, and no limit on work."""
+    """Return a claim in the kernel's form, with the evidence that theorems themselves need, and no limit on work."""
     Account.left = 10**12
     return Claim(
         claim["theorem"],
@@ -40,7 +40,7 @@ def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
 
 
 def obligations(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> tuple[dict[str, rules.Obligation], Claim]:
-    """Return what has to be shown of a claim, and the claim, which knows what of it was read."""
+    """Return the obligations of a claim, and the claim, which knows which of its entries were read."""
     known = read(claim, programs)
     return dict(THEOREMS[known.theorem](known)), known
 
@@ -80,14 +80,14 @@ def _completed(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mappi
 
 
 def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[str, float]) -> Any:
-    """Return the evidence of an obligation; None for one that needs none."""
+    """Return the evidence of an obligation, or None if it needs none."""
     found: Any = None
     o = wanted[name]
     if isinstance(o, rules.Squares):
         found = plainly(o) or squares(o, scales)
         if found is None:
             raise NotFoundError(f"{name}: no sum of squares was found")
-        # It was checked as it was found.
+        # It was checked when it was found.
         return found
     if isinstance(o, rules.Sum):
         found = Reduced(o, scales).evidence()

@@ -1,4 +1,4 @@
-"""Finds the claim about a loop that knows no axis: a V with a mixed term, the largest level, and evidence for the kernel."""
+"""Finds the claim about an isotropic loop: a V with a cross term, the largest level, and evidence for the kernel."""
 
 from bisect import bisect
 from fractions import Fraction
@@ -23,7 +23,7 @@ from starhold.kernel.rules import Sum
 
 
 class Shape(NamedTuple):
-    """The numbers of V. Where p > 0, p + 2 c2 > 0 and p + 4 c2 > 0 the attitude's part rises with the turn."""
+    """The numbers of V. Where p > 0, p + 2 c2 > 0 and p + 4 c2 > 0 the attitude's part increases with the rotation."""
 
     p: float
     c2: float
@@ -63,7 +63,7 @@ SHAPES = (
 LIMITS = (0.01, 0.02, 0.045, 0.07, 0.12, 0.2, 0.4)
 """The shapes are near the largest sets for ab of up to these, and from 1 on, from a search among points of a grid."""
 SIGNED = (Shape(4.0, 0.0, 0.02, 0.0), Shape(4.0, 0.0, 0.1, 0.0), Shape(5.0, 0.0, 0.7, -0.7))
-"""Where the sign of the quaternion is chosen: with a mixed term so small that a change of sign lowers V."""
+"""Where the sign of the quaternion is chosen: with a cross term so small that a change of sign lowers V."""
 
 
 def near(beta: float) -> tuple[Shape, ...]:
@@ -93,7 +93,7 @@ class Reach(NamedTuple):
 
 
 def find_isotropic(loop: Loop) -> None:
-    """Find the claim with the largest set, for a law that tells a single root."""
+    """Find the claim with the largest set, for a law that declares a single root."""
     flown = loop.loop
     root = flown.law.module.single_root(flown.gains)
     if root is None or not max(root) < 0.0:
@@ -118,7 +118,7 @@ def units(level: float) -> dict[str, float]:
 
 
 def words(loop: Loop) -> list[str]:
-    """Name what the loop is taken with."""
+    """Name the assumptions about the loop."""
     return [*loop.words, *sign_words(loop.loop)]
 
 

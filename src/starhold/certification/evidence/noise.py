@@ -1,4 +1,4 @@
-"""Finds how large the errors become that noise drives: a covariance that bounds theirs, and radii that they leave rarely."""
+"""Finds bounds of noise-driven errors: a covariance that bounds theirs, and radii that they rarely leave."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import floats
 from starhold.certification.evidence.squares import rounded
-from starhold.certification.openness import driven_errors, measures_noisy_field, samples_of
+from starhold.certification.unmodelled import driven_errors, measures_noisy_field, samples_of
 from starhold.kernel.held import near_target
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.regions import RATE, TURN
@@ -26,18 +26,18 @@ Array = NDArray[np.float64]
 RARELY = Fraction(27, 10_000)
 """The share of orbits in which errors may leave their radii."""
 WIDER, LEAST, MORE, DIGITS = 1e-6, 1e-30, 1.0 + 1e-9, 9
-"""By which share of its variances the covariance is given away at each step, and the least that is; what is given away where
-numbers are rounded; and to how many digits covariances are, for long numbers take long."""
+"""The share by which the covariance is inflated at each step, and its minimum; the margin for rounding; and the digits of
+covariances, because long numbers take long."""
 
 
 SHARES = (0.05, 0.05, 0.05, 0.85)
-"""These shares of the probability are given to the radii of the attitude and the rate that are told, and of the rate and the
-turn that they cause."""
+"""The shares of the probability for the radii of attitude and rate errors of the measurement, and of the rate and the
+rotation that they cause."""
 
 
 def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[str, Any]] | None:
-    """Find the numbers that a claim tells of noise, and the evidence for them; None without noise, or where it drives errors
-    or the loop without end."""
+    """Find the numbers of a claim about noise, and their evidence; None without noise, or where it drives errors or the loop
+    without bound."""
     noise = driven_errors(loop.loop)
     if noise is None:
         return None
@@ -82,7 +82,7 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
 
 
 def period(steps: list[tuple[Array, ...]], size: int, more: Array) -> tuple[Array, Array]:
-    """Return by what errors are multiplied in the steps together, and the covariance that these add, each with more."""
+    """Return the factor of errors over all steps together, and the covariance that the steps add, each with a margin."""
     whole, spread = np.eye(size), np.zeros((size, size))
     for A, B in steps:
         own, noise = A[:size], B[:size]

@@ -1,4 +1,5 @@
-"""Finds the claim about the loop that flies: V, the levels that motions come down by, and the ellipsoids where they end."""
+"""Finds the claim about the loop that flies: V, the descending levels of motions, and the ellipsoids of their ultimate
+bound."""
 
 from __future__ import annotations
 
@@ -20,8 +21,8 @@ from starhold.certification.evidence.finding import NotFoundError, evidence, flo
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.squares import rounded
-from starhold.certification.openness import Pushes, driven_errors, pushes
 from starhold.certification.subject import above
+from starhold.certification.unmodelled import Pushes, driven_errors, pushes
 from starhold.kernel.held import Held, Tube, near_target
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
@@ -36,22 +37,22 @@ Array = NDArray[np.float64]
 
 POINTS = "points"
 ANGLES = (175, 150, 120, 90, 60, 45, 30, 20, 10)
-"""From up to which turns (deg) motions are tried to be shown to come to the target."""
+"""The initial rotations (deg) from which convergence is attempted."""
 LEAST = 1e-6
-"""By how much (rad) a spring as stiff as the law gives to the least torque from outside that is told of."""
+"""The deflection (rad) of a spring as stiff as the law under the least external torque that is considered."""
 HEED = 0.5
-"""How much the rates of an ellipsoid count beside its turns, until that makes no more of them smaller."""
+"""The weights of an ellipsoid's rates relative to its rotations, until they reduce no bound further."""
 NEARLY = 1e-3
-"""By which share the linear motion is multiplied first, for what wheels' momentum makes of it."""
+"""The share by which the linear motion is first scaled, to allow for the wheels' momentum."""
 NEARER = 0.25
-"""A claim is made only where motions end within this share of the largest turn that the set holds."""
+"""A claim is made only if the ultimate bound is below this share of the largest rotation in the set."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
 MORE, FLOOR, LARGER, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 7, 8.0, 20, 24, 2000
-"""What is given away where numbers are rounded; by how much the last level is above its limit, and ellipsoids are larger
-than the least, for motions come into them after a finite time; to how many digits their numbers are rounded; by how much a
-level may be below the one before; how many levels and ellipsoids there are at most; at how many states of a set the torque
-is looked at."""
+"""Margins for rounding; for the last level above its limit, and for ellipsoids above the least, so that motions enter them
+in finite time; the digits of their numbers; the largest ratio of successive levels; the most levels and ellipsoids; the
+number of states of a set at which the torque is examined.
+"""
 
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
@@ -59,24 +60,24 @@ Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 
 @dataclass
 class Chain:
-    """Levels from a set down to where pushes outweigh the damping, and ellipsoids from there on."""
+    """Levels from a set down to where disturbances outweigh the damping, and ellipsoids from there on."""
 
     held: Held
     V: str
     level: float
     found: dict[Fraction, Lower | None] = field(default_factory=dict[Fraction, "Lower | None"])
-    """It keeps what `lower` found, for all chains of one V."""
+    """The results of `lower`, for all chains of one V."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     samples: int = 0
 
     def aim(self) -> float:
-        """Return the level that pushes allow where all motions are nearly linear."""
+        """Return the level that disturbances allow where all motions are nearly linear."""
         found = self.lower(self.held.s / 2**20)
         return inf if found is None else float(found[2])
 
     def decreases(self) -> bool:
-        """Tell whether V decreases on the whole set, down to a lower level."""
+        """Return whether V decreases on the whole set, down to a lower level."""
         found = self.lower(Fraction(self.level))
         return found is not None and found[2] < Fraction(self.level)
 
@@ -94,7 +95,7 @@ class Chain:
         return float(c)
 
     def lower(self, c: Fraction) -> Lower | None:
-        """Return tau and beta for the lowest level that is shown to be reached from another, and that level."""
+        """Return tau and beta for the lowest level proved to be reached from another, and that level."""
         if c not in self.found:
             self.found[c] = self.lowest(c)
         return self.found[c]
@@ -125,8 +126,8 @@ class Chain:
         return t, b, (push * push / (4 * t) + rest) / b
 
     def tighten(self, tube: Tube, swayed: Radii) -> tuple[float, float]:
-        """Find the ellipsoids, and return the angle (rad) and the rate (rad/s) where motions end. swayed: what noise
-        adds."""
+        """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s). swayed: the contribution of
+        noise."""
         angle, fastest = self.ends(tube, tube.region.X)
         heed, corners = HEED, self.held.corners()
         for _ in range(ELLIPSOIDS):
@@ -161,7 +162,7 @@ class Chain:
         return angle, fastest
 
     def asks_more(self, limits: dict[str, float]) -> bool:
-        """Tell whether the law asks for more than its limit at some state of the set."""
+        """Return whether the law commands more than its limit at some state of the set."""
         most = min((x for name, x in limits.items() if name.startswith("limit")), default=inf)
         r, G, s = np.random.default_rng(1), floats(self.held.G), float(self.held.s)
         along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STATES)))
@@ -182,8 +183,8 @@ class Chain:
         return bool(size[inside].max(initial=0.0) > most)
 
     def ends(self, tube: Tube, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
-        """Return the angle (rad) and the rate (rad/s) that motions of a tube do not exceed, between samples either, which
-        at samples are no further than `swayed` from an ellipsoid."""
+        """Return bounds of the angle (rad) and the rate (rad/s) of motions, also between samples, that at samples are within
+        `swayed` of an ellipsoid."""
         shape, drift = floats(X), float(norm(tube.drift))
         wide, turned = (
             sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
@@ -197,15 +198,15 @@ class Chain:
 
 
 def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
-    """Find how near the loop comes to its target against what its parts do, and what is asked for beside, within its limits
-    if that is found: from the largest turns, at the rate of the loop's start or from rest. like: the numbers of a claim, to
-    start as that one does, within the same limits, and with noise if it tells of noise."""
+    """Find the pointing bound of the loop under the disturbances of its parts and the requested ones, within its limits if
+    possible: from the largest rotations, at the rate of the loop's start or from rest. like: the numbers of a claim, for the
+    same start set and limits, and with noise if it includes noise."""
     if like is None:
         begun = loop.loop.without("sensor", "estimator")
         shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
         rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
         tried = [(list(map(radians, ANGLES)), rate, limits) for limits in (loop.limits, {}) for rate in rates]
-        # Against more noise than can be shown, without it.
+        # If the noise is too large for a proof, without it.
         kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
@@ -225,7 +226,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
 
 
 class Pushed:
-    """A loop against torques that no law is told, and errors. RefusedError for a law that the theorem does not take."""
+    """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
     def __init__(self, loop: Loop, against: Pushes, noisy: bool = False) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
@@ -236,9 +237,9 @@ class Pushed:
         self.loop, self.words = loop, words + sign_words(loop.loop)
         wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None), loop.by_digest))
         self.stiffness = feedback(wired)
-        demand(self.stiffness > 0.0, "the law does not turn the body to its target")
+        demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
-        demand(all(map(isfinite, against)), "the wheels' friction has no bound, for their momentum has no limit")
+        demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
         self.told: dict[str, Any] = {"period": loop.loop.period}
         self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
@@ -252,7 +253,7 @@ class Pushed:
             (float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}")), dict[Fraction, Lower | None]())
             for lean in LEANS
         ]
-        # The best in the small is tried first, and taken if it comes down from the whole set.
+        # The locally best is tried first, and taken if it descends from the whole set.
         self.leans.sort(key=lambda lean: Chain(lean[2], lean[1], 0.0, lean[3]).aim())
 
     def held(self, epsilon: float) -> tuple[str, Held]:
@@ -261,18 +262,18 @@ class Pushed:
         return V, Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
 
     def claim(self, V: str, told: dict[str, Any], **evidence: Any) -> dict[str, Any]:
-        """Return the claim with what is told, and evidence beside that about noise."""
+        """Return the claim with its numbers, and its evidence except that about noise."""
         return self.loop.claim(POINTS, self.words, V, **told) | {"evidence": self.evidence | evidence}
 
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float]) -> bool:
-        """Find the claim from the largest of these turns, of which each is less than the one before, that can be had."""
-        # What may start within a set may start within a smaller one.
+        """Find the claim from the largest possible of these rotations, which are in decreasing order."""
+        # A start within a smaller set is also within the larger one.
         first = bisect_left(angles, True, key=lambda angle: self.begun(angle, rate, limits) is not None)
         return any(self.find(angle, rate, limits) for angle in angles[first:])
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
-        """Return what the claim tells of the set from which motions start, and a chain that begins there for each lean of V;
-        None, and the reason in `failed`, where V does not decrease on it or the torque exceeds its limits."""
+        """Return the claim's numbers of the start set, and a chain from there for each lean of V; None, and the reason in
+        `failed`, where V does not decrease on the set or the torque exceeds its limits."""
         loop, J, begun = self.loop, self.J, list[Chain]()
         told = self.told | limits
         told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
@@ -291,8 +292,8 @@ class Pushed:
         return told, begun
 
     def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
-        """Find the claim of how near to its target the loop comes, and add it. The set holds turns of up to `angle` (rad) at
-        up to `rate` (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
+        """Find the pointing claim of the loop, and add it. The set contains rotations of up to `angle` (rad) at up to `rate`
+        (rad/s); limits: of the torque about each axis (`limit`) or its norm (`limit.norm`), or of wheels."""
         loop, start_of = self.loop, self.begun(angle, rate, limits or {})
         if start_of is None:
             return False
@@ -303,7 +304,7 @@ class Pushed:
         else:
             chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)
         if not chain.levels:
-            loop.failed[POINTS] = "V does not fall on the set from which motions start"
+            loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return False
         held, start = chain.held, Fraction(chain.level)
         angle, fastest = chain.tighten(held.tube(held.region(Fraction(chain.levels[-1]["end"]))), self.swayed)
@@ -318,7 +319,7 @@ class Pushed:
 
 
 def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
-    """Tell whether the set of a claim without levels is sound, and the torque keeps its limits on it."""
+    """Return whether the set of a claim without levels is sound, and the torque keeps its limits on it."""
     try:
         shown = points(read(claim | {"numbers": claim["numbers"] | {"highest": "0"}}, loop.by_digest))
         wanted = dict(takewhile(lambda one: one[0] != "V between samples", shown))
@@ -336,8 +337,8 @@ def feedback(loop: AttitudeLoop) -> float:
 
 
 def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tuple[Array, list[float]] | None:
-    """Return the matrix of the ellipsoid that pushes of size 1 do not leave, about the one that turns least, and its shares.
-    heed: how much rates count beside turns, in powers."""
+    """Return the matrix of an ellipsoid invariant under disturbances of size 1, approximately the one with the least
+    rotation, and its shares. heed: the weight of rates relative to rotations, in powers."""
     radius = float(np.abs(np.linalg.eigvals(A)).max())
     if radius >= 1.0:
         return None
@@ -373,5 +374,5 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
 
 
 def highest_ratio(a: Rows, b: Rows) -> float:
-    """Return a number that the eigenvalues of b^-1 a stay below."""
+    """Return an upper bound of the eigenvalues of b^-1 a."""
     return float(linalg.eigh(floats(a), floats(b), eigvals_only=True)[-1]) * MORE

@@ -1,4 +1,4 @@
-"""A closed loop in the kernel's terms: its programs as they fly, its numbers exactly, claims about it."""
+"""A closed loop in the kernel's terms: the programs that fly, its exact numbers, claims about it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, complete, read
-from starhold.certification.openness import driven_errors
 from starhold.certification.subject import Subject, above
+from starhold.certification.unmodelled import driven_errors
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.polynomials import Poly
 from starhold.kernel.programs import Program, digest
@@ -49,13 +49,13 @@ class RecordedLoop:
     failed: dict[str, str] = field(default_factory=dict[str, str])
 
     written_by: dict[str, dict[str, float | None]] = field(default_factory=dict[str, dict[str, float | None]])
-    """The numbers that a V which is not the law's own is made of, by its digest."""
+    """The numbers of a V that is not the law's own, by its digest."""
     forms: dict[str, Poly] = field(default_factory=dict[str, Poly])
     """The polynomials V, by their digests."""
     eigenvalues: list[list[float]] = field(default_factory=list[list[float]])
     """Those of a step near rest, in floats."""
     pushed_at: list[float] | None = None
-    """Where on the orbit (m) the gravity gradient pushes the motion off the law's surface."""
+    """The position (m) on the orbit where the gravity gradient pushes the motion off the law's surface."""
 
     @property
     def loop(self) -> ClosedLoop:
@@ -136,7 +136,7 @@ class RecordedLoop:
 
     @cached_property
     def subject(self) -> dict[str, str]:
-        """The exact numbers that programs and the body may ask for."""
+        """The exact numbers that programs and the body may read."""
         loop, J = self.loop, tensor(self.loop.craft.inertia).tolist()
         named = [*labelled("gains", loop.gains), *labelled("craft", loop.known), ("measurement.period", float(loop.period))]
         found = {name: x.hex() for name, x in named if isfinite(x)}
@@ -149,7 +149,7 @@ class RecordedLoop:
 
     @property
     def words(self) -> list[str]:
-        """Name what the loop is taken with, as far as it has it."""
+        """Name the assumptions about the loop that apply."""
         loop, known = self.loop, self.known
         found = [OUTSIDE] if any(known.modelled) else []
         found += [MOVING] if known.moving else []
@@ -174,7 +174,7 @@ class RecordedLoop:
         return {digest(program): program for program in self.programs}
 
     def scales(self, V: str | None, level: float | None = None) -> dict[str, float]:
-        """Return about how large variables become on {V <= level}."""
+        """Return the approximate size of variables on {V <= level}."""
         known, J, top = self.known, tensor(self.loop.craft.inertia), self.potential(V)
         energy = min(level or top, top)
         found = {f"q{k}": sqrt(energy / top) for k in (1, 2, 3)}
@@ -203,7 +203,7 @@ class RecordedLoop:
         return [2.0 * abs(float(p.terms.get((f"w{k}", f"w{k}"), 0.5))) for k in (1, 2, 3)]
 
     def bounds(self, words: list[str]) -> dict[str, Any]:
-        """Return the numbers that bound what the loop is taken with."""
+        """Return the numbers that bound the loop's assumptions."""
         known, found = self.known, dict[str, Any]()
         if OUTSIDE in words:
             found |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
@@ -213,7 +213,7 @@ class RecordedLoop:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """Return the limits of the torque, or those of the wheels; nothing where there are none."""
+        """Return the limits of the torque, or those of the wheels; empty where there are none."""
         loop, wheels = self.loop, self.loop.wheels
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
         shared = dict[str, Any]()
@@ -225,7 +225,7 @@ class RecordedLoop:
         return {"limit" if loop.limit == "axis" else "limit.norm": limit} if isfinite(limit) else {}
 
     def is_told(self, name: str) -> bool:
-        """Tell whether the law's program asks for an input."""
+        """Return whether the law's program reads an input."""
         law = self.roles["law"]
         return name + ".0" in Program.read(self.by_digest[law]).inputs
 
@@ -240,7 +240,7 @@ class RecordedLoop:
         return True
 
     def too_little_momentum(self) -> bool:
-        """Tell whether a body at rest on a target that turns has more momentum than is told."""
+        """Return whether a body at rest on a rotating target has more momentum than claimed."""
         loop, known = self.loop, self.known
         stored = np.array(loop.rotors) @ np.array(loop.wheels.axes) if loop.wheels is not None else np.zeros(3)
         least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0]) * (1.0 - 1e-12)

@@ -1,4 +1,4 @@
-"""Guesses of what the theorem on loops that know no axis asks for, in u = 1 - q0, the rate v, and t, the part of q along the
+"""Guesses of the evidence for the theorem on isotropic loops, in u = 1 - q0, the rate v, and t, the part of q along the
 rate: sums of squares times products of level - V and of |q|^2 - t^2."""
 
 from collections.abc import Mapping

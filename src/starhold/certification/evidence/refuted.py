@@ -1,4 +1,4 @@
-"""Finds states at which what a claim about an attitude loop needs fails, in floats, for the kernel to refute it by."""
+"""Finds, in floats, states at which a condition of a claim about an attitude loop fails, for the kernel to refute."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -28,14 +28,14 @@ REFUTING = (RISES, RISES_NEAR, NEGATIVE, EXCEEDS, UNSETTLED, PUSHED, AWAY)
 Floats = NDArray[np.float64]
 VARIABLES = ("w1", "w2", "w3", "q1", "q2", "q3")
 TRIES = 10_000
-"""How many states are tried at each rate."""
+"""The number of states tried at each rate."""
 PIECES = 64
-"""Of how many pieces of V' at most."""
+"""The most pieces of V'."""
 
 
 def find_refuted(loop: Loop, turn: float | None = None, rate: float | None = None) -> None:
-    """Find what refutes the claims for which no evidence was found. turn: what the set within the limits was to hold (rad);
-    rate: up to which motions were to end on target from every attitude (rad/s, inf for any)."""
+    """Find what refutes the claims without evidence. turn: the rotation that the set within the limits should contain (rad);
+    rate: up to which motions should converge from every attitude (rad/s, inf for any)."""
     flown, shown = loop.loop, [claim["theorem"] for claim in loop.claims]
     if flown.law.lyapunov is not None:
         ends = [claim for claim in loop.claims if claim["theorem"].startswith(CONVERGES)]
@@ -50,7 +50,7 @@ def find_refuted(loop: Loop, turn: float | None = None, rate: float | None = Non
 
 
 def against_sampling(loop: Loop) -> None:
-    """Find that the loop is unstable with the torque held between samples."""
+    """Show that the loop is unstable with the torque held between samples."""
     shown = any(claim["theorem"] == SAMPLED for claim in loop.claims)
     if not shown and any(abs(complex(*z)) > 1.0 for z in loop.eigenvalues):
         loop.try_to_show(loop.claim(UNSETTLED, [], None, period=loop.loop.period), {})
@@ -71,7 +71,7 @@ def wired(loop: Loop, V: str) -> AttitudeLoop:
 
 
 def against_near(loop: Loop) -> bool:
-    """Find that V is negative, or rises, however near the target."""
+    """Show that V is negative, or increases, arbitrarily near the target."""
     V = loop.lyapunov()
     exact = wired(loop, V)
     try:
@@ -85,8 +85,8 @@ def against_near(loop: Loop) -> bool:
 
 
 def small_states(p: Poly) -> Iterator[dict[str, float]]:
-    """Yield states, from large ones to small ones, along which the quadratic part of p is largest, where it is positive: of
-    rates alone, of turns alone, of both."""
+    """Yield states, from large to small, along which the quadratic part of p is largest, where it is positive: rates alone,
+    rotations alone, both."""
     form = quadratic(p)
     for part in (slice(0, 3), slice(3, 6), slice(0, 6)):
         values, vectors = np.linalg.eigh(form[part, part])
@@ -94,7 +94,7 @@ def small_states(p: Poly) -> Iterator[dict[str, float]]:
             found = np.zeros(6)
             found[part] = vectors[:, -1]
             for size in 10.0 ** -np.arange(8.0):
-                # Near the target q is twice the turn.
+                # Near the target the rotation is twice q.
                 yield state(0.5 * size * found[3:], size * found[:3])
 
 
@@ -106,7 +106,7 @@ def quadratic(p: Poly) -> Floats:
 
 
 def against_far(loop: Loop, rate: float) -> bool:
-    """Find a state at which V rises, at a rate of up to that: on target first, where a reader sees most."""
+    """Find a state at which V increases, up to this rate: on target first, which is the clearest case."""
     V = loop.lyapunov()
     more = {} if isinf(rate) else {"fastest": rate}
     lengths = 10.0 ** np.array(sorted(range(-6, 19), key=abs))
@@ -191,7 +191,7 @@ def at_rest(t: Floats) -> dict[str, Fraction]:
 
 
 def against_surface(loop: Loop) -> bool:
-    """Find a torque from outside that exceeds what the law switches, or a way along the surface away from the target."""
+    """Find an external torque that exceeds the law's switching torque, or a motion on the surface away from the target."""
     roles, flown = loop.roles, loop.loop
     roles["surface"] = loop.add(flown.law.module.surface, measurement=ASKED, gains=flown.gains)
     try:
@@ -210,7 +210,7 @@ def against_surface(loop: Loop) -> bool:
 
 
 def pushes(loop: Loop) -> list[tuple[float, list[float] | None]]:
-    """Return a torque about each axis that there is somewhere on the orbit, a little less than the most, and where."""
+    """Return a torque about each axis from somewhere on the orbit, slightly less than the largest, and the position."""
     flown, most = loop.loop, number(loop.known.disturbance)
     if not flown.has("gravity-gradient"):
         return [(most, None)] * 3
@@ -219,5 +219,5 @@ def pushes(loop: Loop) -> list[tuple[float, list[float] | None]]:
     directions *= distance / np.linalg.norm(directions, axis=1, keepdims=True)
     strength = 3.0 * flown.craft.gravity / distance**5
     found = np.array([gravity_gradient(tuple(d), strength, flown.craft) for d in directions.tolist()])
-    # Floats told where.
+    # Floats found the position.
     return [((most + float(own.max())) * (1.0 - 1e-9), directions[int(np.argmax(own))].tolist()) for own in found.T]

@@ -1,7 +1,7 @@
 """Guesses of sums of squares: multipliers, cofactors and a Gram matrix by an interior point (Clarabel), then made exact.
 
 All of them are linear in the polynomial. In floats the matrix is made as definite as can be, in units in which the variables
-are about one; rounded to short numbers, what is then amiss is put on the matrix, monomial by monomial.
+are about one; after rounding to short numbers, the residual is added to the matrix, monomial by monomial.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +23,7 @@ sparse: Any = import_module("scipy.sparse")
 T = TypeVar("T")
 TOLERANCE = 1e-11
 LIMIT = 30.0
-"""Seconds that the interior point may take."""
+"""The time limit of the interior point (s)."""
 DIGITS = (12, 14, 9, 16)
 SINGULAR, SHORT = 1e-6, 8
 """The share of the largest eigenvalue below which a matrix is taken for singular, and the denominators of what it takes to
@@ -68,7 +68,7 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
 
 
 def plainly(o: Squares) -> dict[str, Any] | None:
-    """Return evidence in which the matrix is what is left of p without relations; None where that is refused."""
+    """Return evidence whose matrix is the rest of p without relations; None where that is refused."""
     p, known, fixed = settled(o)
     problem = posed(p, known, [], o.z)
     if o.modulo or not p.terms.keys() <= {m for q in problem.columns for m in q.terms}:
@@ -185,9 +185,9 @@ MOST_KNOWN = 256
 
 
 def once(key: Any, make: Callable[[], T]) -> T:
-    """Return what `make` finds for this key, which tells all that it depends on. Modes of a law often differ in nothing that
-    is proved, and limits of axes in their signs alone: what was found of one is kept for the next. The kernel checks it each
-    time."""
+    """Return the result of `make` for this key, which contains all that it depends on. Modes of a law often do not differ in
+    what is proved, and limits of axes only in their signs: results are kept for the next. The kernel checks them each time.
+    """
     if key not in _KNOWN:
         if len(_KNOWN) >= MOST_KNOWN:
             _KNOWN.clear()
@@ -197,7 +197,7 @@ def once(key: Any, make: Callable[[], T]) -> T:
 
 def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
     """Minimise cost.x with A x + s = b, s in the cones; None where that fails."""
-    # Not every command certifies.
+    # Loaded here, because not every command certifies.
     clarabel: Any = import_module("clarabel")
     cones = [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(signed), *map(clarabel.PSDTriangleConeT, sides)]
     settings = clarabel.DefaultSettings()

@@ -30,7 +30,7 @@ ROLES = {
     LIMITED: ("field", "law", "rest", "limited"),
 }
 ALMOST = Fraction(1) - Fraction(1, 2**20)
-"""The part that is claimed of a level at which V is at rest in the middle."""
+"""The claimed share of the level of V at the equilibrium in the middle."""
 GIVEN_AWAY = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 """Shares of a largest level that are given away, for at the largest the matrices are singular."""
 SHARE, FAR = Fraction(0.999), Fraction(1000)
@@ -43,7 +43,7 @@ _T = TypeVar("_T")
 
 
 def full_problem(loop: ClosedLoop) -> bool:
-    """Return whether the whole field is flown, and not the linear one."""
+    """Return whether the nonlinear field is flown."""
     return not loop.has("linear-gravity")
 
 
@@ -101,7 +101,7 @@ class Station:
         return found | ({"clear": root(inside / 2, 0.0)} if bodies and inside > 0 else {})
 
     def show_circle(self) -> None:
-        """Find where motions end on the circle, from the largest level."""
+        """Find the claim that motions converge to the circle, from the largest level."""
         _, circle = self.circle
         level = nextafter(float(circle.weights[0] * circle.square**2 * ALMOST), 0.0)
         if level <= 0.0:
@@ -109,7 +109,7 @@ class Station:
         self.show(self.claim(CIRCLE, **self.contents(level)))
 
     def show_held(self) -> None:
-        """Find another circle that a relay without a layer holds: half as far as it could, near the circle."""
+        """Find another circle that a relay without a layer holds: at half the possible distance, near the circle."""
         loop, circle = self.circle
         away = next((s for s in loop.sides if circle.inverse in {name for p in s.value for name in p.names}), None)
         if away is None:
@@ -124,7 +124,7 @@ class Station:
         self.show(self.claim(HELD, radius=radius, needs=nextafter(needs, inf), of=float(k)))
 
     def show_limit(self, kind: str, limit: float) -> None:
-        """Find the largest level on which the control stays within its limit, or that the circle asks for more."""
+        """Find the largest level on which the control stays within its limit, or show that the circle demands more."""
         _, circle = self.circle
         name = f"limit.{kind}"
         peak, place = self.peak(kind)
@@ -171,19 +171,19 @@ class Station:
         return sizes | ({circle.inverse: 1.0 / max(errors)} if circle.inverse else {})
 
     def show_rest(self) -> None:
-        """Find that every motion comes to rest."""
+        """Show that every motion comes to rest."""
         self.show(self.claim(REST))
 
     def show_astray(self) -> None:
-        """Find that some motions do not return along an axis."""
+        """Show that some motions do not return along an axis."""
         self.show(self.claim(ASTRAY))
 
     def show_limited_axis(self, limit: float) -> None:
-        """Find from where the X axis returns although its control is limited, and from where not."""
+        """Find from where motions along X return with limited control, and from where not."""
         wanted, _ = obligations(
             self.claim(LIMITED, limit=limit, width=1.0, reach=1.0, boundary=1.0, root_low=1.0, root_high=1.0), self.by_digest
         )
-        pull = wanted["the limit turns motions round"]
+        pull = wanted["the limit reverses motions"]
         assert isinstance(pull, Exceeds)
         p = Fraction(pull.small)
         if p <= 0:

@@ -1,7 +1,7 @@
 """Guesses of sums of squares with products of what is known (`kernel.rules.Sum`): an interior point, then exact numbers.
 
 In floats the matrices are made as definite as can be, in units (powers of two) in which the variables are about one. Rounded
-to few binary digits they still are; what is then amiss is put on the matrix that has no factor.
+to few binary digits they still are; the residual is added to the matrix without a factor.
 """
 
 from collections import defaultdict
@@ -37,7 +37,7 @@ pivoted: Any = import_module("scipy.linalg").qr
 MARGIN = 1e-7
 """The least eigenvalue, in scaled units, with which exact numbers are tried."""
 MOST = 60_000
-"""Entries of the matrices, at most."""
+"""The most entries of the matrices."""
 Terms: TypeAlias = dict[Monomial, Fraction]
 
 

@@ -1,4 +1,4 @@
-"""A system and claims about it, from a TOML file or from Python, and the certificate of all of them."""
+"""A system and claims about it, from a TOML file or from Python, and their common certificate."""
 
 import difflib
 import json
@@ -21,8 +21,8 @@ from starhold.errors import InputError
 from starhold.files import read_text
 
 MOVING, MOST, LARGEST, LONGEST = 7, 9, 1e100, 100
-"""Variables, and with parameters, beyond which no evidence would be found; numbers of a box, of which floats hold the
-powers; characters of a name."""
+"""The most variables, and with parameters, for which evidence can be found; the largest number of a box, whose powers floats
+can hold; the most characters of a name."""
 _KEYS = ("name", "description", "variables", "parameters", "define", "rates", "box", "claim")
 _NUMBERS = ("level", "known", "published")
 _CLAIM = ("name", "theorem", "V", "box", "equilibrium", "escape", "squares", "core", "start", "unsafe", "orbit", *_NUMBERS)
@@ -30,7 +30,7 @@ _CLAIM = ("name", "theorem", "V", "box", "equilibrium", "escape", "squares", "co
 
 @dataclass(frozen=True)
 class InvariantProblem:
-    """A system with what is to be shown of it. `written`: what the certificate says the system is; `orbits`: for each claim
+    """A system with the claims to be shown. `written`: the system's description in the certificate; `orbits`: for each claim
     a state whose motion backwards in time goes to the border of the true region, or None."""
 
     name: str
@@ -71,13 +71,13 @@ def write(certificate: SetCertificate, path: Path) -> None:
 
 
 def builtin_names() -> list[str]:
-    """The problems that come with starhold."""
+    """Return the names of the built-in problems."""
     folder = resources.files("starhold.certification.invariant") / "builtin"
     return sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
 def load(source: str | Path) -> InvariantProblem:
-    """The problem in a file, or the built-in one of that name. InputError says what is wrong with it."""
+    """Read the problem in a file, or the built-in one of that name. InputError states its first error."""
     path = Path(source)
     if not path.exists() and str(source) in builtin_names():
         file = resources.files("starhold.certification.invariant") / "builtin" / f"{source}.toml"
@@ -135,7 +135,7 @@ class _File:
             self._fits(system, item, f"claim[{k}]")
         written: dict[str, Any] = {name: self.data[name] for name in ("define", "rates") if name in self.data}
         written["V"] = [table["V"] for table in tables]
-        # Whatever a claim is made of, so that it can be checked from the certificate alone.
+        # All inputs of a claim, so that it can be checked from the certificate alone.
         points = [item[0].equilibrium for item in wanted]
         if any(point is not None for point in points):
             names = self.variables
@@ -170,7 +170,7 @@ class _File:
 
     def _claim(self, table: dict[str, Any], key: str) -> tuple[WantedSet, tuple[float, ...] | None]:
         if "rest" in table:
-            raise InputError(self.where, f"{key}.rest", "an unknown key", "it is called equilibrium")
+            raise InputError(self.where, f"{key}.rest", "an unknown key", "the key is named equilibrium")
         self._known(table, _CLAIM, key)
         theorem = self._required(table, "theorem", key)
         if theorem not in THEOREMS:
@@ -285,7 +285,7 @@ class _File:
 
     def _fresh(self, name: str, key: str) -> None:
         if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:
-            raise InputError(self.where, key, _show(name), "a name of letters, digits and _ that no function has")
+            raise InputError(self.where, key, _show(name), "a name of letters, digits and _ that is not a function")
         if name in self.names:
             raise InputError(self.where, key, _show(name), "a name that is not taken")
 

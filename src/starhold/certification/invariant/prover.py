@@ -1,6 +1,5 @@
-"""Finds evidence for what the kernel's theorems ask of a function V: hints, the largest level, sums of squares.
-
-Nothing here is trusted: whatever is found counts once the kernel has accepted it.
+"""Finds evidence for the kernel's theorems on a function V: hints, the largest level, sums of squares. Nothing here is
+trusted: evidence counts once the kernel has accepted it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +26,8 @@ HALVINGS = 18
 CLOSE, FAR = 1e-5, 5e-4
 """How close floats come to the largest level, of one cell and of more."""
 DEGREES = {False: (0, 2), True: (0, 2, 4)}
-"""Degrees above that of what is to be shown. Angles want more, by their series, and a core that holds {V <= 0}, by V."""
+"""Degrees above that of the obligation. Angles need more, because of their series, and so does a core that contains {V <=
+0}, because of V."""
 SLOPES = (0, 1, -1, 8, -8, 64, -64)
 """Multiples of a surface by which V is bent where it is crossed."""
 
@@ -89,7 +89,7 @@ class Attempt:
         return lacking, found
 
     def holds(self, surface: int) -> bool:
-        """Tell whether there is evidence of what has to be shown on a surface that is crossed."""
+        """Return whether there is evidence for the obligations on a surface that is crossed."""
         return all(self.shown(o, name=name) for name, o in self.obligations().items() if f" on {surface}" in name)
 
     def shown(self, o: Sum, exact: bool = True, name: str = "") -> dict[str, Any] | None:
@@ -207,7 +207,7 @@ def shape(functions: Sequence[Poly], names: Sequence[str]) -> list[int]:
 
 
 def completed(attempt: Attempt, role: str, escape: Poly | None) -> list[str]:
-    """Add hints about pairs of cells where V does not decrease strictly, and where rates jump; return what is not shown."""
+    """Add hints about pairs of cells where V does not decrease strictly, and where rates jump; return what is unproved."""
     lacking: list[str] = []
     for _ in range(6):
         lacking, _ = attempt.missing(every=True)

@@ -1,4 +1,4 @@
-"""Floats guess how large a level may be, and states that refute. The latter are verified in exact rationals."""
+"""Guesses the largest level, and refuting states, in floats. The states are verified in exact rationals."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -21,9 +21,9 @@ State: TypeAlias = tuple[Fraction, ...]
 """Exact values of variables and parameters."""
 Found: TypeAlias = dict[str, Any] | None
 POINTS = {1: 4001, 2: 301, 3: 61, 4: 23, 7: 5, 8: 3, 9: 3}
-"""Points of a grid along each side, by the number of sides."""
+"""The number of grid points along each side, by the number of sides."""
 TRIES = 40
-"""States that are verified exactly before one gives up."""
+"""The most states that are verified exactly."""
 
 
 def sides(names: Sequence[str], box: Sequence[tuple[float, float]]) -> dict[str, str]:
@@ -223,8 +223,8 @@ def stuck(what: Candidate) -> list[Array]:
 
 
 def ceiling(what: Candidate, equilibria: bool = True) -> float:
-    """The least V that points of a grid give for a state that no set may hold: on the border of the box, where V rises, or
-    (if `equilibria`) at an equilibrium. Infinite if there is none."""
+    """Return the least V, on a grid, of states that no set may contain: on the border of the box, where V increases, or (if
+    `equilibria`) at an equilibrium. Infinite if there is none."""
     least = math.inf
     for k in range(len(what.system.variables)):
         for end in what.box[k]:
@@ -242,12 +242,13 @@ SIMPLE, NEAR = (2, 3, 4, 6, 9, 12, 17), (6, 9, 12, 17, 4, 3, 2)
 def rounded(point: Array, digits: Sequence[int] = SIMPLE) -> Iterator[State]:
     """Exact states near a point, all of them floats too."""
     for count in digits:
-        # What is zero up to rounding is taken for zero.
+        # A number that is zero up to rounding is taken as zero.
         yield tuple(Fraction(float(f"{round(float(x), 12):.{count}g}")) for x in point)
 
 
 def rising(what: Candidate, level: float, sense: int = 1, digits: Sequence[int] = SIMPLE) -> Found:
-    """A state with 0 < V <= level, verified, where V rises (sense -1: does not grow) or that is an equilibrium; or None."""
+    """Return a state with 0 < V <= level, verified, where V increases (sense -1: does not grow) or that is an equilibrium;
+    or None."""
     for point in islice([*wrong(what, sense), *stuck(what)], TRIES):
         for state in rounded(point, digits):
             inside = (cell for cell in what.whole if all(what.at(p, state) > 0 for p in cell.sides))

@@ -1,7 +1,7 @@
-"""Expressions that a user writes: read by a list of what is allowed, never evaluated as Python.
+"""Reads expressions written by users, from a list of allowed elements, never evaluated as Python.
 
 Arithmetic, whole powers, comparisons and the piecewise functions below make a piecewise polynomial with rational
-coefficients. A number stands for what is written: 0.1 is one tenth.
+coefficients. A number means exactly what is written: 0.1 is one tenth.
 """
 
 import ast
@@ -16,14 +16,14 @@ from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, wher
 from starhold.certification.invariant.system import TURNED, turned
 
 LONGEST = 2_000
-"""Characters of an expression."""
+"""The most characters of an expression."""
 DIGITS = 3
 """The largest power of ten: floats have no more."""
 MOST_DIGITS = 1_000
-"""Digits of a number, of what numbers make together too."""
+"""The most digits of a number, also of results."""
 MOST_TERMS, MOST_CASES, HIGHEST, WORK, COMPARED = 600, 64, 24, 2_000_000, 10
 """Terms of a polynomial, cases of a piecewise one, the degree, and pairs of terms that are multiplied on the way to an
-expression, a pair of cases that are compared counted as so many: beyond these a proof would not end anyway."""
+expression, a pair of cases that are compared counted as so many: beyond these a proof would not terminate."""
 ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and where, min, max, abs, clip, sat, sign, sin, cos"
 
 
@@ -36,7 +36,7 @@ class ExpressionError(ValueError):
 
 
 def as_written(text: str) -> Fraction:
-    """The number that a text says: 0.1 is one tenth. ExpressionError for powers of ten that would fill the memory."""
+    """Return the number of a text: 0.1 is one tenth. ExpressionError for powers of ten that would fill the memory."""
     if len(text.lower().partition("e")[2].lstrip("+-")) > DIGITS:
         raise ExpressionError(text, f"a power of ten of at most {DIGITS} digits")
     return Fraction(text)
@@ -69,7 +69,7 @@ def read(text: str, names: Mapping[str, Any]) -> Any:
     except SyntaxError as error:
         raise ExpressionError(f"{_short(text)} ({error.msg})", "an expression") from None
     except (RecursionError, MemoryError):
-        raise ExpressionError(_short(text), "an expression that is nested less deeply") from None
+        raise ExpressionError(_short(text), "a less deeply nested expression") from None
     except ValueError as error:
         if isinstance(error, ExpressionError):
             raise
@@ -159,7 +159,7 @@ class _Reader:
         """Count a product of numbers of terms or pieces as work."""
         self._work += math.prod(factors)
         if self._work > WORK:
-            raise ExpressionError("an expression that is too large on the way", "fewer pieces and terms")
+            raise ExpressionError("an expression with too large intermediate results", "fewer pieces and terms")
 
     def _call(self, name: str, arguments: list[ast.expr]) -> Any:
         if name == "where" and len(arguments) == 3:

@@ -1,9 +1,9 @@
-"""The theorems on invariant sets as claims: what each has to show, and the largest level at which it is shown.
+"""The theorems on invariant sets as claims: the obligations of each, and the largest level for which they are proved.
 
 M is a compact set, V its indicator: continuous, zero on M and positive elsewhere near it. V <= 0 counts as zero.
 
 * `stable` (theorem 1): V' <= 0 near M.
-* `attracts` (theorem 2): and no motion can stay where V' = 0 but in M.
+* `attracts` (theorem 2): and no motion can stay where V' = 0 except in M.
 * `region` (its corollary): all motions that start in {V <= level} stay there and come to M.
 * `unstable` (theorem 3): V' > 0 wherever V > 0 in a neighbourhood; V need be positive somewhere in every neighbourhood only.
 * `intersection` (theorem 4): M is where none of several V_k is positive, and each decreases outside. Their maximum is a V.
@@ -44,7 +44,7 @@ STEPS = {
 """The steps of a theorem, by the words with which the names of the kernel's obligations begin."""
 ASSUMPTIONS = "equations-as-given", "filippov"
 NEAR = 1e-6
-"""The share of the largest V below which a V that rises leaves no level."""
+"""An increase of V below this share of the largest V leaves no level."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def a_state(system: System, wanted: WantedSet, functions: Sequence[Any]) -> tupl
     """Return an exact state at which none of these functions is negative; ValueError where none is found in the box."""
     state = search.member(Candidate(system, 0 - common(functions), wanted.box), 0.0) if functions else None
     if state is None:
-        raise ValueError("a set that is empty, as far as states of the box tell")
+        raise ValueError("a set without a state in the box")
     return state
 
 
@@ -115,11 +115,11 @@ def show(system: System, wanted: WantedSet) -> Shown:
     if system.angles and (wanted.equilibrium is None or wanted.theorem == "unstable"):
         raise ValueError(f"{wanted.theorem} with angles: sets and states with a sine or cosine have no exact values")
     if wanted.theorem == "avoids" and wanted.equilibrium is not None:
-        raise ValueError("what avoids a set has no equilibrium")
+        raise ValueError("a claim of avoidance has no equilibrium")
     if any(wanted.equilibrium[system.variables.index(x)] for x in system.angles if wanted.equilibrium):
         raise ValueError("an equilibrium at which an angle is not zero")
     if wanted.core is not None and (system.angles or wanted.theorem not in ("attracts", "region")):
-        raise ValueError("a core is told of what attracts, in a system without angles")
+        raise ValueError("a core is only for claims of attraction, in a system without angles")
     return _Proof(wanted, candidate(system, wanted)).shown()
 
 
@@ -212,7 +212,7 @@ class _Proof:
         levelled = wanted.level is not None and not self.unstable
         top = math.inf if self.unstable or levelled else search.ceiling(what, wanted.theorem != "stable")
         if top <= 0.0:
-            return "V is not positive on the border of the box, or V rises however small it is: border"
+            return "V is not positive on the border of the box, or V increases at arbitrarily small values: border"
         if levelled:
             numbers["level"] = Fraction(wanted.level or 0.0)
         given = dict[str, Any]()
@@ -279,7 +279,7 @@ class _Proof:
         return [*found, (name, word, changes)]
 
     def near(self) -> float:
-        """Return a V so small that where it rises no level can be claimed."""
+        """Return a V so small that no level can be claimed if it increases there."""
         values = search.Values(self.what, search.grid(self.what.box)).V
         return NEAR * float(abs(values[values == values]).max(initial=0.0))
 

@@ -17,9 +17,9 @@ HEADINGS = {
 OBLIGATIONS = {
     "proof": "the kernel accepts the evidence",
     "continuous": "V is continuous",
-    "positive": "V > 0 everywhere in the box but at the equilibrium",
+    "positive": "V > 0 everywhere in the box except at the equilibrium",
     "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
-    "falls": "V is non-increasing on the set, and decreases but where a function is told that grows there",
+    "falls": "V is non-increasing on the set, and decreases except where a given function grows",
     "grows": "V grows wherever it is positive in the box",
     "start": "V is not positive in the start set",
     "unsafe": "V is positive in the unsafe set",
@@ -29,7 +29,7 @@ OBLIGATIONS = {
 
 
 def sentence(claim: Claim) -> str:
-    """The claim in a sentence, whether or not it is proved."""
+    """Return the claim as a sentence, whether or not it is proved."""
     n = claim.numbers
     theorem, level = n["theorem"], n.get("level")
     where = "a level set of V" if level is None else f"{{V < {down(level)}}}"
@@ -67,7 +67,7 @@ def limit(numbers: Mapping[str, Any]) -> str:
 
 
 def evidence(obligation: Obligation) -> str:
-    """Why an obligation is refuted or undecided."""
+    """Return why an obligation is refuted or undecided."""
     parts: list[str] = []
     for key, value in obligation.evidence.items():
         if key == "reason":

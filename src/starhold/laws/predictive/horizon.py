@@ -1,4 +1,4 @@
-"""Each pass over the horizon of a predictive program takes time proportional to its length: states under a plan, the
+"""Passes over the horizon of a predictive program, each in time proportional to its length: states under a plan, the
 gradient, the Newton step by a backward Riccati sweep, and flights of a step through the limits."""
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def _costate(q: Any, columns: Rows, x: Numbers, y: Numbers) -> Numbers:
 
 
 class Value(NamedTuple):
-    """Half the best cost from a state on is x'curvature x / 2 + slope'x + constant. The Newton decrement and the number
-    of limits held are those of the moves so far."""
+    """Half the optimal cost-to-go of a state is x'curvature x / 2 + slope'x + constant. The Newton decrement and the number
+    of active limits are those of the moves so far."""
 
     curvature: Rows
     slope: Numbers

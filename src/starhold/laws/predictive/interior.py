@@ -15,7 +15,7 @@ from starhold.laws.predictive.sixes import triple
 
 MOST_SWEEPS = 30
 INWARD = 0.9
-"""Share of its distance from the centre at which a move starts."""
+"""The share of its distance from the centre at which a move starts."""
 SHORT_OF = 0.95
 """Share of the way to the nearest limit that a step goes."""
 
@@ -60,7 +60,7 @@ def _pairs(problem: Problem) -> int:
 
 
 def _begin(problem: Problem, barrier: Scalar) -> None:
-    """Put the plan aside, and start well inside."""
+    """Store the plan, and start well inside the limits."""
     store, bounds = carve(problem), limits(problem)
 
     def stage(k: Index) -> None:
@@ -151,7 +151,7 @@ def _settle(problem: Problem) -> None:
 
 
 def _restore(problem: Problem) -> Scalar:
-    """Take back the plan put aside; gives half its cost."""
+    """Restore the stored plan; return half its cost."""
     store = carve(problem)
 
     def stage(k: Index) -> None:

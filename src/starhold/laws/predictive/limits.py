@@ -1,4 +1,4 @@
-"""A move is limited to a box or a ball round a centre; inverses of 3x3 matrices respect the limits."""
+"""Limits of a move, a box or a ball around a centre, and inverses of 3x3 matrices that respect them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from starhold.algebra.scalar import (
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, scale, subtract, times
 
 ON_SPHERE = 1.0 - 1e-12
-"""Share of the bound's square from which on a move counts as lying on the sphere."""
+"""The share of the bound's square from which a move counts as lying on the sphere."""
 
 Symmetric: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
 """A symmetric 3x3 matrix: m00, m01, m02, m11, m12, m22."""
@@ -70,7 +70,7 @@ def project(limits: Limits, v: Vector) -> tuple[Vector, Truth]:
 
 
 def pressing(limits: Limits, v: Vector, g: Vector) -> Truths:
-    """Tell which axes of a box press against a limit, for the gradient g."""
+    """Return which axes of a box press against a limit, for the gradient g."""
 
     def presses(i: int) -> Truth:
         above = both(less(g[i], 0.0), less_equal(limits.high[i], v[i]))

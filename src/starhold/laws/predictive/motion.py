@@ -29,11 +29,11 @@ from starhold.laws.predictive.sixes import Numbers, Rows, transposed
 from starhold.parts.craft import Craft, total_inertia
 
 TERMS = 30
-"""Most terms of the Taylor series; fewer once they no longer count."""
+"""The most terms of the Taylor series; fewer once they no longer matter."""
 NEGLIGIBLE = 1e-21
-"""Size of a term's entries below which the series ends."""
+"""The size of a term's entries below which the series ends."""
 DOUBLINGS = 60
-"""Most halvings of the time, and doublings after."""
+"""The most halvings of the time, and doublings afterwards."""
 
 
 class Linear(NamedTuple):

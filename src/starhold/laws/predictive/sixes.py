@@ -49,7 +49,7 @@ def product(m: Rows, n: Rows) -> Rows:
 
 
 def is_diagonal(m: Weight) -> bool:
-    """Tell whether only the diagonal is given."""
+    """Return whether only the diagonal is given."""
     return not isinstance(m[0], tuple)
 
 

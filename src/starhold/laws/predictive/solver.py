@@ -1,13 +1,13 @@
-"""Quadratic programs of predictive control are solved by equations: no allocation, no library, and a bound on the work.
+"""Solves quadratic programs of predictive control by equations: no allocation, no library, and bounded work.
 
-The method is a projected Newton method of two metrics (Bertsekas 1982, "Projected Newton methods for optimization
-problems with simple constraints"). Moves that press against a limit are held there, on a ball with the curvature of the
-sphere; the others take the Newton step, which one backward Riccati sweep gives in time proportional to N. The step is
-flown with its feedback through the limits, so later moves already answer to those that were cut; where that does not
-reduce the cost, a search along the projected line does. Programs on which this is slow are handed to an interior-point
-method, whose answer is the next start; a scaled gradient step, which always descends, is the last resort. A run ends
-when the gap to the optimum is proved small: for multipliers of the right sign, strong convexity bounds the gap of half
-the cost by g'R^-1 g / 2, g being the gradient that no limit holds.
+The method is a projected Newton method of two metrics (Bertsekas 1982, "Projected Newton methods for optimization problems
+with simple constraints"). Moves that press against a limit are held there, on a ball with the curvature of the sphere; the
+others take the Newton step, which one backward Riccati sweep gives in time proportional to N. The step is flown with its
+feedback through the limits, so later moves already respond to those that were limited; where that does not reduce the cost,
+a search along the projected line does. Programs on which this is slow go to an interior-point method, whose result is the
+next start; a scaled gradient step, which always descends, is the last resort. A run ends when the optimality gap is proved
+small: for multipliers of the right sign, strong convexity bounds the gap of half the cost by g'R^-1 g / 2, with g the
+gradient of the free moves.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The report of a body that has none of its own: every recorded quantity over time."""
+"""The report of a body without a report of its own: every recorded quantity over time."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
 
 
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-    """Make plots over time of the same."""
+    """Make plots over time of all recorded quantities."""
     times, plots = collect(flights, PAGE_POINTS)
     return PageParts({"times": rounded(times), "plots": [over_time_data(plot, flights) for plot in plots]})
 
 
 def collect(flights: Sequence[Flight], points: int) -> tuple[Curve, list[Plot]]:
-    """Times, and a plot of each quantity that all flights record, a panel for each component; thinned to about `points`."""
+    """Return times and a plot of each quantity that all flights record, a panel for each component; thinned to about
+    `points`."""
     longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = thinning(len(longest), points)
     return thin_times(longest, factor), recorded_plots(flights, factor)

@@ -24,15 +24,16 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 FRAMES = 1200
-"""Places of the craft in the three-dimensional views."""
+"""The number of positions of the craft in the three-dimensional views."""
 SECONDS = 30.0
 """The duration of the animation."""
 TURNS = 10.0
-"""Revolutions of the two bodies that are played at most; what follows is left out of the views."""
+"""The most revolutions of the two bodies that are played; the views leave out the rest."""
 
 _VIEWS = (
-    "The path in the axes that turn with the two bodies, dashed the circle to be held; the line is the X axis, which leads "
-    "to the bodies, the cross the libration point, the arrow the control. The number is the distance from what is held."
+    "The path in the axes that rotate with the two bodies. Dashed: the circle to be held; line: the X axis, which leads "
+    "to the bodies; cross: the libration point; arrow: the control. The number is the distance from the circle or point "
+    "held."
 )
 
 
@@ -45,7 +46,7 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
 
 
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-    """Show the path in planes and in space, with what is held, and the control over time."""
+    """Show the path in planes and in space, with the circle or point held, and the control over time."""
     plots = collect(flights, PAGE_POINTS, scenario)
     scene, (lead, *rest) = _scene(scenario, flights, plots), plots.over_time
     drawn = [*first_alone(lead), *rest]
@@ -78,7 +79,7 @@ def _space(plots: PathPlots, flights: Sequence[Flight], name: str) -> Any:
         inside = np.where((np.abs(path) <= 1.1 * size).all(axis=1, keepdims=True), path, np.nan)
         axis.plot(*inside.T, color=colour(number), linewidth=0.6 * width_of(number, len(flights)), zorder=2)
         axis.plot(*path[:1].T, "o", color=colour(number), markersize=4)
-    # Paths lie across the X axis, so that less of it is shown.
+    # Paths lie across the X axis, so less of that axis is shown.
     for name_of, share in (("x", 0.7), ("y", 1.1), ("z", 1.1)):
         getattr(axis, f"set_{name_of}lim")(-share * size, share * size)
         getattr(axis, f"set_{name_of}label")(name_of)
@@ -96,7 +97,7 @@ def _size(plots: PathPlots, flights: Sequence[Flight]) -> float:
 
 
 def _units(scenario: Scenario) -> list[tuple[str, str]]:
-    """Tell how much one of the scaled numbers in the settings is worth."""
+    """State the physical units of the scaled numbers in the settings."""
     units, plant = scenario.table.libration.units, scenario.craft
     pair = scenario.table.libration.pair
     return [

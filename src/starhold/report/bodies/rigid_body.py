@@ -1,4 +1,4 @@
-"""The report of a body that turns: its figures, and the turning body on the page."""
+"""The report of a rotating body: its figures, and the animated body on the page."""
 
 from __future__ import annotations
 
@@ -39,22 +39,22 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 FRAMES = 180
-"""Attitudes of the turning body; the page turns it smoothly from one to the next."""
+"""The number of attitudes of the animated body; the page interpolates smoothly between them."""
 EARLY_POINTS = 900
-"""Samples of a curve of the transient alone."""
+"""The number of samples of a curve of the transient alone."""
 EARLY = 1.6
-"""Frame k of n shows the time T (k/n)^EARLY: most of the motion is at the start. Of a run that is long beside its transient
-half of the frames show that."""
+"""Frame k of n shows the time T (k/n)^EARLY, because most of the motion is at the start. Where a run is much longer than its
+transient, half of the frames show the transient."""
 SECONDS = 14.0
 """The duration of the animation."""
 
 _VIEWS = (
-    "Measurement in the axes of the target (dashed, x* y* z*); solid axes are the body's, and the angle "
-    "is what is left to turn. The outline is that of the uniform box with this inertia."
+    "The measured attitude in the axes of the target (dashed, x* y* z*); solid axes are the body's, and the angle is the "
+    "one left to turn. The outline is the uniform box with this inertia."
 )
 _ORBITAL = (
-    " Of the orbital frame x* leads along the motion, y* against the orbit's normal, and z* to the centre of attraction, "
-    "which is down in the picture."
+    " In the orbital frame x* points along the motion, y* against the orbit's normal, and z* to the centre of "
+    "attraction, which is down in the picture."
 )
 
 
@@ -72,8 +72,8 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
 
 
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
-    """Show the attitude over time, and the body as a box that turns."""
-    # It needs much of SciPy, which pictures, made before the table is printed, do without.
+    """Show the attitude over time, and the body as a rotating box."""
+    # It loads much of SciPy, which the figures, made before the table is printed, do not need.
     from starhold.report.linear_loop import section
 
     plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
@@ -102,7 +102,7 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
 
 
 def _limits(flights: Sequence[Flight], scenario: Scenario) -> str:
-    """Tell what limits each flight."""
+    """State which limit each flight comes closest to."""
     closest = [(number, *closest_limit(flight, scenario)) for number, flight in enumerate(flights)]
     said = "".join(f"<span>{swatch(number)}{name} {100.0 * share:.3g} %</span>" for number, share, name in closest if name)
     return f'<p class="best-at of-file"><strong>Of torque and wheels, closest to a limit</strong>{said}</p>' if said else ""
@@ -131,7 +131,7 @@ def _simplification(scene: Mapping[str, Any]) -> str:
 
 
 def _drawn(plots: AttitudePlots, flights: Sequence[Flight], scenario: Scenario) -> list[dict[str, Any]]:
-    """The plots over time for the script, first the error that the laws are there for."""
+    """Return the plots over time for the script, beginning with the error that the laws control."""
     (angle, speed), of_angle = plots.angle.panels, replace(plots.angle, title="error angle")
     lead = [replace(of_angle, panels=[angle]), replace(of_angle, name="speed", title="relative rate", panels=[speed])]
     # Where every attitude is within its tolerance, the rate is what counts.
@@ -143,7 +143,7 @@ def _drawn(plots: AttitudePlots, flights: Sequence[Flight], scenario: Scenario) 
 
 
 def _happenings(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
-    """When faults happen and are acted on, and modes: as bands of time where one law has such, else by their beginnings."""
+    """Mark faults, reactions to them, and modes: as bands of time where only one law has them, else where they begin."""
     struck = {fault.time for fault in scenario.table.fault}
     marks = [(time, "fault" if time in struck else "acted on") for time in fault_times(scenario)]
     moded = [flight for flight in flights if flight.modes]
@@ -200,7 +200,7 @@ def _scene(scenario: Scenario, flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def _earth(flights: Sequence[Flight], places: Any) -> list[list[float | None]]:
-    """Where the centre of attraction is at these samples of the longest run, in the axes of the target, as unit vectors."""
+    """Return unit vectors, in target axes, to the centre of attraction at these samples of the longest run."""
     run = max((flight.recording for flight in flights), key=lambda recording: len(recording["time"]))
     attitude, error, position = (run[name][places].T for name in ("attitude", "attitude_error", "position"))
     goal = multiply(tuple(attitude), conjugate(tuple(error)))
@@ -211,14 +211,14 @@ def _earth(flights: Sequence[Flight], places: Any) -> list[list[float | None]]:
 def _box(inertia: Any) -> tuple[Any, Any]:
     """Half edges of the uniform box with this inertia, the longest 0.95, and its axes as columns, in body axes.
 
-    For edges 2a, 2b, 2c a moment is proportional to b^2 + c^2, thus a^2 to the other two moments' sum less its own.
-    Edges that would vanish (a flat body has them) are shown as a tenth of the longest."""
+    For edges 2a, 2b, 2c a moment is proportional to b^2 + c^2, so a^2 is proportional to the sum of the other two moments
+    less its own. Edges that would vanish (a flat body has them) are shown as a tenth of the longest."""
     full = np.asarray(inertia, dtype=float)
     if full.ndim == 1:
         moments, axes = full, np.eye(3)
     else:
         moments, axes = np.linalg.eigh(full)
-        # The library is free in the signs; a picture should be the same everywhere.
+        # The library may return either sign; a picture should be the same everywhere.
         axes = axes * np.where(np.take_along_axis(axes, np.abs(axes).argmax(axis=0)[None], axis=0)[0] < 0.0, -1.0, 1.0)
         axes[:, 2] *= np.sign(np.linalg.det(axes))
     edges = np.sqrt(np.maximum(moments.sum() - 2.0 * moments, 0.0))

@@ -1,5 +1,5 @@
-"""Commands whose results are declared: each is a file of this folder, with its name and a `COMMAND`. The command line and
-the Python interface offer whatever stands here, and the studio what is about a scenario."""
+"""Commands that declare their results, each in a file of its own name with a `COMMAND`. The command line and the Python
+interface offer every command of this folder, the studio those about a scenario."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Column(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """Words of a table with a look of their own. kind: "law", in the colour of the law of this number, or "name" where it
-    names its row, with detail below it; an outcome, as "met" or "missed"; "best" of its column; "typed", to be copied;
-    "section", where it leads to that of a document which detail names;
-    "share", with a bar of this share of the column below it; "shade", in the colour that detail names, the stronger the
-    farther the number is from 0; else detail says what the words mean."""
+    """Styled text in a table. kind: "law", in the colour of the law of this number; "name", which names its row, with detail
+    below it; an outcome, such as "met" or "missed"; "best" of its column; "typed", to be copied; "section", a link to the
+    section of a document that detail names; "share", with a bar of this share of the column below it; "shade", in the colour
+    that detail names, the stronger the farther the number is from 0; for any other kind detail explains the text.
+    """
 
     text: str
     kind: str = ""
@@ -44,8 +44,8 @@ class Cell(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Columns and rows. A cell is a number, several of them, words, a `Cell` or None for nothing; bold and ends are the
-    numbers of rows that stand out and of those that a line follows."""
+    """Columns and rows. A cell is a number, several numbers, text, a `Cell`, or None if empty. bold: indices of highlighted
+    rows; ends: indices of rows followed by a line."""
 
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]]
@@ -58,7 +58,7 @@ class Table(NamedTuple):
         return [f"{column.name} ({column.unit})" if column.unit else column.name for column in self.columns]
 
     def texts(self) -> list[list[str]]:
-        """The cells for reading; an empty one is a dash, and words keep their marks of style."""
+        """Return the cells as text; an empty one is a dash, and text keeps its style marks."""
         return [
             [
                 value if isinstance(value, str) else "—" if value is None else format(value, column.format)
@@ -69,14 +69,14 @@ class Table(NamedTuple):
 
 
 class Heading(NamedTuple):
-    """A name that stands out, and what follows it in its line."""
+    """A highlighted name, and the text that follows it in its line."""
 
     name: str
     rest: str = ""
 
 
 Block: TypeAlias = Table | Heading | str
-"""A block is shown as a whole; "" is an empty line."""
+"""A block of output; "" is an empty line."""
 
 
 class Result(NamedTuple):
@@ -113,7 +113,7 @@ class Option(NamedTuple):
 
 
 def number_or_text(value: str | float) -> str | float:
-    """A value as a file would hold it: a number, in SI, where the text is one."""
+    """Return a value as a scenario file would hold it: a number, in SI, if the text is one."""
     try:
         return float(value) if isinstance(value, str) else value
     except ValueError:
@@ -121,7 +121,7 @@ def number_or_text(value: str | float) -> str | float:
 
 
 def later(path: str) -> Callable[..., Any]:
-    """The function of a path below starhold; its module is loaded when it is called."""
+    """Return the function at a path below starhold; its module is loaded at the first call."""
     module, _, name = path.rpartition(".")
     return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given)
 
@@ -131,16 +131,16 @@ def _named(scenario: Scenario, law: str | None) -> LawEntry:
 
 
 class Command(NamedTuple):
-    """A command about a law of a scenario; or about something else, which `read` gives.
-
-    summary: what it does, in a sentence. suffix: results go to SUBJECT-suffix; "" where none are written unasked. study:
-    computes, from a scenario, a law and, if there is `doing`, a notice, which hears the number done, that of all and what
-    comes next ("" at the end). present: the Result of these and what was computed. pick: the law that a name or None means,
-    with InputError for what cannot be studied. law: help for --law. doing: what stands beside the bar of progress. unstable:
-    whether there is --allow-unstable. body: the one that scenarios are about, any if "". file: help for FILE, None for a
-    command without; listed: what is shown where FILE is not given, if it need not be. read: returns what stands in place of
-    a scenario and a law, from FILE and options. proofs: whether a certificate is written, and so there is --rocq. kinds: how
-    the files NAME.* may end. prove: the study with what is proved of the pointing beside, where there is --proof."""
+    """A command about a law of a scenario, or about another subject that `read` returns. summary: what it does, in a
+    sentence. suffix: results go to SUBJECT-suffix; "" if none are written by default. study: computes from a scenario, a law
+    and, if `doing` is set, a callback that takes the number done, the total and the next item ("" at the end). present:
+    makes the Result from these and what was computed. pick: returns the law for a name or None; InputError if it cannot be
+    studied. law: help for --law. doing: label of the progress bar. unstable: whether there is --allow-unstable. body: the
+    body that scenarios must have, "" for any. file: help for FILE, None for a command without one; listed: what is shown
+    without FILE, if that is allowed. read: returns the subject in place of a scenario and a law, from FILE and options.
+    proofs: whether a certificate is written, and so whether there is --rocq. kinds: suffixes of the files NAME.*. prove: the
+    study together with a proof of the pointing, where there is --proof.
+    """
 
     summary: str
     suffix: str
@@ -160,7 +160,7 @@ class Command(NamedTuple):
     prove: Callable[..., Any] | None = None
 
     def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
-        """The arguments of `study`: the scenario changed as options say, and the law; or those that `read` gives."""
+        """Return the arguments of `study`: the scenario, changed by options, and the law; or those from `read`."""
         if self.read is not None:
             defaults = {name: option.default for name, option in self.options.items() if not option.file}
             return self.read(*about, **defaults | given)
@@ -186,11 +186,11 @@ class Command(NamedTuple):
         return self.read is None and not self.arguments
 
     def studying(self, proof: bool) -> Callable[..., Any]:
-        """Return what computes, with what is proved beside if that is asked for."""
+        """Return the function that computes, together with the proof if requested."""
         return self.prove if proof and self.prove is not None else self.study
 
     def result(self, subject: tuple[Any, ...], notice: Callable[[int, int, str], None], proof: bool = False) -> Result:
-        """Study the arguments that `prepare` gave, and present the result; proof: with what `prove` gives."""
+        """Study the arguments from `prepare`, and present the result; proof: use `prove`."""
         study = self.studying(proof)
         if self.doing is None:
             return self.present(*subject, study(*subject))
@@ -203,10 +203,10 @@ class Command(NamedTuple):
 
 
 def names() -> list[str]:
-    """The names of the commands."""
+    """Return the names of the commands."""
     return [item.name.replace("_", "-") for item in iter_modules(__path__)]
 
 
 def command(name: str) -> Command:
-    """The command of a name."""
+    """Return the command of this name."""
     return import_module(f"{__name__}.{name.replace('-', '_')}").COMMAND

@@ -1,4 +1,4 @@
-"""The pointing error by source."""
+"""The command `budget`: the pointing error by source."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from starhold.studies.budget import Budget
 UNITS = (("deg", math.radians(1.0)), ("arcsec", math.radians(1.0 / 3600.0)), ("mas", math.radians(1.0 / 3.6e6)))
 LEAST = 0.1
-"""The largest level is no less in the unit that it is told in."""
+"""The unit of an index is such that its largest level is at least this."""
 SMALL = 1e-4
-"""Levels below this share of the largest of their panel are told as nothing."""
-SHARES = "The column proved has this bound, and by how much it is lower without a source; — where it is the same."
+"""Levels below this share of the largest of their panel are shown as nothing."""
+SHARES = "The column proved shows this bound, and by how much it decreases without a source; — where it does not change."
 INTERPRETED = {
     "mixed": "of all instants of all runs",
     "temporal": "of the instants of the worst run",
@@ -70,17 +70,17 @@ def _table(budget: Budget) -> Table:
 
 
 def _unit_of(budget: Budget, index: str) -> tuple[str, float]:
-    """The unit that the levels of an index are shown in, and its size (rad)."""
+    """Return the unit in which the levels of an index are shown, and its size (rad)."""
     return _fitting(max(budget.level(row.name, index) for row in budget.rows))
 
 
 def _fitting(largest: float) -> tuple[str, float]:
-    """The unit in which an angle (rad) is told, and its size (rad)."""
+    """Return the unit in which an angle (rad) is shown, and its size (rad)."""
     return next((unit for unit in UNITS if largest >= LEAST * unit[1]), UNITS[-1])
 
 
 def _setting_text(budget: Budget) -> str:
-    """Say how the errors were taken, in a sentence or two."""
+    """State how the errors were sampled, in a sentence or two."""
     settings = budget.settings
     about = "about any axis" if settings.boresight is None else "half the cone of the line of sight"
     runs = "run" if settings.runs == 1 else "runs"
@@ -92,7 +92,7 @@ def _setting_text(budget: Budget) -> str:
 
 
 def draw(budget: Budget, title: str) -> Any:
-    """A panel for each index, in it a bar for each source."""
+    """Draw a panel for each index, with a bar for each source."""
     from starhold.analysis.pointing import MEANINGS
     from starhold.report.bars import Bars, draw_bars
     from starhold.studies.budget import COMBINED, LOOP, TOGETHER
@@ -112,15 +112,16 @@ def draw(budget: Budget, title: str) -> Any:
 
 
 COMMAND = Command(
-    "Tell the pointing error by source, each alone and all together: a table, budget.csv, budget.png and summary.json.",
+    "Break the pointing error down by source, each alone and all together: a table, budget.csv, budget.png and "
+    "summary.json.",
     "budget",
     later("studies.budget.study"),
     present,
     options={
-        "start": Option("budget.start", "errors count from here; else as the file says"),
-        "window": Option("budget.window", "length of windows; else as the file says"),
-        "separation": Option("budget.separation", "of the two windows of a drift; else as the file says"),
-        "runs": Option("budget.runs", "with random numbers of their own; else what the file says", whole=True),
+        "start": Option("budget.start", "errors count from this time; by default as the file says"),
+        "window": Option("budget.window", "length of windows; by default as the file says"),
+        "separation": Option("budget.separation", "of the two windows of a drift; by default as the file says"),
+        "runs": Option("budget.runs", "with independent random numbers; by default as the file says", whole=True),
     },
     unstable=True,
     prove=later("studies.pointing.budget_with_proof"),

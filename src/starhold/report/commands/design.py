@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 WIDE = 132
-"""Characters in a line of a matrix."""
+"""The most characters in a line of a matrix."""
 
 
 def present(scenario: Scenario, law: str | None, designs: Sequence[Design]) -> Result:
-    """Show the inputs of each design, its gains, and the numbers to judge it by."""
+    """Show the inputs of each design, its gains, and its figures of merit."""
     from starhold.report.stability_map import draw_map
     from starhold.scenario.designing import map_inputs
 
@@ -36,7 +36,7 @@ def _blocks(scenario: Scenario, design: Design) -> list[Block]:
         cells = [(item.name, number_text(values[item.name]), item.gain.unit, item.gain.text) for item in items]
         rows = [[*map(escape, row)] for row in cells]
         blocks.append(Table([*map(Column, (title, "value", "unit", "meaning"))], rows))
-    # Digits, not decimals: entries of P may be far apart in size.
+    # Digits, not decimals: entries of P may differ by orders of magnitude.
     digits: Any = {"float_kind": lambda number: f"{number:12.6g}", "complex_kind": lambda number: f"{number:.6g}"}
     for name, value in design.figures.items():
         shown = f"{value:.3g}" if isinstance(value, float) else np.array2string(value, max_line_width=WIDE, formatter=digits)

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
 
 
 def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) -> Result:
-    """One row a loss; gains only where they were designed anew."""
+    """Make a row for each loss; gains only where they were redesigned."""
     from starhold.report.text import number_text
 
     flown = [failure.gains for failure in failures if failure.gains is not None]
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
     sentences: list[str] = []
     if any(not failure.controllable for failure in failures):
-        sentences.append("not (x, y, z): no torque is left about this body direction.")
+        sentences.append("not (x, y, z): no control torque is left about this body direction.")
     sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in failures if failure.refused]
     if any(failure.certified is not None for failure in failures):
-        sentences.append("certified: turns from rest on which no motor or wheel is proved to meet its limit.")
+        sentences.append("certified: slews from rest for which it is proved that no motor or wheel reaches its limit.")
     sentences += [
         f"lost {failure.name}: {failure.proof.sentence}" for failure in failures if failure.proof and failure.flown
     ]
@@ -39,7 +39,7 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
 
 
 def _numbers(failures: Sequence[Failure], entry: LawEntry) -> Table:
-    """All numbers, with every gain."""
+    """Return all numbers, with every gain."""
     gains = [Column(item.name, item.gain.unit) for item in entry.law.fields()]
     rows = [[*_cells(failure).values(), *((failure.gains or {}).get(gain.name) for gain in gains)] for failure in failures]
     return Table([*_cells(failures[0]), *gains], rows)
@@ -130,7 +130,7 @@ def _directions(failure: Failure) -> str:
 
 
 def draw(failures: Sequence[Failure], title: str) -> Any:
-    """One row a loss, one panel a quantity."""
+    """Draw a row for each loss and a panel for each quantity."""
     from starhold.report.bars import draw_bars
 
     panels = [_bars("authority left, % of intact", failures, [100.0 * failure.share for failure in failures])]
@@ -138,7 +138,7 @@ def draw(failures: Sequence[Failure], title: str) -> Any:
         panels.append(_bars("degree of stability, 1/s", failures, [failure.eta for failure in failures]))
     panels.append(_bars("settling time, s", failures, [failure.settling for failure in failures]))
     if any(failure.certified is not None for failure in failures):
-        # Rounded down, so as not to say more than is proved.
+        # Rounded down, so that it never exceeds what is proved.
         turns = [None if f.certified is None else math.floor(10.0 * math.degrees(f.certified[0])) / 10.0 for f in failures]
         panels.append(_bars("certified turn, °", failures, turns, "not proved"))
     rows, hues = [failure.name for failure in failures], [0 if failure.lost else 2 for failure in failures]
@@ -148,7 +148,7 @@ def draw(failures: Sequence[Failure], title: str) -> Any:
 
 
 def _bars(label: str, failures: Sequence[Failure], values: Sequence[float | None], missing: str = "not settled") -> Any:
-    """A panel with the number at the end of each bar, or why there is none."""
+    """Make a panel with the number at the end of each bar, or the reason why there is none."""
     from starhold.report.bars import Bars
 
     lost = ["diverged" if f.diverged_at is not None else "not flown" if f.refused else missing for f in failures]
@@ -157,7 +157,7 @@ def _bars(label: str, failures: Sequence[Failure], values: Sequence[float | None
 
 
 COMMAND = Command(
-    "Tell what is left after the loss of any one or two wheels: a table, failures.csv and failures.png.",
+    "Show the control left after the loss of any one or two wheels: a table, failures.csv and failures.png.",
     "failures",
     later("studies.failures.study"),
     present,

@@ -25,14 +25,14 @@ def listed() -> list[Block]:
 
 
 def read(problem: InvariantProblem | str | Path) -> tuple[InvariantProblem]:
-    """The problem: made in Python, read from a file, or the built-in one of a name."""
+    """Return the problem: one made in Python, one read from a file, or the built-in one of this name."""
     from starhold.certification import invariant as sets
 
     return (problem if isinstance(problem, sets.InvariantProblem) else sets.load(problem),)
 
 
 def present(problem: InvariantProblem, certificate: SetCertificate) -> Result:
-    """Each claim with its outcome, how it was shown and what is missing; the phase portrait with the sets."""
+    """Present each claim with its outcome, how it was shown and what is missing; the phase portrait with the sets."""
     from starhold.certification import invariant as sets
     from starhold.certification.assumptions import texts
     from starhold.studies.phase_portraits import portraits
@@ -77,9 +77,9 @@ def _table(certificate: Certificate, portraits: list[Portrait]) -> Table:
 
 
 COMMAND = Command(
-    """Prove what functions V say of an invariant set of any small system: a table, certificate.json and a picture.
+    """Prove claims about invariant sets of any small system by functions V: a table, certificate.json and a picture.
 
-    Exit code 0: all that is claimed is proved; 3: something is refuted, with the state that does; 4: not decided.
+    Exit code 0: every claim is proved; 3: one is refuted, with the state that refutes it; 4: one is undecided.
     """,
     "invariant",
     later("certification.invariant.certify"),

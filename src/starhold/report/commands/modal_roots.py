@@ -1,4 +1,4 @@
-"""The roots of the modal law that turn fastest within limits, over the initial angle."""
+"""The roots of the modal law that slew fastest within limits, over the initial angle."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.studies.modal_roots import Study
 LINES = {"fit": ("own fit", "-", 2), "published": ("published fit", (0, (5, 2.5)), 1)}
-"""How each fit is drawn: its words, dashes and the number of its colour."""
+"""The style of each fit: its label, dashes and the number of its colour."""
 POINTS = 200
-"""Points of each piece of a fit."""
+"""The number of points of each piece of a fit."""
 
 
 def present(scenario: Scenario, entry: LawEntry, result: Study) -> Result:
-    """One row an angle, how good the fits are, and the law to be pasted."""
+    """Present a row for each angle, the quality of the fits, and the law to be pasted."""
     from starhold.studies.modal_roots import law_lines
 
     sentences: list[str] = []
@@ -97,7 +97,7 @@ def draw(result: Study, title: str) -> Any:
     for axis in axes:
         plain(axis)
         axis.set_axisbelow(True)
-    # Fits first were drawn behind; the points they go through come first in words.
+    # Fits were drawn first, to lie behind; in the legend the points come first.
     handles = top.get_legend_handles_labels()[0]
     place = {"loc": "upper left", "bbox_to_anchor": (0.09, 1.0 - 0.30 / figure.get_figheight())}
     handles = [*handles[len(fits) :], *handles[: len(fits)]]
@@ -106,7 +106,7 @@ def draw(result: Study, title: str) -> Any:
 
 
 def _line(axis: Any, pieces: TwoPieceFit, angles: Any, words: str, style: dict[str, Any]) -> None:
-    """Each piece by itself, for they do not meet."""
+    """Draw each piece by itself, because they do not join."""
     import numpy as np
 
     split = np.degrees(pieces.split)

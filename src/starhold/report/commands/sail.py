@@ -1,4 +1,4 @@
-"""The sail that a circle about a libration point takes."""
+"""The sail area that a circle about a libration point requires."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ REFLECTIVITIES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 DEFICITS = (0.0, 0.05, 0.1)
 UNITS = {"radius": "m", "mass": "kg", "area": "m^2", "pressure": "N/m^2"}
 NOTE = (
-    "largest radius: held at the best rate by what is left; whether the full circle then bends or is lost, flights\n"
-    "tell. radius in that light: where the sail loses with the Sun what the body hides."
+    "largest radius: held at the best rate by the control left; flights show whether the full circle then bends or\n"
+    "diverges. radius in that light: the sail then lacks the sunlight that the body hides."
 )
 
 
 def read(**given: Any) -> tuple[Station, float, float | None]:
-    """The circle, the mass of the craft (kg), and the sail that there is (m2; None for none)."""
+    """Return the circle, the mass of the craft (kg), and the area of its sail (m2; None without one)."""
     from starhold.parts.bodies.libration_point import PRIMARIES
     from starhold.scenario.checking import nearest
     from starhold.synthesis.circle import Station
@@ -49,12 +49,12 @@ def read(**given: Any) -> tuple[Station, float, float | None]:
         raise InputError("sail", "--radius", radius or "", "a circle smaller than the distance of the point from the body")
     if station.pressure == 0.0:
         clear = f"{1e-3 * station.clear_radius:.0f} km"
-        raise InputError("sail", "--radius", radius or "", f"a circle that the Sun reaches; the whole Sun from {clear} on")
+        raise InputError("sail", "--radius", radius or "", f"a circle in sunlight; the whole Sun is seen from {clear} on")
     return station, mass, area
 
 
 def _number(name: str, text: Any) -> Any:
-    """A positive quantity of its unit, or else a part of the light; a plain number is SI."""
+    """Read a positive quantity with its unit, or a share of the light; a plain number is SI."""
     from pydantic_core import PydanticCustomError
 
     from starhold.laws.interface import Gain
@@ -70,8 +70,8 @@ def _number(name: str, text: Any) -> Any:
 
 
 def present(station: Station, mass: float, area: float | None, _same: Station) -> Result:
-    """The design in words, then the sail over rates and reflectivities, and the control left at deficits of what the circle
-    asks."""
+    """Present the design, then the sail over rates and reflectivities, and the control left at deficits of the circle's
+    demand."""
     from starhold.parts.bodies.libration_point import nonlinear
     from starhold.synthesis.circle import demand
 
@@ -130,7 +130,7 @@ def _margin(station: Station, area: float, mass: float) -> str:
 
 
 def _deficits(station: Station, deficits: list[float]) -> Table:
-    """A row a deficit, with what it leaves; a margin is a negative one."""
+    """Make a row for each deficit, with the control it leaves; a margin is a negative deficit."""
     columns = [Column("deficit", "%", ".4g"), Column("largest radius", "km", ".6g"), Column("Sun seen there", "%", ".4g")]
     columns += [Column("radius in that light", "km", ".6g"), Column("on its limit, full circle", "% of the time", ".3g")]
     rows: list[list[float]] = []
@@ -150,11 +150,11 @@ COMMAND = Command(
     file=None,
     read=read,
     options={
-        "primaries": Option("", "the Sun and which body", default="sun-earth"),
+        "primaries": Option("", "the Sun and the other body", default="sun-earth"),
         "point": Option("", "libration point: L1 or L2", default="L2"),
         "radius": Option("", 'of the circle, "20000 km"; the body\'s diameter if not given'),
         "mass": Option("", 'of the craft, "300 kg"', default="300 kg"),
-        "area": Option("", 'sail that there is, "200 m^2", for its margin'),
+        "area": Option("", 'actual sail area, "200 m^2", for its margin'),
         "reflectivity": Option("", "part of the light reflected as by a mirror", default="1"),
         "diffuse": Option("", "part of the light reflected in all directions", default="0"),
         "pressure": Option("", 'of the whole Sun\'s light on black, "4.5e-6 N/m^2"; by distance if not given'),

@@ -1,4 +1,4 @@
-"""This command tells whether what is required of a law is met."""
+"""This command reports whether a law meets its requirements."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STYLES = {"met": "green", "missed": "red", "not decided": "yellow"}
 
 
 def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementVerdict]) -> Result:
-    """One row a requirement, and below the table why one is not met."""
+    """Make a row for each requirement, and below the table say why one is not met."""
     from rich.markup import escape
 
     rows: list[list[Any]] = []
@@ -39,7 +39,7 @@ def numbers(one: RequirementVerdict) -> list[str | None]:
 
 
 def amount(one: RequirementVerdict, value: float | None) -> str | None:
-    """A number in the unit that the limit is typed in, rounded for reading."""
+    """Show a number in the unit in which the limit is typed, rounded for reading."""
     if value is None:
         return None
     unit = one.typed_unit or ("" if one.unit == "1" else one.unit)
@@ -47,7 +47,7 @@ def amount(one: RequirementVerdict, value: float | None) -> str | None:
 
 
 def _matrix(verdicts: Sequence[RequirementVerdict]) -> Table:
-    """All that is known of each, numbers in SI."""
+    """Return all that is known of each, numbers in SI."""
     columns = ("id", "parent", "text", "rationale", "method", "metric", "verdict", "number", "limit", "margin", "unit")
     rows: list[list[Any]] = []
     for one in verdicts:
@@ -58,8 +58,8 @@ def _matrix(verdicts: Sequence[RequirementVerdict]) -> Table:
 
 
 def junit(title: str, law: str, verdicts: Sequence[RequirementVerdict]) -> str:
-    """The verdicts as JUnit's XML: a requirement that is missed failed, and one that is not decided is an error, so that
-    nothing passes that was not shown."""
+    """Return the verdicts as JUnit XML: a missed requirement is a failure and an undecided one an error, so that only what
+    was shown passes."""
     from xml.etree import ElementTree as Tree
 
     counts = {name: sum(one.verdict == kind for one in verdicts) for kind, name in JUNIT.items()}
@@ -77,10 +77,10 @@ def junit(title: str, law: str, verdicts: Sequence[RequirementVerdict]) -> str:
 
 
 JUNIT = {"missed": "failure", "not decided": "error"}
-"""How JUnit calls verdicts; a requirement that is met passed."""
+"""JUnit's names for verdicts; a requirement that is met has passed."""
 
 COMMAND = Command(
-    "Tell which requirements of a file are met, each by its own method: a table, verify.csv, and verify.xml for JUnit.",
+    "Report which requirements of a file are met, each by its own method: a table, verify.csv, and verify.xml for JUnit.",
     "verify",
     later("campaign.verify.study"),
     present,

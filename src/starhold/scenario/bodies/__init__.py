@@ -1,5 +1,5 @@
-"""The bodies that scenarios can be about: each module or folder here defines the tables of one, which is named nowhere else;
-`any_body` defines those of all others."""
+"""The bodies of scenarios: each module or folder here defines the tables of one, which no other code names; `any_body`
+defines those of all others."""
 
 import pkgutil
 from collections.abc import Mapping
@@ -17,14 +17,14 @@ from starhold.scenario.bodies.interface import Body
 
 @cache
 def bodies() -> dict[str, Body]:
-    """The bodies by name: the `BODY` of every module of this package that has one."""
+    """Return the bodies by name: the `BODY` of every module of this package that has one."""
     modules = [import_module(f"{__name__}.{item.name}") for item in pkgutil.iter_modules(__path__)]
     all_bodies: list[Body] = [module.BODY for module in modules if hasattr(module, "BODY")]
     return {body.name: body for body in all_bodies}
 
 
 def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:
-    """The body that the tables of a file are about, by its marker; InputError for none and for several."""
+    """Return the body of a file's tables, by its marker; InputError for none and for several."""
     markers = {body.marker: body for body in (_any_body().NAMED_BY_TABLE, *bodies().values())}
     there = [marker for marker in markers if marker in tables]
     if len(there) > 1:
@@ -32,19 +32,19 @@ def body_of(tables: Mapping[str, Any], where: str, folder: Path) -> Body:
     if there:
         return markers[there[0]].chosen(tables, where, folder)
     for key in tables:
-        # Nearer than `nearest` asks, to which a [simulation] is like a [libration].
+        # Stricter than `nearest`, which takes [simulation] for a misspelt [libration].
         if near := get_close_matches(key[:100], markers, n=1, cutoff=0.8):
             raise InputError(where, key, "an unknown key", f"did you mean {near[0]}?")
     raise InputError(where, "", "no body", f"one of the tables {', '.join(f'[{marker}]' for marker in sorted(markers))}")
 
 
 def body_for(law: Law) -> Body:
-    """The body that a law is for."""
+    """Return the body of a law."""
     return bodies().get(law.body) or _any_body().AnyBody(find("body", law.body))
 
 
 def others() -> list[Body]:
-    """The bodies without tables of their own: each that is installed, and one that stands for those in files."""
+    """Return the bodies without tables of their own: each installed one, and one for those in files."""
     return [
         _any_body().NAMED_BY_TABLE,
         *(_any_body().AnyBody(part) for name, part in parts("body").items() if name not in bodies()),
@@ -52,5 +52,5 @@ def others() -> list[Body]:
 
 
 def _any_body() -> Any:
-    # Its tables are made of `schema`, which asks here for all bodies.
+    # Its tables come from `schema`, which looks up all bodies here.
     return import_module(f"{__name__}.any_body")

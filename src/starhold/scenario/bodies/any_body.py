@@ -1,5 +1,5 @@
-"""Scenarios of any body that has no tables of its own, known by their [body] table: a part that is installed, or one in a
-file. The part's parameters are the keys of [body], its state's fields those of [initial]."""
+"""Scenarios of any body without tables of its own, recognized by their [body] table: an installed part, or one in a file.
+The part's parameters are the keys of [body], its state's fields those of [initial]."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class AnyTiming(SeededTiming):
     """The duration of a run, its control period and its integration steps."""
 
     lost_beyond: Annotated[
-        float | None, *quantity(Gain(above=0.0, text="distance beyond which the motion has diverged; none if absent"))
+        float | None, *quantity(Gain(above=0.0, text="divergence bound on the distance; none if absent"))
     ] = None
 
 
@@ -70,8 +70,8 @@ class BodyFromFileTables(ScenarioTable):
 
 
 class Context(NamedTuple):
-    """The name that errors call a scenario by, and the folder that file names in it are relative to. All numbers are in the
-    units that the body declares."""
+    """The scenario's name in errors, and the folder to which its file names are relative. All numbers are in the units that
+    the body declares."""
 
     where: str
     folder: Path
@@ -83,7 +83,7 @@ class Context(NamedTuple):
 
 
 class Made(NamedTuple):
-    """The parameters of a body, and the numbers that laws and equations of motion take."""
+    """The parameters of a body, and the numbers for laws and equations of motion."""
 
     params: Any
     craft: Any
@@ -128,11 +128,11 @@ class AnyBody(Body):
     def examine(self, scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> None:
         lost = make_step(loop.composition()).check(loop.carry(), 0, loop.setup()).lost_at
         if lost >= 0.0:
-            raise InputError(scenario.where, "initial", "a start that the body counts as lost", "a sound one")
+            raise InputError(scenario.where, "initial", "a start that the body counts as diverged", "a sound one")
 
 
 class NamedByTable:
-    """Stands for all these bodies until a file's [body] table names one."""
+    """Represents all these bodies until a file's [body] table names one."""
 
     name = ""
     marker = MARKER
@@ -157,7 +157,9 @@ class NamedByTable:
         known = {part.name: part for part in parts("body").values() if part.name not in tabled}
         if not isinstance(name, str) or name not in known:
             given_name = "nothing" if name is None else show(name)
-            allowed = f"{nearest(str(name), list(known))}; or a file" if known else "a file, for no other body is installed"
+            allowed = (
+                f"{nearest(str(name), list(known))}; or a file" if known else "a file, because no other body is installed"
+            )
             raise InputError(where, f"{MARKER}.type", given_name, allowed)
         with input_at(where, f"{MARKER}.type"):
             return AnyBody(known[name], folder)
@@ -175,7 +177,7 @@ def _read(path: Path, folder: Path) -> AnyBody:
 
 @cache
 def tables_of(part: Part) -> type[ScenarioTable]:
-    """The tables of a file about a body but those of its laws. ValueError, one line, where the part's declaration leaves
+    """Return the tables of a file about a body, without those of its laws. ValueError, in one line, where the part declares
     numbers that a file cannot give."""
     try:
         state, params = _state(part), _params(part)
@@ -188,7 +190,7 @@ def tables_of(part: Part) -> type[ScenarioTable]:
         if len(item.gain.shape) > 1 or item.gain.whole or item.gain.choices or item.gain.columns:
             raise ValueError(f"{part.module.__file__}: State.{item.name} must be a number or a vector")
     if taken := {"type", "file"} & {item.name for item in params}:
-        raise ValueError(f"{part.module.__file__}: Params has a field {taken.pop()}, which says which body it is")
+        raise ValueError(f"{part.module.__file__}: Params has a field {taken.pop()}, a key that names the body")
     title = part.name.replace("-", " ").title().replace(" ", "")
     named: Any = {"type": (Literal[part.name], ...)} if part.file is None else {"file": (str, ...)}
     body: Any = create_model(f"{title}Body", __base__=Table, __doc__=part.card.summary, **named, **columns(params))
@@ -229,7 +231,7 @@ def tables_of(part: Part) -> type[ScenarioTable]:
 
 
 def _example(part: Part) -> str:
-    """Written from the example of the part's parameters, where it has one; what the state leaves open is 0.1."""
+    """Written from the example of the part's parameters, if it has one; unspecified state components are 0.1."""
     which = f'type = "{part.name}"' if part.file is None else f"file = {json.dumps(str(part.file))}"
     lines = ['name = "written"', f"[{MARKER}]", which]
     examples = part.examples() if part.hook("examples") else []
@@ -246,12 +248,12 @@ def _params(part: Part) -> list[contract.Field]:
 
 
 def _state(part: Part) -> list[contract.Field]:
-    """The fields of the state that a file gives: all but the command, which is zero at the start."""
+    """Return the fields of the state that a file gives: all but the command, which is zero at the start."""
     return contract.fields(part.module.State, part.module.COMMAND)
 
 
 def _within(gain: contract.Parameter) -> Any:
-    """A value that a parameter may have: 0.1 for each number, or one near it within the bounds."""
+    """Return an allowed value of a parameter: 0.1 for each number, or one near it within the bounds."""
     least = [0.1, *(x for x in (gain.at_least, None if gain.above is None else gain.above + 0.1) if x is not None)]
     value = min(max(least), math.inf if gain.at_most is None else gain.at_most)
     return [value] * gain.shape[0] if gain.shape else value

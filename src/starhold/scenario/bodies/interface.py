@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 
 
 class Made(Protocol):
-    """The numbers that a body's tables make; a body may add others."""
+    """The numbers that a body's tables define; a body may add others."""
 
     @property
     def craft(self) -> Any:
-        """The body's numbers as laws and equations of motion take them."""
+        """The body's numbers for laws and equations of motion."""
         ...
 
 
 class Moved(NamedTuple):
-    """The numbers of a loop that values of a file's keys give: the body's first state as its motion begins and as the loop
-    is made with it, the craft that flies, the nominal model that the law has, the saturation limit of the command, and the
-    loop's parts."""
+    """The numbers of a loop from values of a file's keys: the body's initial state as its motion begins and as the loop is
+    made, the craft that flies, the law's nominal model, the saturation limit of the command, and the loop's parts.
+    """
 
     start: Any
     made_with: Any
@@ -42,29 +42,29 @@ class Moved(NamedTuple):
 
 
 class Body(Protocol):
-    """One body: its tables, its laws, and how loops are built of them. Its `tables` have a `simulation` that is a `Timing`;
-    a table of a part's parameters is made of `schema.columns`."""
+    """One body: its tables, its laws, and how they become loops. Its `tables` have a `simulation` that is a `Timing`; a
+    table of a part's parameters comes from `schema.columns`."""
 
     name: str
     """The body's name, that of its module with hyphens."""
     marker: str
-    """The top-level table by which a file is known to be about this body."""
+    """The top-level table that marks a file as being about this body."""
     tables: type[ScenarioTable]
-    """All tables of a file but those of its laws."""
+    """All tables of a file except those of its laws."""
     law_table: type[LawTable]
     """The keys of tables of laws beside their gains."""
     example: str
     """A small scenario in TOML, to which a law's table can be appended."""
     modes: bool = False
-    """Whether a law may be made of modes: the body's `Measurement` has what their conditions look at."""
+    """Whether a law may be made of modes: the body's `Measurement` has what their conditions test."""
     linked: Mapping[str, str] = MappingProxyType({})
-    """Keys of `dials` whose value is that of another key until they are moved themselves."""
+    """Keys of `dials` whose value follows another key until they are moved themselves."""
     orbit: str = ""
-    """The table that it has besides where a part needs an orbit."""
+    """The additional table where a part needs an orbit."""
     modelled: tuple[str, ...] = ()
-    """The tables whose numbers laws take the craft for."""
+    """The tables whose numbers define the craft for laws."""
     designed: tuple[str, ...] = ()
-    """Those whose numbers besides give gains to laws with a design form."""
+    """Further tables whose numbers give gains to laws with a design form."""
 
     @property
     def template(self) -> str:
@@ -72,8 +72,8 @@ class Body(Protocol):
         return (resources.files(type(self).__module__) / "template.toml").read_text(encoding="utf-8")
 
     def chosen(self, tables: Mapping[str, Any], where: str, folder: Path) -> Body:
-        """The body that these raw tables, which have the marker, are about: this one, unless the marker's table names one
-        of several by a type or a file. InputError where there is no such body."""
+        """Return the body of these raw tables, which have the marker: this one, unless the marker's table names another by a
+        type or a file. InputError where there is no such body."""
         return self
 
     def laws(self) -> Mapping[str, Law]:
@@ -81,32 +81,32 @@ class Body(Protocol):
         return catalogue(self.name)
 
     def context(self, tables: Mapping[str, Any], where: str) -> Any:
-        """The context that validators of these raw tables and of laws' gains need, such as the worth of scaled numbers.
+        """Return the context for validators of these raw tables and of laws' gains, such as the units of scaled numbers.
         InputError where the tables do not give it."""
         return None
 
     def make(self, table: Any, where: str) -> Made:
-        """The numbers that validated tables make. InputError for numbers that no body has."""
+        """Return the numbers that validated tables define. InputError for numbers that no body has."""
         ...
 
     def complete(self, scenario: Scenario, law: Law, spec: Any, law_table: Any) -> Any:
-        """The inputs of a law's design form, completed from the scenario; `law_table` is the law's validated table.
+        """Return the inputs of a law's design form, completed from the scenario; `law_table` is the law's validated table.
         ValueError where the scenario cannot give them."""
         return spec
 
     def target(self, scenario: Scenario, given: Any, context: Any, key: str) -> Fitted:
-        """The target that the raw table of a mode gives, called `key` in errors; for None that of the scenario. InputError
-        where it gives none."""
-        raise InputError(scenario.where, key, "a target", "none, for this body has no attitude")
+        """Return the target of a mode's raw table, named `key` in errors; for None that of the scenario. InputError where it
+        gives none."""
+        raise InputError(scenario.where, key, "a target", "none, because this body has no attitude")
 
     def options(self, scenario: Scenario, law_table: Any, gains: Any, key: str) -> Any:
-        """The options of a law beside its gains, from its validated table (called `key` in errors) or else from the
+        """Return the options of a law beside its gains, from its validated table (named `key` in errors) or else from the
         scenario. InputError if they do not fit the gains."""
         return None
 
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
-        """Return the arguments of `ClosedLoop` that the body's tables give for one law: the start, all parts, and those in
-        which the body differs from any other."""
+        """Return the arguments of `ClosedLoop` from the body's tables for one law: the start, all parts, and those specific
+        to the body."""
         ...
 
     def build(self, scenario: Scenario, entry: LawEntry) -> ClosedLoop:
@@ -125,26 +125,26 @@ class Body(Protocol):
         return ClosedLoop(**(shared | self.given(scenario, entry)))
 
     def examine(self, scenario: Scenario, entry: LawEntry, loop: Any) -> None:
-        """InputError where the law of a loop, which has been called once, cannot work there."""
+        """Raise InputError where the law of a loop, which has been called once, cannot work there."""
         return
 
     def drawn(self, scenario: Scenario, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the arguments of `moved` for many runs, an array (lanes,) in place of each number, where they differ in the
-        values of some keys, or components of theirs, (components..., lanes) by key; without those of which only `build`
-        can tell."""
+        """Return the arguments of `moved` for many runs that differ in the values of some keys or their components,
+        (components..., lanes) by key: an array (lanes,) in place of each number, without arguments that only `build`
+        determines."""
         return {}
 
     def dials(self, scenario: Scenario) -> dict[str, Any]:
-        """The keys that `moved` takes, with the numbers that the scenario has there."""
+        """Return the keys that `moved` accepts, with their numbers in the scenario."""
         return {}
 
     def moved(self, scenario: Scenario, loop: Any, values: Mapping[str, Any]) -> Moved:
-        """The numbers of a law's loop under other values of the keys of `dials`: an equation, with the bits that `build`
-        gives of the scenario that `changes` tells."""
+        """Return the numbers of a law's loop under other values of the keys of `dials`: an equation with the same bits as
+        `build` of the scenario with these `changes`."""
         return Moved(loop.start, loop.start, loop.craft, loop.craft, loop.saturation_limit(), loop.parts)
 
     def flown(self, scenario: Scenario, loop: Any, values: Mapping[str, Any], known: Mapping[str, Any]) -> Moved:
-        """The numbers of a loop that flies with values of which laws know others, or not all: an equation."""
+        """Return the numbers of a loop that flies with values unknown to laws, or only partly known: an equation."""
         true = self.moved(scenario, loop, values)
         supposed = self.moved(scenario.known, replace(loop, craft=loop.known), known)
 
@@ -156,15 +156,15 @@ class Body(Protocol):
         return true._replace(nominal=supposed.craft, parts=tuple(parts))
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:
-        """The body's numbers as laws know them under these values of the keys of `dials`, which may be recorded numbers;
-        InputError, as of a file, for values that no file may have."""
+        """Return the body's numbers as laws know them under these values of the keys of `dials`, which may be recorded
+        numbers; InputError, as for a file, for values that no file may have."""
         return scenario.craft
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The changes of a file, as a scenario's `with_` takes them, that give keys of `dials` these values."""
+        """Return the changes, for a scenario's `with_`, that give keys of `dials` these values."""
         return dict(values)
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Any]) -> Any:
-        """Which lanes have values, (components..., lanes) by key, that no body has, beyond the bounds of each number:
-        (lanes,), or None where none are known."""
+        """Return which lanes have values, (components..., lanes) by key, that are within the bounds of each number but
+        impossible for a body: (lanes,), or None where no such check exists."""
         return None

@@ -1,4 +1,4 @@
-"""The study of a body that has none of its own."""
+"""The study of a body without a study of its own."""
 
 from starhold.studies.body import BodyStudy
 

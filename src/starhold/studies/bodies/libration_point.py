@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 @final
 class LibrationPointStudy(BodyStudy):
-    """Runs are scaled, their units in SI among the attributes; metrics are in SI. Calls are not timed where control surfaces
-    move within hours."""
+    """Runs are scaled, their units in SI among the attributes; metrics are in SI. Calls are not timed, because control
+    surfaces move within hours."""
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         units, goal = scenario.table.libration.units, goal_of(loop.gains)

@@ -1,4 +1,4 @@
-"""The study of a body that turns, with or without wheels."""
+"""The study of a rotating body, with or without wheels."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ TRANSIENT = ("rate_limit", "acceleration_limit", "angle_end", "rate_end")
 
 @final
 class RigidBodyStudy(BodyStudy):
-    """Everything is in SI. Laws with wheels are certified anew after faults that they know of."""
+    """Everything is in SI. Laws with wheels are certified again after faults that they know of."""
 
     EXTRAS = EXTRAS
 
@@ -109,7 +109,7 @@ class RigidBodyStudy(BodyStudy):
     def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
         from starhold.analysis.departure import departures
 
-        # A certificate ends where the loop changes next; of events at one step the last decides.
+        # A certificate ends where the loop changes next; the last of several events at one step decides.
         latest = {event.step: event for event in loop.events if event.step * loop.period <= float(run["time"][-1])}
         if issued.mode is not None:
             return mode_departures(issued, run, min(latest, default=None))
@@ -131,10 +131,11 @@ STUDY = RigidBodyStudy()
 
 
 def _differs(event: Event, issued: Issued) -> bool:
-    """Whether from an event on a loop flies, or is known to the law, that differs from the one a certificate is about."""
+    """Return whether after an event the loop that flies, or the law's model of it, differs from the one a certificate is
+    about."""
     if event.step != issued.step or issued.step:
         return event.step > issued.step
-    # A fault at the very start, of which the law knows or does not.
+    # A fault at the very start, known to the law or not.
     loop = issued.loop
     pairs = zip(event.parts, loop.parts, strict=True)
     same = same_numbers((event.craft, event.nominal, event.gains), (loop.craft, loop.craft, loop.gains))
@@ -142,8 +143,8 @@ def _differs(event: Event, issued: Issued) -> bool:
 
 
 def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing: bool = False) -> list[Issued]:
-    """The certificates of one law of the scenario, with the claims that its [certify] table asks for: as it starts, and from
-    each time on at which wheels, gains or craft are others and the law knows of it."""
+    """Return the certificates of one law of the scenario, with the claims of its [certify] table: for the initial loop, and
+    for the loop after each change of wheels, gains or craft that the law knows of."""
     from starhold.certification.certify import certify
 
     wanted = wanted_of(scenario, pointing)
@@ -153,7 +154,7 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing:
 
 
 def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
-    """The claims that the [certify] table of a scenario asks for; pointing: how near to the target, too."""
+    """Return the claims of a scenario's [certify] table; pointing: also how near to the target."""
     from starhold.certification.certify import Wanted
 
     table = scenario.table.certify
@@ -161,14 +162,15 @@ def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
 
 
 def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, ClosedLoop]:
-    """The loops that the certificates of one law of the scenario are about, by their names."""
+    """Return the loops of the certificates of one law of the scenario, by name."""
     if mode_laws(loop.law, loop.gains):
         return named_modes(loop, entry.name) | {one.name: one.after for one in hand_overs(loop, entry.name)}
     return {name: now for name, now, _ in _named(scenario, entry, loop)}
 
 
 def handed_over(entry: LawEntry, loop: ClosedLoop) -> dict[str, Ends]:
-    """The rates (rad/s) and angles (rad) up to which the switches of a law hand over, by the names of their certificates."""
+    """Return the rates (rad/s) and angles (rad) below which the switches of a law hand over, by the names of their
+    certificates."""
     from starhold.certification.hand_over import ends
 
     switches = hand_overs(loop, entry.name) if mode_laws(loop.law, loop.gains) else []
@@ -181,7 +183,7 @@ def _named(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[tuple[
 
 
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
-    """The loop as it starts, and each later loop that the law knows, with the control step from which on it flies."""
+    """Return the initial loop and each later loop that the law knows, with the control step from which it flies."""
     known = [(0, replace(loop, events=()))]
     if loop.remembers:
         return known
@@ -192,7 +194,7 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
             continue
         now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
         if step:
-            # One step more, for the changes that come with the event.
+            # One more step, for the changes that come with the event.
             carry = fly(loop, step)[1]
             phase = next(phase for phase in loop.phases(steps) if phase.first == step)
             carry = phase.entered(carry)

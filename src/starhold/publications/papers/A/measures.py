@@ -30,7 +30,7 @@ def gravity_torque(desk: Desk) -> Finding:
 
 
 def beside_wheels(desk: Desk) -> Finding:
-    """Tell whether each disturbance is at least a hundred times smaller than the torque of wheels."""
+    """Return whether each disturbance is at least a hundred times smaller than the torque of wheels."""
     torques = {
         "gravity gradient, 10⁴ kg m²": 1.5 * ORBIT**2 * 1e4,
         "solar pressure, 10⁻⁴ N m": 1e-4,
@@ -41,7 +41,7 @@ def beside_wheels(desk: Desk) -> Finding:
 
 
 def controllable(desk: Desk) -> Finding:
-    """Tell whether [B, AB] of the linear model has full rank, for random inertias."""
+    """Return whether [B, AB] of the linear model has full rank, for random inertias."""
     ranks = set[int]()
     for inertia in _inertias():
         a, b = linear_model(inertia)
@@ -51,7 +51,7 @@ def controllable(desk: Desk) -> Finding:
 
 
 def riccati_solution(desk: Desk, form: str) -> Finding:
-    """Tell whether a form's P is the stabilising solution that a numerical solver finds, and positive definite, for random
+    """Return whether a form's P is the stabilising solution that a numerical solver finds, and positive definite, for random
     inertias and weights."""
     worst, least = 0.0, np.inf
     for inertia, spec in _specs(form):
@@ -65,7 +65,7 @@ def riccati_solution(desk: Desk, form: str) -> Finding:
 
 
 def costs_least(desk: Desk) -> Finding:
-    """Tell whether the feedback of form II costs less than stable feedback near it, by the functional (2.1)."""
+    """Return whether the feedback of form II costs less than stable feedback near it, by the functional (2.1)."""
     from scipy.linalg import solve_continuous_lyapunov
 
     random, fewer, tried = np.random.default_rng(RNG), 0, 0
@@ -83,7 +83,7 @@ def costs_least(desk: Desk) -> Finding:
 
 
 def middle_weight(desk: Desk) -> Finding:
-    """Tell whether (2.24) makes (2.23) hold, and y2 positive, and whether the weights that `balance` moves obey it."""
+    """Return whether (2.24) makes (2.23) hold, and y2 positive, and whether the weights that `balance` moves obey it."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(TRIALS):
         moments = np.sort(10.0 ** random.uniform(2.0, 4.0, 3))
@@ -100,7 +100,7 @@ def middle_weight(desk: Desk) -> Finding:
 
 
 def sign_of_term(desk: Desk) -> Finding:
-    """Tell whether the gyroscopic term of V' takes both signs wherever (2.23) does not hold: it is kappa w1 w2 w3."""
+    """Return whether the gyroscopic term of V' takes both signs wherever (2.23) does not hold: it is kappa w1 w2 w3."""
     random, both = np.random.default_rng(RNG), 0
     for _ in range(TRIALS):
         moments, y = 10.0 ** random.uniform(2.0, 4.0, 3), 10.0 ** random.uniform(-2.0, 0.0, 3)
@@ -134,14 +134,14 @@ def channels(desk: Desk) -> Finding:
 
 
 def conditions(desk: Desk, file: str, laws: Sequence[str], claim: str) -> Finding:
-    """Tell for which laws a claim is proved."""
+    """Return for which laws a claim is proved."""
     issued = {law: desk.claims(file, law).get(claim) for law in laws}
     proved = {law: one is not None and one.outcome == "proved" for law, one in issued.items()}
     return Finding(proved, f"{claim} proved by certificate")
 
 
 def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
-    """Tell along which flights V is non-increasing, but for its rounding."""
+    """Return along which flights V is non-increasing, but for its rounding."""
     verdicts: dict[str, bool] = {}
     for file, law in runs:
         values = _lyapunov(desk, file, law)
@@ -150,21 +150,21 @@ def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
 
 
 def settled(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
-    """Tell which flights settle."""
+    """Return which flights settle."""
     times = {law: desk.flight(file, law).metrics["settling_time"] for file, law in runs}
     note = ", ".join(f"{law} {time:.0f} s" for law, time in times.items() if time is not None)
     return Finding({law: time is not None for law, time in times.items()}, note)
 
 
 def below_wheels(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
-    """Tell which flights need less than 0.1 N m."""
+    """Return which flights need less than 0.1 N m."""
     peaks = {law: desk.flight(file, law).metrics["peak_torque"] for file, law in runs}
     note = ", ".join(f"{law} {peak:.3g}" for law, peak in peaks.items())
     return Finding({law: peak < 0.1 for law, peak in peaks.items()}, f"{note} N m")
 
 
 def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
-    """Tell from which rates form I does not settle within 12 h; wheels of 0.1 N m balance the gyroscopic torque of none."""
+    """Return from which rates form I does not settle within 12 h; wheels of 0.1 N m balance the gyroscopic torque of none."""
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for rate in rates:
@@ -182,8 +182,8 @@ def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
 
 
 def globally(desk: Desk) -> Finding:
-    """Tell for which laws the required attitude attracts every start: not for those whose torque vanishes at q0 = -1
-    too, the same attitude."""
+    """Return for which laws the required attitude attracts every start: not for those whose torque vanishes at q0 = -1 too,
+    the same attitude."""
     verdicts: dict[str, bool] = {}
     for entry in desk.scenario("stabilisation").laws:
         loop = desk.loop("stabilisation", entry.name)
@@ -194,7 +194,7 @@ def globally(desk: Desk) -> Finding:
 
 
 def offset(desk: Desk, law: str) -> Finding:
-    """Tell whether a law's error under disturbance is the one that its stiffness holds against it: |q| = |K^-1 M|, to a
+    """Return whether a law's error under disturbance is the one that its stiffness holds against it: |q| = |K^-1 M|, to a
     tenth."""
     run = desk.recording("disturbed", law)
     gain = desk.loop("disturbed", law).gains.k_attitude

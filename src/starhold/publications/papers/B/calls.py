@@ -1,4 +1,4 @@
-"""Calls of a law cost processor time along a flight, and operations."""
+"""The cost of a law's calls along a flight, in processor time and operations."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -92,7 +92,7 @@ def time_ratio(desk: Desk, name: str) -> Finding:
 
 
 def time_cases(desk: Desk, names: Sequence[str], least: float, most: float = float("inf")) -> Finding:
-    """Tell for which laws a call takes between `least` and `most` times as long as one of the Lyapunov law."""
+    """Return for which laws a call takes between `least` and `most` times as long as one of the Lyapunov law."""
     ratios = {name: ratio(desk, name) for name in names}
     note = ", ".join(f"{name} {value:.2g} times" for name, value in ratios.items())
     return Finding({name: least < value < most for name, value in ratios.items()}, note)
@@ -113,8 +113,8 @@ def operations_ratio(desk: Desk) -> Finding:
 
 
 def fewer_operations(desk: Desk, law: str, than: str, factor: float = 1.0) -> Finding:
-    """Tell whether a call of a law does fewer operations than `factor` times another's: with and without the gravity model,
-    which some laws have to compute."""
+    """Return whether a call of a law does fewer operations than `factor` times another's: with and without the gravity
+    model, which some laws have to compute."""
     cases = {"gravity model counted": True, "gravity model not counted": False}
     counted = {name: (operations(desk, law, gravity), operations(desk, than, gravity)) for name, gravity in cases.items()}
     note = "; ".join(f"{name}: {mine} and {other} operations" for name, (mine, other) in counted.items())

@@ -1,4 +1,4 @@
-"""The equations of the publication are tried by numbers."""
+"""Tests the equations of the publication numerically."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -25,7 +25,7 @@ def skew(a: Any) -> Array:
 
 
 def near_the_target(desk: Desk, degrees: float = 1.0) -> Finding:
-    """Tell whether the Lyapunov law turns the short way from rest, a little off the target, for either sign of Q."""
+    """Return whether the Lyapunov law turns the short way from rest, a little off the target, for either sign of Q."""
     half = np.radians(degrees) / 2.0
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
@@ -60,7 +60,7 @@ def target_motion(desk: Desk, cases: int = 100) -> Finding:
 
 
 def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
-    """Tell whether V_e' = q'K q' is negative on the surface w = -K q, at random attitudes by the sign of q0, and at the
+    """Return whether V_e' = q'K q' is negative on the surface w = -K q, at random attitudes by the sign of q0, and at the
     start."""
     gain = desk.scenario(COMMON).pick("sliding").gains.surface_gain[0]
     random = np.random.default_rng(2)
@@ -80,7 +80,7 @@ def on_the_surface(desk: Desk, cases: int = 2000) -> Finding:
 
 
 def reaching_condition(desk: Desk, cases: int = 2000) -> Finding:
-    """Tell whether V_r' = s (M - g sign s) <= 0 for random s and M within the condition (21): as printed, and of |M|."""
+    """Return whether V_r' = s (M - g sign s) <= 0 for random s and M within the condition (21): as printed, and of |M|."""
     random = np.random.default_rng(3)
     s, torque = random.normal(size=cases), random.normal(size=cases)
     bound = random.uniform(0.0, 2.0, size=cases)
@@ -113,7 +113,7 @@ def gravity_block(desk: Desk, cases: int = 20) -> Finding:
 
 
 def one_step(desk: Desk, of: Mapping[str, Mapping[str, Any]]) -> Finding:
-    """Tell whether x + h (A_c x + B u) predicts the state (q; w) a control period later, within a tenth of what it moves,
+    """Return whether x + h (A_c x + B u) predicts the state (q; w) a control period later, within a tenth of what it moves,
     under predictive control. of: cases by name; `step`: whether h is the control period, or 1 as printed; `changes`."""
     errors: dict[str, float] = {}
     for name, case in of.items():

@@ -1,4 +1,4 @@
-"""Flights of the three laws are compared with the statements of the publication, and drawn as it draws them."""
+"""Compares flights of the three laws with the statements of the publication, and draws them as it does."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -68,14 +68,14 @@ def _listed(values: Mapping[str, float], unit: str = "") -> str:
 
 
 def smooth(desk: Desk) -> Finding:
-    """Tell whether the Lyapunov torque changes little from call to call, beside the sliding torque."""
+    """Return whether the Lyapunov torque changes little from call to call, beside the sliding torque."""
     steps = {law: float(np.abs(np.diff(desk.recording(COMMON, law)["torque"], axis=0)).max()) for law in LAWS[:2]}
     return Finding(steps["lyapunov"] < 0.02 * steps["sliding"], "largest change a call: " + _listed(steps, "N m"))
 
 
 def alternates(desk: Desk, of: Mapping[str, Sequence[str]], quantity: str, least: float = 0.95) -> Finding:
-    """Tell whether every component changes sign at nearly every call in the last 150 s: of the torque, or of the increments
-    of the rate. of: file and law by the names of cases."""
+    """Return whether every component changes sign at nearly every call in the last 150 s: of the torque, or of the
+    increments of the rate. of: file and law by the names of cases."""
     shares: dict[str, float] = {}
     for name, (file, law) in of.items():
         run = desk.recording(file, law)
@@ -86,7 +86,7 @@ def alternates(desk: Desk, of: Mapping[str, Sequence[str]], quantity: str, least
 
 
 def worse_with_noise(desk: Desk) -> Finding:
-    """Tell whether each law ends further from the target with noise than without, in flights as long."""
+    """Return whether each law ends further from the target with noise than without, in flights as long."""
     pairs = {
         law: (_final(desk, COMMON, law, {"simulation.duration": 600.0}), _final(desk, f"{COMMON}-noise", law))
         for law in LAWS
@@ -96,8 +96,8 @@ def worse_with_noise(desk: Desk) -> Finding:
 
 
 def pattern(desk: Desk, files: Mapping[str, str], least: float) -> Finding:
-    """Tell whether the torque with noise follows that without: the correlation of means over 5 s in the first 200 s,
-    the least of the laws, by the names of readings."""
+    """Return whether the torque with noise follows that without: the correlation of means over 5 s in the first 200 s, the
+    least of the laws, by the names of readings."""
 
     def means(file: str, law: str) -> Array:
         return np.asarray(desk.recording(file, law)["torque"])[:2000].reshape(40, 50, 3).mean(axis=1).ravel()
@@ -129,8 +129,8 @@ def _count(steps: Any) -> str:
 
 
 def least_accurate(desk: Desk, of: Sequence[Mapping[str, Any]], law: str) -> Finding:
-    """Tell in which cases a law ends further from the target than both others; each has a name, and the file and the law for
-    every law."""
+    """Return in which cases a law ends further from the target than both others; each has a name, and the file and the law
+    for every law."""
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for one in of:
@@ -141,7 +141,7 @@ def least_accurate(desk: Desk, of: Sequence[Mapping[str, Any]], law: str) -> Fin
 
 
 def same_after(desk: Desk, law: str, bound: float, short: float) -> Finding:
-    """Tell whether the step after which the error stays within a bound is the same in a flight that ends sooner (s)."""
+    """Return whether the step after which the error stays within a bound is the same in a flight that ends sooner (s)."""
     _, error = _deviation(desk, COMMON, law)
     cut, whole = stays_within(error[: int(10.0 * short) + 1], bound), stays_within(error, bound)
     return Finding(cut == whole, f"{_count(cut)} after {short:.0f} s, {_count(whole)} in the end")

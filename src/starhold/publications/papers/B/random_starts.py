@@ -1,4 +1,5 @@
-"""Control steps are counted over random starts: for good, as the campaign has them, and at the first passage."""
+"""Counts control steps over random starts: until the error stays below a bound, as in the campaign, and to the first
+passage."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -116,8 +117,8 @@ def fewest(desk: Desk, kind: str, law: str, against: Sequence[str], orders: Sequ
 
 
 def rises(desk: Desk, law: str, orders: dict[str, int], factor: float) -> Finding:
-    """Tell whether the step from one accuracy to the next costs a law more than `factor` times what it costs the
-    others; orders: the k reached, for attitude and for rate."""
+    """Return whether the step from one accuracy to the next costs a law more than `factor` times what it costs the others;
+    orders: the k reached, for attitude and for rate."""
     cases: dict[str, bool] = {}
     notes: list[str] = []
     for kind, k in orders.items():

@@ -26,7 +26,7 @@ EXAMPLE = ((1.0, 1.5, 2.0), 0.5, 0.3, 2.0)
 
 
 def closed_loop(desk: Desk, file: str, law: str) -> Finding:
-    """Tell whether the flight of a law obeys (9), by differences of its recorded rates; the first wheel fault ends it."""
+    """Return whether the flight of a law obeys (9), by differences of its recorded rates; the first wheel fault ends it."""
     whole = {"fault": None}
     run, loop = desk.recording(file, law, whole), desk.loop(file, law, whole)
     q, rate, time = (np.asarray(run[name]) for name in ("attitude_error", "rate_error", "time"))
@@ -39,7 +39,7 @@ def closed_loop(desk: Desk, file: str, law: str) -> Finding:
 
 
 def roots_match(desk: Desk) -> Finding:
-    """Tell whether the roots (19) are the eigenvalues of (17), for random gains and moments."""
+    """Return whether the roots (19) are the eigenvalues of (17), for random gains and moments."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(TRIALS):
         ratios, stiffness, damping = _ratios(random), random.uniform(0.1, 3.0), random.uniform(0.1, 6.0)
@@ -55,19 +55,19 @@ def roots_match(desk: Desk) -> Finding:
 
 
 def first_region(desk: Desk) -> Finding:
-    """Tell whether (21) is the degree of stability in the first region of (20), where all axes oscillate."""
+    """Return whether (21) is the degree of stability in the first region of (20), where all axes oscillate."""
     return _in_region(lambda s1, s2, k: np.sqrt(8.0 * k) * 0.999, lambda s1, s2, k, w: w / (2.0 * (1.0 + s2)))
 
 
 def fourth_region(desk: Desk) -> Finding:
-    """Tell whether (22) is the degree of stability in the last region of (20), where none does."""
+    """Return whether (22) is the degree of stability in the last region of (20), where none does."""
     return _in_region(
         lambda s1, s2, k: np.sqrt(8.0 * (1.0 + s2) * k) * 1.3, lambda s1, s2, k, w: 0.5 * (w - np.sqrt(w * w - 8.0 * k))
     )
 
 
 def middle_regions(desk: Desk) -> Finding:
-    """Tell whether the degree of stability in the second and third regions is (21) or (22), the lesser of both."""
+    """Return whether the degree of stability in the second and third regions is (21) or (22), the lesser of both."""
     return _in_region(
         lambda s1, s2, k: np.sqrt(8.0 * k * (1.0 + 0.7 * s2)),
         lambda s1, s2, k, w: min(w / (2.0 * (1.0 + s2)), 0.5 * (w - np.sqrt(w * w - 8.0 * k))),
@@ -75,7 +75,7 @@ def middle_regions(desk: Desk) -> Finding:
 
 
 def curve_in_second(desk: Desk) -> Finding:
-    """Tell for which moments the curve (23) lies in the second region of (20)."""
+    """Return for which moments the curve (23) lies in the second region of (20)."""
     verdicts: dict[str, bool] = {}
     for s1, s2 in ((0.1, 0.5), (0.4, 0.5), (0.2, 0.6), (0.1, 0.9), (0.8, 0.9)):
         square = 1.0 / boundary((1.0, 1.0 + s1, 1.0 + s2))
@@ -84,7 +84,7 @@ def curve_in_second(desk: Desk) -> Finding:
 
 
 def printed_optimum(desk: Desk) -> Finding:
-    """Tell for which orders of the moments (25), taken as it is printed, gives the largest degree of stability."""
+    """Return for which orders of the moments (25), taken as it is printed, gives the largest degree of stability."""
     verdicts: dict[str, bool] = {}
     for order in permutations((1.0, 1.5, 2.0)):
         x, y, z = order
@@ -99,8 +99,8 @@ def printed_optimum(desk: Desk) -> Finding:
 
 
 def general_optimum(desk: Desk) -> Finding:
-    """Tell whether the formula of the smallest and the largest moment is the optimum in any order of the moments,
-    against a search over all gains."""
+    """Return whether the formula of the smallest and the largest moment is the optimum in any order of the moments, against
+    a search over all gains."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(25):
         ratios, alpha, omega, budget = _ratios(random), *random.uniform((0.1, 0.0, 0.5), (3.0, 1.0, 4.0)).tolist()
@@ -110,7 +110,7 @@ def general_optimum(desk: Desk) -> Finding:
 
 
 def example(desk: Desk) -> Finding:
-    """Tell whether (25) gives the optimum for moments of 1 : 1.5 : 2, an angle of 0.5, a rate of 0.3 and a budget of 2."""
+    """Return whether (25) gives the optimum for moments of 1 : 1.5 : 2, an angle of 0.5, a rate of 0.3 and a budget of 2."""
     ratios, alpha, omega, budget = EXAMPLE
     share = _share(ratios[2])
     K_w = _on_line(share, alpha, omega, budget)
@@ -120,7 +120,7 @@ def example(desk: Desk) -> Finding:
 
 
 def degree_after(desk: Desk, file: str, law: str) -> Finding:
-    """Tell whether a retuned law is proved to converge, and with which degree of stability."""
+    """Return whether a retuned law is proved to converge, and with which degree of stability."""
     issued = [one.certificate for one in desk.certificates(file, law)]
     kept = {certificate.name: certificate.claims[0].outcome == "proved" for certificate in issued}
     moments = np.diagonal(tensor(desk.scenario(file).craft.inertia))
@@ -131,7 +131,7 @@ def degree_after(desk: Desk, file: str, law: str) -> Finding:
 
 
 def within_torque(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
-    """Tell which laws demand no more of the weak wheel than it has, at every sample after the fault."""
+    """Return which laws demand no more of the weak wheel than it has, at every sample after the fault."""
     verdicts, notes = dict[str, bool](), list[str]()
     for law in laws:
         time, command = samples(desk, file, law, "wheel_command")
@@ -142,14 +142,14 @@ def within_torque(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
 
 
 def settles(desk: Desk, file: str, laws: Sequence[str]) -> Finding:
-    """Tell which laws fail to settle."""
+    """Return which laws fail to settle."""
     times = {law: desk.flight(file, law).metrics["settling_time"] for law in laws}
     note = ", ".join(f"{law} after {time:.0f} s" for law, time in times.items() if time is not None)
     return Finding({law: time is None for law, time in times.items()}, f"settles: {note}")
 
 
 def globally(desk: Desk) -> Finding:
-    """Tell whether the law's torque vanishes at the required attitude alone: it does so at every half turn, too."""
+    """Return whether the law's torque vanishes at the required attitude alone: it does so at every half turn, too."""
     random, gains = np.random.default_rng(RNG), wheel.Gains(1.0, (1.0, 1.0, 1.0))
     craft, torques = desk.loop("three-wheels", desk.scenario("three-wheels").laws[0].name).craft, []
     for axis in random.normal(size=(50, 3)):

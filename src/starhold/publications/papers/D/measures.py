@@ -1,5 +1,5 @@
-"""Measures of this publication's turns: the roots that turn fastest within limits, the fits through them, the printed turn,
-and the effects of the control period and of external torque on it. Those of its linear model stand in `placement`."""
+"""Measures of this publication's slews: the roots that slew fastest within limits, the fits through them, the printed slew,
+and the effects of the control period and of external torque on it. Those of its linear model are in `placement`."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -82,7 +82,7 @@ def in_whole_steps(desk: Desk, piece: str, step: float) -> Finding:
 
 
 def no_other_step(desk: Desk, steps: Sequence[float]) -> Finding:
-    """Tell whether no other step (s) of counted times gives all six printed numbers."""
+    """Return whether no other step (s) of counted times gives all six printed numbers."""
     printed = np.array([PUBLISHED.below, PUBLISHED.above])
     fits = {step: three_point_fit(_counted(desk, step)) for step in steps}
     giving = [step for step, f in fits.items() if (np.abs(np.array([f.below, f.above]) - printed) < 5e-4).all()]
@@ -90,7 +90,7 @@ def no_other_step(desk: Desk, steps: Sequence[float]) -> Finding:
 
 
 def off_the_printed_fit(desk: Desk, share: float) -> Finding:
-    """Tell whether the printed fit is within a share of the best roots, within the limits and with their tolerances."""
+    """Return whether the printed fit is within a share of the best roots, within the limits and with their tolerances."""
     search = searched(desk)
     hard, eased = (np.abs(PUBLISHED.errors(search.angles, roots)) for roots in (search.roots, _eased(search)))
     note = f"off by at most {100 * hard.max():.2f} %, and by {100 * eased.min():.1f} to {100 * eased.max():.1f} %"
@@ -98,7 +98,7 @@ def off_the_printed_fit(desk: Desk, share: float) -> Finding:
 
 
 def least_squares(desk: Desk) -> Finding:
-    """Tell whether the least-squares fit through all roots is nearer to them than the printed one, rms and at worst."""
+    """Return whether the least-squares fit through all roots is nearer to them than the printed one, rms and at worst."""
     search = searched(desk)
     assert search.fitted is not None
     fitted, printed = (np.abs(pieces.errors(search.angles, search.roots)) for pieces in (search.fitted, PUBLISHED))
@@ -114,7 +114,7 @@ def least_squares(desk: Desk) -> Finding:
 
 
 def which_limit(desk: Desk) -> Finding:
-    """Tell whether the acceleration decides up to 85 degrees and the rate beyond, at every angle that was searched."""
+    """Return whether the acceleration decides up to 85 degrees and the rate beyond, at every angle that was searched."""
     limits, results = _limits(desk), searched(desk).results
     decides: list[bool] = []
     for item in results:
@@ -127,7 +127,7 @@ def which_limit(desk: Desk) -> Finding:
 
 
 def inside_the_interval(desk: Desk) -> Finding:
-    """Tell whether every best root lies inside [-3, 0), with and without tolerances, and the next faster one breaks a
+    """Return whether every best root lies inside [-3, 0), with and without tolerances, and the next faster one breaks a
     limit."""
     scenario, search = desk.scenario("landing-limits"), searched(desk)
     problem, limits = problem_of(scenario, scenario.pick("published")), _limits(desk)
@@ -141,7 +141,7 @@ def inside_the_interval(desk: Desk) -> Finding:
 
 
 def printed_fit_flies(desk: Desk) -> Finding:
-    """Tell whether turns with the printed fit's roots keep the limits, and the limits with the least tolerances printed."""
+    """Return whether turns with the printed fit's roots keep the limits, and the limits with the least tolerances printed."""
     scenario, search = desk.scenario("landing-limits"), searched(desk)
     problem, hard = problem_of(scenario, scenario.pick("published")), _limits(desk)
     eased = Limits(hard.rate + math.radians(2.0), hard.acceleration + math.radians(3.0))
@@ -210,12 +210,12 @@ def turn(desk: Desk, law: str, wanted: Sequence[str], changes: Mapping[str, Any]
 
 
 def limits_kept(desk: Desk) -> Finding:
-    """Tell whether the printed turn keeps the limits without their tolerances."""
+    """Return whether the printed turn keeps the limits without their tolerances."""
     return Finding(bool(desk.flight("landing", "fit").metrics["limits_kept"]), "without tolerances")
 
 
 def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
-    """Tell whether one of the roots that round to -0.428 gives all printed peaks, digit by digit, and none of them the
+    """Return whether one of the roots that round to -0.428 gives all printed peaks, digit by digit, and none of them the
     time."""
     scenario = desk.scenario("landing", {"simulation.control_period": 0.001})
     roots = np.linspace(-0.4285, -0.4275, 101)
@@ -229,14 +229,14 @@ def one_root_for_all(desk: Desk, peaks: Sequence[str], time: str) -> Finding:
 
 
 def faster_root(desk: Desk) -> Finding:
-    """Tell whether the root searched for this very start ends the turn sooner within the limits."""
+    """Return whether the root searched for this very start ends the turn sooner within the limits."""
     ours, fit = (desk.flight("landing", law).metrics for law in ("searched", "fit"))
     note = f"a = −0.454: {ours['transient_time']:.2f} s, {ours['peak_rate'] * DEGREES:.2f} °/s"
     return Finding(bool(ours["limits_kept"] and ours["transient_time"] < fit["transient_time"] - 1.0), note)
 
 
 def scalar_root(desk: Desk, share: float) -> Finding:
-    """Tell whether the transient with b = -0.01 is within a share of that with hardly any b."""
+    """Return whether the transient with b = -0.01 is within a share of that with hardly any b."""
     time, without = (
         desk.flight("landing", "rounded", {"law.rounded.b": b}).metrics["transient_time"] for b in (-0.01, -1e-6)
     )
@@ -244,7 +244,7 @@ def scalar_root(desk: Desk, share: float) -> Finding:
 
 
 def periods(desk: Desk, seconds: Sequence[float]) -> Finding:
-    """Tell whether the printed turn keeps the limits without tolerance when its torque is held for so many seconds."""
+    """Return whether the printed turn keeps the limits without tolerance when its torque is held for so many seconds."""
     flown = {h: _held(desk, h) for h in seconds}
     note = ", ".join(
         f"{h:g} s: {seen['transient_time']:.1f} s, {seen['peak_rate'] * DEGREES:.1f} °/s"
@@ -256,7 +256,7 @@ def periods(desk: Desk, seconds: Sequence[float]) -> Finding:
 
 
 def period_of_linear_motion(desk: Desk, at_least: float) -> Finding:
-    """Tell whether the linear motion near rest is proved stable for every period up to some seconds."""
+    """Return whether the linear motion near rest is proved stable for every period up to some seconds."""
     claim = desk.claims("landing", "rounded")["sampling"]
     longest = claim.numbers["longest"]
     return Finding(
@@ -274,8 +274,8 @@ def over_periods(desk: Desk, seconds: Sequence[float]) -> Figure:
 
 
 def known_torque(desk: Desk) -> Finding:
-    """Tell whether the error that is left under the gravity gradient is less than a thousandth of the one that this
-    torque would leave if the law did not know it."""
+    """Return whether the error that is left under the gravity gradient is less than a thousandth of the one that this torque
+    would leave if the law did not know it."""
     scenario = desk.scenario("known-torque")
     inertia, orbit = tensor(scenario.craft.inertia), np.array(desk.recording("known-torque", "modal")["position"])[-1]
     # At the target the body's axes are the inertial ones.
@@ -287,7 +287,7 @@ def known_torque(desk: Desk) -> Finding:
 
 
 def unknown_torque(desk: Desk) -> Finding:
-    """Tell whether the error that an unknown torque leaves is 2 asin |J^-1 M / 2a^2|."""
+    """Return whether the error that an unknown torque leaves is 2 asin |J^-1 M / 2a^2|."""
     scenario = desk.scenario("unknown-torque")
     torque = np.array(next(part for part in scenario.parts if part.name == "constant-torque").params.torque)
     left = _left(tensor(scenario.craft.inertia), torque, _root(scenario))
@@ -304,7 +304,7 @@ def errors_under_torque(desk: Desk) -> Figure:
 
 
 def inside_the_region(desk: Desk) -> Finding:
-    """Tell whether the printed start is inside the sets that are proved, however the quaternion's sign is chosen."""
+    """Return whether the printed start is inside the sets that are proved, however the quaternion's sign is chosen."""
     run = desk.recording("landing", "rounded")
     attitude, rate = (tuple(np.array(run[name])[0].tolist()) for name in ("attitude_error", "rate_error"))
     measured = Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)

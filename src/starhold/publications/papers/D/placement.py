@@ -133,7 +133,7 @@ def closed_loop(case: Case, a: float, b: float = -0.01) -> Array:
 
 
 def model_at_the_start_of_a_step(desk: Desk) -> Finding:
-    """Tell how far A x + B u + N xi is from the derivative that (1.1) and (1.4) give at the state itself."""
+    """Return how far A x + B u + N xi is from the derivative that (1.1) and (1.4) give at the state itself."""
     worst = 0.0
     for case, _ in cases():
         (a, b), u = case.model(), 50.0 * case.rate
@@ -145,7 +145,7 @@ def model_at_the_start_of_a_step(desk: Desk) -> Finding:
 
 
 def gyroscopic_sign(desk: Desk) -> Finding:
-    """Tell which sign of w x J w, counted among the torques, makes the motion (1.1) under (3.2) that of (5.2)."""
+    """Return which sign of w x J w, counted among the torques, makes the motion (1.1) under (3.2) that of (5.2)."""
     worst = {"−ω × Jω, as (1.1) wants it": 0.0, "ω × Jω, as printed": 0.0}
     for case, spectra in cases():
         gyroscopic = np.cross(case.rate, case.inertia @ case.rate)
@@ -167,13 +167,13 @@ def controllable(desk: Desk) -> Finding:
 
 
 def unstable_by_itself(desk: Desk) -> Finding:
-    """Tell whether A has an eigenvalue on the right for some bodies and torques."""
+    """Return whether A has an eigenvalue on the right for some bodies and torques."""
     right = sum(float(np.linalg.eigvals(case.model()[0]).real.max()) > 1e-6 for case, _ in cases())
     return Finding(right > 0, f"{right} of {TRIALS} random states")
 
 
 def pseudo_inverse_formulas(desk: Desk) -> Finding:
-    """Tell whether (B'B)^-1 B', B'(BB')^-1 and B^-1 are the pseudo-inverse, which a singular-value decomposition gives."""
+    """Return whether (B'B)^-1 B', B'(BB')^-1 and B^-1 are the pseudo-inverse, which a singular-value decomposition gives."""
     random, worst = np.random.default_rng(RNG), 0.0
     for _ in range(TRIALS):
         tall, square = random.normal(size=(7, 3)), random.normal(size=(3, 3))
@@ -187,7 +187,7 @@ def pseudo_inverse_formulas(desk: Desk) -> Finding:
 
 
 def printed_levels(desk: Desk) -> Finding:
-    """Tell whether the matrices printed for the levels follow from the annihilators [E 0] and [1 0 0 0]."""
+    """Return whether the matrices printed for the levels follow from the annihilators [E 0] and [1 0 0 0]."""
     worst = 0.0
     for case, _ in cases():
         (a, b), jd, w = case.model(), case.straighten, case.rate
@@ -206,13 +206,13 @@ def printed_levels(desk: Desk) -> Finding:
 
 
 def classical_algorithm(desk: Desk) -> Finding:
-    """Tell whether the last level has more inputs than states, so that its B has no full column rank."""
+    """Return whether the last level has more inputs than states, so that its B has no full column rank."""
     sizes = [levels(*case.model())[-1] for case, _ in cases()]
     return Finding(all(size == 1 for size in sizes), "one pole for three inputs")
 
 
 def inverse_of_the_skeleton(desk: Desk) -> Finding:
-    """Tell whether (4.7) is the pseudo-inverse of T_2, and (4.8) an inverse that breaks the one rule it may."""
+    """Return whether (4.7) is the pseudo-inverse of T_2, and (4.8) an inverse that breaks the one rule it may."""
     kept = {"(4.7) is the pseudo-inverse": True, "(4.8) keeps (4.5) and all of (4.2) but one symmetry": True}
     for case, _ in cases():
         jd, w = case.straighten, case.rate[:, None]
@@ -233,8 +233,8 @@ def inverse_of_the_skeleton(desk: Desk) -> Finding:
 
 
 def placed_poles(desk: Desk, level: int) -> Finding:
-    """Tell how far the poles that the printed regulator of a level gives are from the spectra of that level and those below
-    it: the error of the characteristic polynomial's partial fractions, of 512 binary digits."""
+    """Return how far the poles that the printed regulator of a level gives are from the spectra of that level and those
+    below it: the error of the characteristic polynomial's partial fractions, of 512 binary digits."""
     worst = 0.0
     for case, spectra in cases():
         a, b = case.model()
@@ -248,7 +248,7 @@ def placed_poles(desk: Desk, level: int) -> Finding:
 
 
 def general_placement(desk: Desk) -> Finding:
-    """Tell how far (4.11) is from the gain that the general algorithm computes from numbers alone, with (4.8) given."""
+    """Return how far (4.11) is from the gain that the general algorithm computes from numbers alone, with (4.8) given."""
     worst = 0.0
     for case, spectra in cases():
         turned = case.straighten @ case.rate[:, None]
@@ -259,7 +259,7 @@ def general_placement(desk: Desk) -> Finding:
 
 
 def single_root(desk: Desk) -> Finding:
-    """Tell how far (5.1) is from (4.11) with the spectra that section 5 chooses."""
+    """Return how far (5.1) is from (4.11) with the spectra that section 5 chooses."""
     worst = 0.0
     for case, spectra in cases():
         a = spectra.phi_2
@@ -269,7 +269,7 @@ def single_root(desk: Desk) -> Finding:
 
 
 def loop_of_the_law(desk: Desk) -> Finding:
-    """Tell how far the motion under the law that flies here, and under (3.2) with (5.1), is from (5.2)."""
+    """Return how far the motion under the law that flies here, and under (3.2) with (5.1), is from (5.2)."""
     worst = {"(3.2) with (5.1)": 0.0, "the law `modal`": 0.0}
     for case, spectra in cases():
         a, craft = spectra.phi_2, make_craft(case.inertia)
@@ -285,7 +285,7 @@ def loop_of_the_law(desk: Desk) -> Finding:
 
 
 def stable_sign(desk: Desk) -> Finding:
-    """Tell whether A - B K with (5.1) is stable at each state for a < 0, and not for a > 0."""
+    """Return whether A - B K with (5.1) is stable at each state for a < 0, and not for a > 0."""
     stable: dict[float, list[bool]] = {-0.428: [], 0.428: []}
     for case, _ in cases():
         for a, verdicts in stable.items():
@@ -294,7 +294,7 @@ def stable_sign(desk: Desk) -> Finding:
 
 
 def at_rest(desk: Desk) -> Finding:
-    """Tell whether the law's torque tends to -2 a^2 J q as the rate vanishes, where the poles cannot be placed."""
+    """Return whether the law's torque tends to -2 a^2 J q as the rate vanishes, where the poles cannot be placed."""
     worst, a = 0.0, -0.428
     for case, _ in cases():
         crept = np.linalg.norm(case.rate)

@@ -1,4 +1,4 @@
-"""Section 2 is measured: the example (2.2), and an example of each theorem."""
+"""Measures of section 2: the example (2.2), and an example of each theorem."""
 
 import math
 from collections.abc import Sequence
@@ -72,7 +72,7 @@ def certificate(desk: Desk, problem: str) -> tuple[InvariantProblem, Certificate
 
 
 def theorem(desk: Desk, problem: str, claim: int = 0) -> Finding:
-    """Tell whether a claim of a built-in problem is proved."""
+    """Return whether a claim of a built-in problem is proved."""
     read, made = certificate(desk, problem)
     proved = made.claims[claim]
     level = proved.numbers.get("level")
@@ -81,7 +81,7 @@ def theorem(desk: Desk, problem: str, claim: int = 0) -> Finding:
 
 
 def largest_level(desk: Desk, problem: str) -> Finding:
-    """Tell whether a level of V is certified, and one at most 1 % above it refuted."""
+    """Return whether a level of V is certified, and one at most 1 % above it refuted."""
     _, made = certificate(desk, problem)
     proved = made.claims[0]
     level, beyond = proved.numbers["level"], proved.numbers["refuted_level"]
@@ -90,20 +90,20 @@ def largest_level(desk: Desk, problem: str) -> Finding:
 
 
 def only_equilibrium(desk: Desk) -> Finding:
-    """Tell whether rates vanish nowhere but at the origin: x' = y leaves the line y = 0 alone."""
+    """Return whether rates vanish nowhere but at the origin: x' = y leaves the line y = 0 alone."""
     places = np.concatenate([-np.geomspace(1e-6, 1e3, 200), np.geomspace(1e-6, 1e3, 200)])
     others = all(rates(float(x), 0.0)[1] != 0.0 for x in places)
     return Finding(others and rates(0.0, 0.0) == (0.0, 0.0), "x' = y vanishes on y = 0 only, where y' = -2x")
 
 
 def all_come(desk: Desk, count: int) -> Finding:
-    """Tell whether motions from all over the window of figure 1 end at the origin."""
+    """Return whether motions from all over the window of figure 1 end at the origin."""
     ends = [float(np.linalg.norm(flown(start, 25.0)[1][:, -1])) for start in draws(count)]
     return Finding(max(ends) < 1e-6, f"{count} motions are within {max(ends):.0e} after 25 units of time")
 
 
 def where_from(desk: Desk, count: int) -> Finding:
-    """Tell whether motions come from the origin where they are bounded, and from far away elsewhere."""
+    """Return whether motions come from the origin where they are bounded, and from far away elsewhere."""
     bounded, others = [], []
     for start in draws(count, 2):
         _, states = flown(start, -30.0, 1e-5, 1e3)
@@ -113,7 +113,7 @@ def where_from(desk: Desk, count: int) -> Finding:
 
 
 def loops_kept(desk: Desk, count: int) -> Finding:
-    """Tell whether motions of G keep their c, and thus stay in G."""
+    """Return whether motions of G keep their c, and thus stay in G."""
     drift: list[float] = []
     for start in draws(count, 3):
         if phi(*start) < 0.0:
@@ -124,7 +124,7 @@ def loops_kept(desk: Desk, count: int) -> Finding:
 
 
 def border(desk: Desk) -> Finding:
-    """Tell whether the motion through (2, 0) runs along the zero line of the printed function, from the origin to it."""
+    """Return whether the motion through (2, 0) runs along the zero line of the printed function, from the origin to it."""
     ahead = flown((2.0, 0.0), 20.0)[1]
     back = flown((2.0, 0.0), -10.0, 1e-3)[1]
     off = max(float(np.abs(phi(*states)).max()) for states in (ahead, back))
@@ -133,7 +133,7 @@ def border(desk: Desk) -> Finding:
 
 
 def slopes(desk: Desk) -> Finding:
-    """Tell whether the printed function falls below the axis outside of G and is constant above, as exact identities."""
+    """Return whether the printed function falls below the axis outside of G and is constant above, as exact identities."""
     x, y = Polynomial.variable("x"), Polynomial.variable("y")
     below, above = (2 * x + y) * (2 * x + y) - 8 * (x + y), (x - 1) * (x - 1) + y * y - 1
 
@@ -145,7 +145,7 @@ def slopes(desk: Desk) -> Finding:
 
 
 def printed_halves(desk: Desk) -> Finding:
-    """Tell whether the printed function, zero within G, is an indicator: it would have to be continuous."""
+    """Return whether the printed function, zero within G, is an indicator: it would have to be continuous."""
     read = load("switching")
     x, y = (cast(Any, Polynomial.variable(name)) for name in read.system.names)
     below, above = (2 * x + y) * (2 * x + y) - 8 * (x + y), x * x + y * y - 2 * x
@@ -157,7 +157,7 @@ def printed_halves(desk: Desk) -> Finding:
 
 
 def strict_subsets(desk: Desk, inner: float, wider: float) -> Finding:
-    """Tell whether {c <= inner} is stable, and whether it does not attract, by the motion on a wider loop that starts next
+    """Return whether {c <= inner} is stable, and whether it does not attract, by the motion on a wider loop that starts next
     to it."""
     angle = 1e-3
     start = (wider * (1.0 - np.cos(angle)), wider * np.sin(angle))
@@ -173,7 +173,7 @@ def strict_subsets(desk: Desk, inner: float, wider: float) -> Finding:
 
 
 def definition(desk: Desk, near: float) -> Finding:
-    """Tell whether the origin counts as unstable: by excursions from ever nearer starts, as Lyapunov has it, and by the
+    """Return whether the origin counts as unstable: by excursions from ever nearer starts, as Lyapunov has it, and by the
     motion after some time that all starts share, as definition 1 has it."""
     excursion: list[float] = []
     late: list[float] = []

@@ -1,4 +1,4 @@
-"""Section 3 is measured: the linear model, rest and the circle beside L2 as they are flown."""
+"""Measures of section 3: the linear model, and flights of the equilibrium and the circle beside L2."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -46,7 +46,7 @@ def stiffness(desk: Desk) -> Finding:
 
 
 def roots(desk: Desk) -> Finding:
-    """Tell whether the characteristic polynomial has one positive, one negative and two imaginary roots."""
+    """Return whether the characteristic polynomial has one positive, one negative and two imaginary roots."""
     whole = matrix(plant_of(desk))
     flat = [0, 1, 3, 4]
     eigenvalues = {"in the plane X, Y": np.linalg.eigvals(whole[np.ix_(flat, flat)]), "with Z": np.linalg.eigvals(whole)}
@@ -61,7 +61,7 @@ def roots(desk: Desk) -> Finding:
 
 
 def feed_forward(desk: Desk, C: float) -> Finding:
-    """Tell whether rest beside Y and Z takes (C - Omega^2) rho and C rho."""
+    """Return whether rest beside Y and Z takes (C - Omega^2) rho and C rho."""
     plant, demands = plant_of(desk, C), {}
     for name in ("beside Y", "beside Z"):
         entry = desk.scenario(REST).pick(name)
@@ -77,7 +77,7 @@ def feed_forward(desk: Desk, C: float) -> Finding:
 
 
 def degree(desk: Desk) -> Finding:
-    """Tell whether each axis has a double root, and another damping gives a lesser degree of stability."""
+    """Return whether each axis has a double root, and another damping gives a lesser degree of stability."""
     entry, plant = desk.scenario(REST).pick("beside Y"), plant_of(desk)
 
     def slowest(gains: Any) -> list[float]:
@@ -98,7 +98,7 @@ def _unit(desk: Desk) -> dict[str, Any]:
 
 
 def saddles(desk: Desk) -> Finding:
-    """Tell whether the unit form rests at x = -1 and 1, each with one positive and one negative root, and whether the law
+    """Return whether the unit form rests at x = -1 and 1, each with one positive and one negative root, and whether the law
     has this form."""
     plant, gains = plant_of(desk), desk.scenario(REST).pick("beside Y").gains
     steep = plant.rate**2 + 2.0 * plant.stiffness
@@ -158,7 +158,7 @@ def figure_4(desk: Desk) -> Figure:
 
 
 def falls(desk: Desk) -> Finding:
-    """Tell whether V' under (3.7) is -k (f2^2 + f3^2), from the law's equations and in symbols throughout."""
+    """Return whether V' under (3.7) is -k (f2^2 + f3^2), from the law's equations and in symbols throughout."""
     import sympy
 
     x, y, z, a, b, c = sympy.symbols("x y z a b c", real=True)
@@ -174,14 +174,14 @@ def falls(desk: Desk) -> Finding:
 
 
 def indicator(desk: Desk) -> Finding:
-    """Tell whether the law's certificate proves that the circle attracts, and up to which level of V."""
+    """Return whether the law's certificate proves that the circle attracts, and up to which level of V."""
     circle = desk.claims("l2-circle", "smooth")["circle"]
     note = f"{circle.outcome} up to V = {circle.numbers['level']:.7g}; on the axis, where V = 0.5, V' is zero too"
     return Finding(circle.outcome == "proved", note)
 
 
 def relay(desk: Desk) -> Finding:
-    """Tell whether the relay brings the craft to the circle, with a layer in which it is proportional and without."""
+    """Return whether the relay brings the craft to the circle, with a layer in which it is proportional and without."""
     laws = {"with a layer": "relay with layer", "without one": "relay"}
     off = {name: _off(desk.flight("l2-circle", law)) for name, law in laws.items()}
     outcome = desk.claims("l2-circle", "relay")["circle"].outcome
@@ -190,8 +190,8 @@ def relay(desk: Desk) -> Finding:
 
 
 def steepest(desk: Desk) -> Finding:
-    """Tell whether the control that makes V' least brings the craft to the circle: of (3.5), and of a V with a pull towards
-    it."""
+    """Return whether the control that makes V' least brings the craft to the circle: of (3.5), and of a V with a pull
+    towards it."""
     changes = {"V with a pull towards the circle": None, "V of (3.5)": {"law.l2-optimal.pull": 1e-9}}
     off = {name: _off(desk.flight("l2-circle", "l2-optimal", change)) for name, change in changes.items()}
     note = "off by " + " and ".join(f"{value:.3f}" for value in off.values()) + " radii after two years"
@@ -199,7 +199,7 @@ def steepest(desk: Desk) -> Finding:
 
 
 def at_the_axis(desk: Desk, C: float) -> Finding:
-    """Tell whether the nominal control is largest where y = 0, for every rate, and whether its peak follows the formula."""
+    """Return whether the nominal control is largest where y = 0, for every rate, and whether its peak follows the formula."""
     plant = plant_of(desk, C)
     right: list[bool] = []
     for rate in (0.5, 1.0, best_rate(plant), 2.0, 3.0):
@@ -210,7 +210,7 @@ def at_the_axis(desk: Desk, C: float) -> Finding:
 
 
 def extremes(desk: Desk, C: float) -> Finding:
-    """Tell whether the peak demand has a local maximum at rate 0 and its minimum at sqrt(C - 2 Omega^2)."""
+    """Return whether the peak demand has a local maximum at rate 0 and its minimum at sqrt(C - 2 Omega^2)."""
     from scipy.optimize import minimize_scalar
 
     plant = plant_of(desk, C)
@@ -235,7 +235,7 @@ def factor(desk: Desk, C: float) -> Finding:
 
 
 def holds_with(desk: Desk, law: str) -> Finding:
-    """Tell whether a law of `l2-deficit` keeps the circle to a hundredth of its radius."""
+    """Return whether a law of `l2-deficit` keeps the circle to a hundredth of its radius."""
     flight = desk.flight(DEFICIT, law)
     if flight.lost is not None:
         return Finding(False, f"lost after {flight.lost / 86400.0:.0f} days")
@@ -243,14 +243,14 @@ def holds_with(desk: Desk, law: str) -> Finding:
 
 
 def coriolis_share(desk: Desk, C: float, least: float) -> Finding:
-    """Tell whether the Coriolis acceleration is more than a share of the peak demand."""
+    """Return whether the Coriolis acceleration is more than a share of the peak demand."""
     plant = plant_of(desk, C)
     share = 2.0 * best_rate(plant) / demand(best_rate(plant), plant)
     return Finding(share > least, f"{100.0 * share:.0f} % of the norm where it is largest")
 
 
 def farthest(desk: Desk) -> Finding:
-    """Tell whether the craft comes back to the circle from x near the largest that comes back, towards and away from the
+    """Return whether the craft comes back to the circle from x near the largest that comes back, towards and away from the
     Sun."""
     dark, sun = (side * largest(lambda x, s=side: _from(desk, s * x).lost is None, 1.0) for side in (1.0, -1.0))
     off = max(_off(_from(desk, 0.99 * x)) for x in (dark, sun))
@@ -259,7 +259,7 @@ def farthest(desk: Desk) -> Finding:
 
 
 def _off(flight: Any) -> float:
-    """By how many radii a flight is off the circle."""
+    """Return the distance of a flight from the circle, in radii."""
     return flight.metrics["deviation"] / EARTH_DIAMETER
 
 
@@ -268,7 +268,7 @@ def _from(desk: Desk, x: float) -> Any:
 
 
 def deficit(desk: Desk, law: str, tells: str) -> Finding:
-    """Tell whether under a deficit x is not zero ("x"), the path is not the circle ("circle"), or the control meets its
+    """Return whether under a deficit x is not zero ("x"), the path is not the circle ("circle"), or the control meets its
     limit again and again ("limit")."""
     flight = desk.flight(DEFICIT, law)
     position, control = flight.recording["position"], flight.recording["command"]
@@ -295,13 +295,13 @@ def lag_hours(desk: Desk, lag: float) -> Finding:
 
 
 def settles(desk: Desk, lag_h: float, days: float, left: float) -> Finding:
-    """Tell whether a first-order lag leaves less than a share of a step after so many days."""
+    """Return whether a first-order lag leaves less than a share of a step after so many days."""
     remains = math.exp(-days * 24.0 / lag_h)
     return Finding(remains < left, f"after {days:g} days {100.0 * remains:.0f} % of a turn remains")
 
 
 def alike(desk: Desk, lags: Sequence[float]) -> Finding:
-    """Tell for which lags figures 6 and 7 look as without: whether nowhere the lines are two widths apart."""
+    """Return for which lags figures 6 and 7 look as without: whether nowhere the lines are two widths apart."""
     notes: list[str] = []
     cases: dict[str, bool] = {}
     for lag in lags:

@@ -1,4 +1,4 @@
-"""Sections 3.1 and 3.4 are measured: where the Sun is seen from, and how its light gives the control."""
+"""Measures of sections 3.1 and 3.4: from where the Sun is seen, and how its light gives the control."""
 
 import math
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ def angles(desk: Desk) -> Finding:
 
 
 def same_angle(desk: Desk) -> Finding:
-    """Tell how nearly both discs look equal."""
+    """Return how nearly both discs look equal."""
     sun, earth = discs()
     share = earth / sun
     ring = 100.0 * station().light(0.0)
@@ -58,7 +58,7 @@ def clear_offset(desk: Desk) -> Finding:
 
 
 def lit_share(desk: Desk, count: int) -> Finding:
-    """Tell whether the formula for equal discs is the share of points of one disc that the other leaves free."""
+    """Return whether the formula for equal discs is the share of points of one disc that the other leaves free."""
     side = (np.arange(count) + 0.5) / count * 2.0 - 1.0
     x, y = np.meshgrid(side, side)
     inside = x * x + y * y < 1.0
@@ -70,8 +70,8 @@ def lit_share(desk: Desk, count: int) -> Finding:
 
 
 def mirror_force(desk: Desk) -> Finding:
-    """Tell whether the push on a mirror is p S cos g (1 + cos 2g)/cos g along its normal, 2 p S cos^2 g, by the momentum of
-    the light that turns."""
+    """Return whether the push on a mirror is p S cos g (1 + cos 2g)/cos g along its normal, 2 p S cos^2 g, by the momentum
+    of the light that turns."""
     sail, off = sails.make_sail(4.5e-6, 150.0, 300.0), 0.0
     for cone in np.linspace(0.0, 1.5, 31):
         setting = sails.Setting(sail.area, float(cone), 0.7)
@@ -87,7 +87,7 @@ def mirror_force(desk: Desk) -> Finding:
 
 
 def ball(desk: Desk) -> Finding:
-    """Tell whether a ball of controls is within reach: every vector of its border is given by area and two angles."""
+    """Return whether a ball of controls is within reach: every vector of its border is given by area and two angles."""
     sail = sails.make_sail(4.5e-6, 150.0, 300.0)
     reach, off, most = sails.reach(sail), 0.0, 0.0
     for lean in np.linspace(0.0, np.pi, 25):
@@ -103,7 +103,7 @@ def ball(desk: Desk) -> Finding:
 
 
 def shifted(desk: Desk) -> Finding:
-    """Tell whether the linear model stays as it is under a steady push, about a place nearer to the Sun."""
+    """Return whether the linear model stays as it is under a steady push, about a place nearer to the Sun."""
     plant, push = station().plant, 2.3
     back = push / (plant.rate**2 + 2.0 * plant.stiffness)
     draw = np.random.default_rng(5)
@@ -117,7 +117,7 @@ def shifted(desk: Desk) -> Finding:
 
 
 def area(desk: Desk, low: float, high: float, pressure: float) -> Finding:
-    """Tell for which reflectivities the area per mass lies between two numbers (m2/kg), at a pressure (N/m2)."""
+    """Return for which reflectivities the area per mass lies between two numbers (m2/kg), at a pressure (N/m2)."""
     here = station()
 
     def least(mirror: float) -> float:
@@ -132,7 +132,7 @@ def area(desk: Desk, low: float, high: float, pressure: float) -> Finding:
 
 
 def solar_cells(desk: Desk, efficiency: float, most: float) -> Finding:
-    """Tell whether solar cells as large as the sail suit a craft of at most so much power per mass (W/kg)."""
+    """Return whether solar cells as large as the sail suit a craft of at most so much power per mass (W/kg)."""
     flux = pressure_at(station().plant.from_larger * EARTH_DIAMETER) * 299_792_458.0
     power = station().area_per_mass() * flux * efficiency
     return Finding(
@@ -199,7 +199,7 @@ def fly_sail(desk: Desk, margin: float, lag_h: float, years: float) -> dict[str,
 
 
 def sail_keeps(desk: Desk, margin: float, lags_h: Sequence[float], years: float) -> Finding:
-    """Tell whether the circle is kept to a hundredth of its radius by a mirror whose angles lag."""
+    """Return whether the circle is kept to a hundredth of its radius by a mirror whose angles lag."""
     off: dict[str, float] = {}
     for lag in lags_h:
         position = fly_sail(desk, margin, lag, years)["position"]

@@ -1,4 +1,4 @@
-"""Scenarios of a craft that keeps its station near a libration point, known by their [libration] table."""
+"""Scenarios of a craft that keeps its station near a libration point, recognized by their [libration] table."""
 
 from __future__ import annotations
 
@@ -84,11 +84,11 @@ class LibrationPoint(Body):
         if away >= loop.divergence_bound:
             allowed = f"less than lost_beyond, {loop.divergence_bound:.6g}"
             raise InputError(scenario.where, "initial.position", f"a start {away:.6g} away", allowed)
-        # A law may ask for all the control there is.
+        # A law may need all the control available.
         measurement = PointMeasurement(loop.start.position, loop.start.velocity, loop.period, entry.options.limit)
         command, _ = loop.law.command(measurement, entry.gains, loop.known, loop.carry().memory)
         if not is_finite(dot(command, command)):
-            allowed = "a limit, margin or deficit: this law takes as much control as there is"
+            allowed = "a limit, margin or deficit: this law uses all the control available"
             raise InputError(scenario.where, f"law {entry.name}", "no limit of the control", allowed)
 
 
@@ -105,7 +105,7 @@ def _limit(scenario: Scenario, law_table: PointLawTable, gains: Any, key: str) -
     ((word, share),) = said.items()
     goal = goal_of(gains)
     if not isinstance(goal, CircleGoal):
-        raise InputError(where, f"{key}.{word}", show(share), "limit, for a law without a circle has no peak demand")
+        raise InputError(where, f"{key}.{word}", show(share), "limit, because a law without a circle has no peak demand")
     return peak_demand(scenario.craft, goal.rate) * goal.radius * (1.0 + share if word == "margin" else 1.0 - share)
 
 

@@ -23,7 +23,7 @@ def _known_pair(value: Any) -> Any:
 
 
 class LibrationTable(Table):
-    """The libration point, its two bodies, the model of the motion, and the unit of length. Two bodies of one's own replace
+    """The libration point, its two bodies, the model of the motion, and the unit of length. Two custom bodies replace
     `primaries`."""
 
     primaries: Annotated[
@@ -55,7 +55,7 @@ class LibrationTable(Table):
         return self
 
     def _check_own(self) -> None:
-        """Raise an error for two given bodies that cannot be."""
+        """Raise an error for two given bodies that are impossible."""
         pair = self.pair
         check_gravity("larger", pair.larger)
         check_gravity("smaller", pair.smaller)
@@ -77,7 +77,7 @@ class LibrationTable(Table):
 
     @property
     def units(self) -> Units:
-        """The worth of scaled numbers."""
+        """The physical units of scaled numbers."""
         return self.pair.units(self.length_unit)
 
     @property
@@ -126,9 +126,7 @@ class PointInitial(Table):
 
     relative_to: Annotated[
         Literal["point", "target"],
-        Field(
-            description="what position and velocity count from; target: the law's circle at a phase, or its place of rest"
-        ),
+        Field(description="origin of position and velocity; target: the law's circle at a phase, or its equilibrium"),
     ] = "point"
     phase: Annotated[float, *quantity(Gain("rad", text="place on the circle, from Y towards Z"))] = 0.0
     position: Annotated[Any, *scaled("length", Gain("m", shape=(3,), spread=False, text="position"))] = (0.0, 0.0, 0.0)
@@ -145,13 +143,13 @@ class PointTiming(Timing):
         float | None,
         *scaled(
             "length",
-            Gain("m", above=0.0, text="distance beyond which the motion has diverged; 0.4 of the nearer body's if absent"),
+            Gain("m", above=0.0, text="divergence bound on the distance; 0.4 of the nearer body's if absent"),
         ),
     ] = None
 
 
 class Near(Table):
-    """When the circle or the place of rest counts as reached."""
+    """When the circle or the equilibrium counts as reached."""
 
     tolerance: Annotated[float, *scaled("length", Gain("m", above=0.0, text="distance from it"))] = 0.05
 

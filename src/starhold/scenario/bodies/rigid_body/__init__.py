@@ -1,4 +1,4 @@
-"""Scenarios of a rigid body that turns, known by their [spacecraft] table."""
+"""Scenarios of a rotating rigid body, recognized by their [spacecraft] table."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Options(NamedTuple):
 
 
 class RigidBody(Dials):
-    """A spacecraft that turns, with or without wheels."""
+    """A rotating spacecraft, with or without wheels."""
 
     name = "rigid-body"
     marker = "spacecraft"

@@ -1,5 +1,5 @@
-"""From the tables of a spacecraft to the numbers that laws act on, its effectors, and the parts that [wheels], [sensor],
-[environment] and other tables stand for in place of [[part]]."""
+"""Turns the tables of a spacecraft into the numbers that laws use, its effectors, and the parts for which [wheels],
+[sensor], [environment] and other tables are short forms of [[part]]."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ NONE: dict[str, Any] = {
 
 
 def written_out(scenario: Scenario, target: Fitted, effectors: tuple[Fitted, ...]) -> tuple[Fitted, ...]:
-    """The parts of the scenario in the order in which they act: its target and its effectors, those that its other short
-    forms stand for, and those of [[part]] tables."""
+    """Return the parts of the scenario in the order in which they act: its target and its effectors, those of its other
+    short forms, and those of [[part]] tables."""
     table = scenario.table
     around, noise, body = table.environment, table.sensor, table.spacecraft
     lag, rate_limit = body.actuator_lag, body.torque_rate_limit
@@ -61,7 +61,7 @@ def _where(there: bool, role: str, name: str, *numbers: float) -> tuple[Fitted, 
 
 
 def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
-    """The effectors of the tables: their reaction wheels, if any. ValueError says what is missing or cannot be."""
+    """Return the effectors of the tables: their reaction wheels, if any. ValueError says what is missing or impossible."""
     if table.wheels is None and not table.wheel:
         return ()
     axes, columns, momenta = rotors_in(table)
@@ -76,7 +76,7 @@ def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
 
 
 def rotors_in(table: RigidBodyTable) -> tuple[list[Any], dict[str, list[Any]], list[Any]]:
-    """The axes of the wheels of tables, their numbers by name, and their momenta (N m s), of each wheel in order. ValueError
+    """Return the axes of the wheels of tables, their numbers by name, and their momenta (N m s), wheel by wheel. ValueError
     says what is missing."""
     shared, single = table.wheels or WheelsTable(), table.wheel
     axes = [wheel.axis for wheel in single] or list(LAYOUTS[shared.layout or ""]())
@@ -94,7 +94,7 @@ def _given(name: str, table: Rotor, shared: Rotor) -> Any:
 
 
 def _number(name: str, table: Rotor, shared: Rotor, place: int) -> Any:
-    """A number of a wheel: its own, its unit's, what all share, or their unit's."""
+    """Return a number of a wheel: its own, its unit's, the shared one, or that of the shared unit."""
     for given in (table, shared):
         value: Any = getattr(given, name)
         if value is not None:
@@ -121,19 +121,19 @@ class Made(NamedTuple):
 
 
 def make(table: RigidBodyTable, where: str) -> Made:
-    """The spacecraft of these tables. InputError where it cannot be."""
+    """Return the spacecraft of these tables. InputError where it is impossible."""
     with input_at(where, "wheel" if table.wheels or table.wheel else "spacecraft"):
         effectors = effectors_in(table)
         return Made(_craft(table, effectors, table.spacecraft.inertia), effectors)
 
 
 def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
-    """The effectors of a scenario's tables, which share a torque out as laws suppose them to be.
-
-    Beside what its role asks for, each has `sure_torque(params, kind)`, the torque (N m) that it surely gives, in norm or
-    about each axis at once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`,
-    what of the body's inertia (3, 3; kg m2) is that of rotors about their axes; and `shared_as(params, known)`, its numbers
-    with a torque shared out as among those that laws know."""
+    """Return the effectors of a scenario's tables, which allocate a torque by the law's model of them. Beside the functions
+    of its role, each has `sure_torque(params, kind)`, the torque (N m) that it can always give, in norm or about each axis
+    at once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`, the part of the
+    body's inertia (3, 3; kg m2) due to rotors about their axes; and `shared_as(params, known)`, its numbers with the
+    allocation among those that laws know.
+    """
     made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
     if made is supposed or len(made) != len(supposed):
         return made
@@ -144,12 +144,13 @@ def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
 
 
 def wheels_of(scenario: Scenario) -> Wheels | None:
-    """The reaction wheels of a scenario's tables; None for a craft without."""
+    """Return the reaction wheels of a scenario's tables, or None."""
     return next((fitted.params for fitted in effectors_of(scenario) if fitted.part.name == "wheels"), None)
 
 
 def craft_with(scenario: Scenario, inertia: Any) -> Craft:
-    """The scenario's craft with another inertia (3, 3; kg m2), its wheels included; ValueError where it cannot be."""
+    """Return the scenario's craft with another inertia (3, 3; kg m2), including its wheels; ValueError where it is
+    impossible."""
     return _craft(scenario.table, effectors_of(scenario), inertia)
 
 
@@ -163,20 +164,20 @@ def _craft(table: RigidBodyTable, effectors: tuple[Fitted, ...], inertia: Any) -
 
 
 def axial_inertia(effectors: tuple[Fitted, ...]) -> Any:
-    """Return the share of the body's inertia (3, 3; kg m2) that is of the effectors' rotors about their own axes."""
+    """Return the part of the body's inertia (3, 3; kg m2) due to the effectors' rotors about their own axes."""
     return np.sum([fitted.part.module.axial_inertia(fitted.params) for fitted in effectors], axis=0)
 
 
 def torque_limit(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
-    """The torque that a law may reckon with (N m): the limit of [spacecraft], or, where that is less, the torque that the
-    effectors among these parts surely give by the same measure."""
+    """Return the torque on which a law may rely (N m): the limit of [spacecraft] or, where that is less, the torque that the
+    effectors among these parts can always give, by the same measure."""
     craft, least = table.spacecraft, sure_torque(table, parts)
     return least if craft.limit == "none" and least < math.inf else min(craft.torque_limit, least)
 
 
 def sure_torque(table: RigidBodyTable, parts: Iterable[Fitted]) -> float:
-    """The torque that the effectors among these parts surely give (N m), in norm where the limit of [spacecraft] is one of
-    it, else about each axis at once; infinite without any that tells."""
+    """Return the torque that the effectors among these parts can always give (N m), in norm if the limit of [spacecraft] is
+    a norm, else about each axis at once; infinite if none has such a limit."""
     kind = "norm" if table.spacecraft.limit == "norm" else "axis"
     telling = ((fitted.part.hook("sure_torque"), fitted.params) for fitted in parts)
     return min((tell(params, kind) for tell, params in telling if tell is not None), default=math.inf)

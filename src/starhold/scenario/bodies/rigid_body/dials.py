@@ -1,5 +1,4 @@
-"""The inertia, limit and start of a spacecraft can be moved while its loop stays the same program; here are their
-equations."""
+"""Equations of the inertia, limit and start of a spacecraft, which can be moved while its loop stays the same program."""
 
 from __future__ import annotations
 
@@ -32,12 +31,12 @@ if TYPE_CHECKING:
 Array: TypeAlias = NDArray[np.float64]
 
 KNOWN, TRUE = "spacecraft.inertia", "fault[1].inertia"
-"""The inertia that the laws know, and the one that the craft has where they do not know it."""
+"""The inertia that the laws know, and the craft's own where they do not know it."""
 LIMIT, ATTITUDE, RATE = "spacecraft.torque_limit", "initial.attitude", "initial.rate"
 ANGLES = "initial.angles"
-"""No key that may be moved, for sines are no operation: `moved` takes the quaternion of the angles."""
+"""Not a key that may be moved, because there is no sine operation: `moved` takes the quaternion of the angles."""
 ROTORS = "wheels"
-"""Neither: `moved` takes the wheels that the keys of their tables give."""
+"""Not a key either: `moved` takes the wheels that the keys of their tables give."""
 
 
 class Dials(Body):
@@ -46,9 +45,9 @@ class Dials(Body):
     linked = MappingProxyType({TRUE: KNOWN})
 
     def dials(self, scenario: Scenario) -> dict[str, Any]:
-        """The keys that may be moved, with their numbers; an attitude given by angles comes as a quaternion, and a limit
-        that is infinite not at all. With faults nothing may, nor where laws suppose another craft: what that changes is not
-        told by equations."""
+        """Return the keys that may be moved, with their numbers; an attitude given by angles becomes a quaternion, and an
+        infinite limit is left out. With faults or a nominal model nothing may be moved, because no equations give their
+        effects."""
         table = scenario.table
         if table.fault or table.nominal:
             return {}
@@ -60,8 +59,8 @@ class Dials(Body):
         return dials | {ATTITUDE: tuple(map(float, attitude)), RATE: tuple(map(float, table.initial.rate))}
 
     def changes(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The changes of a file that give keys these values: an inertia that the laws do not know is that of a fault at the
-        start, on which nobody acts."""
+        """Return the changes of a file that give keys these values: an inertia unknown to the laws becomes a fault at the
+        start without a reaction."""
         changes = {key: value for key, value in values.items() if key != TRUE}
         if ATTITUDE in changes:
             changes[ANGLES] = None
@@ -70,12 +69,12 @@ class Dials(Body):
         return changes
 
     def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
-        """The numbers of a loop under these values, as `build` and `make_events` give them."""
+        """Return the numbers of a loop under these values, as from `build` and `make_events`."""
         nominal, flown = _crafts(scenario, values, loop.craft)
         cutoff = values.get(LIMIT, loop.saturation_limit())
         attitude = unit_of(values[ATTITUDE]) if ATTITUDE in values else values.get(ANGLES)
         begun = start_of(scenario, target_of(scenario), attitude, values.get(RATE))
-        # An inertia that changes as the motion begins leaves the angular momentum, as in `Phase.rate_from`.
+        # An inertia that changes as the motion begins keeps the angular momentum, as in `Phase.rate_from`.
         pairs = zip(leaves(flown.inertia), leaves(nominal.inertia), strict=True)
         same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
         jumped = apply(flown.inverse_inertia, apply(nominal.inertia, begun.rate))
@@ -86,7 +85,7 @@ class Dials(Body):
         return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff, parts)
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Craft:
-        """The craft that laws know under these values, which may be recorded ones; InputError where no file may have
+        """Return the craft that laws know under these values, which may be recorded ones; InputError where no file may have
         them."""
         crafts = _crafts(scenario, values, scenario.craft)
         for key, craft in zip((KNOWN, TRUE), crafts, strict=True):
@@ -107,7 +106,7 @@ class Dials(Body):
         for key, given in ((ATTITUDE, initial.attitude), (ANGLES, initial.angles), (RATE, initial.rate)):
             values = _whole(columns, key, given)
             if values is not None and key == ANGLES:
-                # One by one, for the sine of an array may differ from that of a number.
+                # One by one, because the sine of an array may differ from that of a number.
                 values = np.array([from_angles(*lane) for lane in values.T.tolist()]).T
             if values is not None:
                 moved[key] = tuple(values)
@@ -117,12 +116,11 @@ class Dials(Body):
         if LIMIT in columns:
             moved[LIMIT] = columns[LIMIT]
         if rotors is not None and rotors.sure is None:
-            raise ValueError("lanes differ in how their wheels share a torque out")
+            raise ValueError("lanes differ in the torque allocation of their wheels")
         return moved if rotors is None else moved | {ROTORS: rotors}
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
-        """Which lanes have an inertia that no body has, or wheels that no craft can have, (lanes,); None where neither is
-        drawn."""
+        """Return which lanes have an impossible inertia or impossible wheels, (lanes,); None where neither is drawn."""
         moments, rotors = _moments(scenario, columns), rotors_over(scenario, columns)
         if moments is None and rotors is None:
             return None
@@ -139,7 +137,7 @@ class Dials(Body):
 
 
 def _crafts(scenario: Scenario, values: Mapping[str, Any], like: Craft) -> tuple[Craft, Craft]:
-    """The craft that laws know, and the one that flies; formed as one like it."""
+    """Return the craft that laws know, and the one that flies, in the form of one like it."""
     craft, rotors = scenario.craft, values.get(ROTORS)
     if LIMIT in values or rotors is not None:
         table = scenario.table
@@ -155,7 +153,7 @@ def _crafts(scenario: Scenario, values: Mapping[str, Any], like: Craft) -> tuple
 
 
 def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any, like: Craft, rotors: Rotors | None = None) -> Craft:
-    """The craft with another inertia of the form of one like it, its wheels included."""
+    """Return the craft with another inertia in the form of one like it, including its wheels."""
     if not craft.with_rotors:
         return craft._replace(inertia=inertia, inverse_inertia=inverse(inertia))
     axial: Any = axial_inertia(effectors_of(scenario)).tolist() if rotors is None else rotors.axial
@@ -165,7 +163,7 @@ def _with_inertia(scenario: Scenario, craft: Craft, inertia: Any, like: Craft, r
         whole = inertia[i][j] if isinstance(inertia[0], tuple) else inertia[i] if i == j else 0.0
         return whole - axial[i][j]
 
-    # What is zero of the one like it stays so, for it is but rounding.
+    # What is zero in the one like it stays zero, because it is only rounding.
     without_rotors: Any = tuple(
         tuple(left(i, j) if form[i][j] != 0.0 else 0.0 for j in range(3)) if isinstance(form[0], tuple) else left(i, i)
         for i in range(3)
@@ -178,8 +176,8 @@ def _moments(scenario: Scenario, columns: Mapping[str, Array]) -> Array | None:
 
 
 def _whole(columns: Mapping[str, Array], key: str, nominal: Any) -> Array | None:
-    """The vectors (components, lanes), or matrices, of a key of which all or some components are drawn; None of one that is
-    not drawn."""
+    """Return the vectors (components, lanes), or matrices, of a key with all or some components drawn; None if none is
+    drawn."""
     if key in columns:
         return columns[key]
     drawn = {name: values for name, values in columns.items() if name.startswith(f"{key}[")}
@@ -192,7 +190,7 @@ def _whole(columns: Mapping[str, Array], key: str, nominal: Any) -> Array | None
 
 
 def _inertia(moments: Array, matrix: bool) -> Any:
-    """Valid inertias (3, lanes) or (3, 3, lanes) in the form of the craft's."""
+    """Return valid inertias (3, lanes) or (3, 3, lanes) in the form of the craft's."""
     if moments.ndim == 2:
         moments = np.eye(3)[:, :, None] * moments
     rows = 0.5 * (moments + moments.swapaxes(0, 1))

@@ -1,4 +1,4 @@
-"""From the fault tables of a scenario to the events of a run."""
+"""Turns the fault tables of a scenario into the events of a run."""
 
 from __future__ import annotations
 
@@ -26,17 +26,16 @@ def action_on(fault: FaultTable, entry: LawEntry) -> str:
 
 
 def fault_times(scenario: Scenario) -> tuple[float, ...]:
-    """When faults happen and are acted on (s)."""
+    """Return when faults happen and when the reactions follow (s)."""
     faults: list[FaultTable] = scenario.table.fault
     acted = [f.time + f.delay for f in faults if any(action_on(f, entry) != "none" for entry in scenario.laws)]
     return tuple(sorted({*(fault.time for fault in faults), *acted}))
 
 
 def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) -> tuple[Event, ...]:
-    """The events of a law's run: each fault when it happens, and what is done about it when it is diagnosed.
-
-    InputError where a fault names a wheel that is not there, or comes after the end, or leaves less body than the rotors
-    have, or fewer than three axes to a law that should go on, or where new gains are asked of a law that cannot have them.
+    """Return the events of a law's run: each fault when it happens, and the reaction when it is diagnosed. InputError where
+    a fault names a wheel that does not exist, or comes after the end, or leaves less inertia than the rotors', or fewer than
+    three axes to a law that must go on, or where new gains are requested for a law that cannot have them.
     """
     table, period = scenario.table, scenario.table.simulation.control_period
     moments: list[tuple[float, bool, int]] = []
@@ -59,7 +58,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
             wheels = None if wheels is None else _struck(wheels, fault)
             now = now._replace(parts=_on(now.parts, wheels), craft=body or now.craft)
         else:
-            # Diagnosed late, an inertia that has changed again since is no news.
+            # A late diagnosis of an inertia that has since changed again is obsolete.
             if body is not None and (fault.time, place) > learnt:
                 now, learnt = now._replace(nominal=body), (fault.time, place)
             if wheels is not None and fault.strikes_wheel:
@@ -68,7 +67,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
                 share, limit = authority(left) / begun, torque_limit(scenario.known.table, _on(effectors, left))
                 wheels = wheels if action == "retune" else left
                 now = now._replace(parts=_on(now.parts, wheels))
-            # The law's limit is nothing that the body feels, so both crafts have it.
+            # The law's limit does not affect the body, so both crafts have it.
             now = now._replace(nominal=now.nominal._replace(torque_limit=limit))
             if action in ("retune", "both"):
                 now = now._replace(gains=_retuned(scenario, entry, now.nominal, share, place))
@@ -78,7 +77,7 @@ def make_events(scenario: Scenario, entry: LawEntry, parts: tuple[Fitted, ...]) 
 
 
 def _on(parts: tuple[Fitted, ...], wheels: Wheels | None) -> tuple[Fitted, ...]:
-    """The parts on other wheels."""
+    """Return the parts with other wheels."""
     return tuple(replace(f, params=wheels) if f.part.name == "wheels" else f for f in parts)
 
 
@@ -97,7 +96,7 @@ def _index(fault: FaultTable) -> int:
 
 
 def _body(scenario: Scenario, place: int, fault: FaultTable) -> Craft | None:
-    """The craft with the fault's inertia, None where that stays."""
+    """Return the craft with the fault's inertia, or None if that does not change."""
     if fault.inertia is None:
         return None
     with input_at(scenario.where, f"fault[{place}].inertia"):
@@ -105,7 +104,7 @@ def _body(scenario: Scenario, place: int, fault: FaultTable) -> Craft | None:
 
 
 def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
-    """The wheels after a fault that nobody knows of: the allocation is as before."""
+    """Return the wheels after an undiagnosed fault: the allocation is as before."""
     changes: dict[str, Any] = {}
     given = {
         "torque_limit": 0.0 if fault.lost else fault.torque_limit,
@@ -139,7 +138,7 @@ def _left(scenario: Scenario, wheels: Wheels, place: int, fault: FaultTable, gai
 
 
 def _retuned(scenario: Scenario, entry: LawEntry, known: Craft, share: float, place: int) -> Any:
-    """The gains designed for the inertia that is known, and for the share of the torque that is left."""
+    """Return the gains designed for the known inertia and for the share of the torque that is left."""
     key, changed = f"fault[{place}].action", scenario.table.fault[place - 1].inertia is not None
     follows = entry.form is not None and "torque" in entry.spec._fields
     if not follows and (entry.form is None or not changed):

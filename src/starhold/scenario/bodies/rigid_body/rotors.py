@@ -1,4 +1,4 @@
-"""The reaction wheels of many runs at once, from what is drawn for the keys of [wheels] and [[wheel]]."""
+"""The reaction wheels of many runs at once, from the draws for the keys of [wheels] and [[wheel]]."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ Array: TypeAlias = NDArray[np.float64]
 
 
 class Rotors(NamedTuple):
-    """Wheels, the inertia of their rotors about their own axes (3, 3; kg m2), and the torque that they surely give (N m),
-    with an array (lanes,) in place of each number that differs; None where lanes differ in how they share it out."""
+    """Wheels, the inertia of their rotors about their own axes (3, 3; kg m2), and the torque that they can always give (N
+    m), with an array (lanes,) in place of each number that differs; None where lanes differ in its allocation."""
 
     wheels: Wheels
     axial: Any
@@ -31,8 +31,8 @@ class Rotors(NamedTuple):
 
 
 def rotors_over(scenario: Scenario, columns: Mapping[str, Array]) -> Rotors | None:
-    """The wheels of lanes that differ in the values of some keys, (components..., lanes) by key; None where none of these is
-    a wheel's."""
+    """Return the wheels of lanes that differ in the values of some keys, (components..., lanes) by key; None where none of
+    these is a wheel's."""
     like, table = wheels_of(scenario), scenario.table
     paths = {key: path_of(key, {}, "") for key in columns}
     drawn = {key: path for key, path in paths.items() if path[0] in ("wheels", "wheel")}
@@ -67,7 +67,7 @@ def rotors_over(scenario: Scenario, columns: Mapping[str, Array]) -> Rotors | No
 
 
 def impossible(scenario: Scenario, wheels: Wheels, lanes: int) -> NDArray[np.bool_]:
-    """Which lanes, (lanes,), have wheels that `check_authority` refuses, or whose friction `check_substeps` does."""
+    """Return which lanes, (lanes,), have wheels refused by `check_authority`, or friction refused by `check_substeps`."""
     viscous, coulomb, inertia = (stacked(column, lanes) for column in (wheels.viscous, wheels.coulomb, wheels.inertia))
     timing = scenario.table.simulation
     least = timing.control_period * ((viscous + coulomb / CREEP) / inertia).max(axis=1) / RESOLVED * (1.0 - 1e-12)
@@ -77,14 +77,14 @@ def impossible(scenario: Scenario, wheels: Wheels, lanes: int) -> NDArray[np.boo
 
 
 def stacked(values: Any, lanes: int) -> Array:
-    """Numbers, each of all lanes or (lanes,), or tuples of them, as an array (lanes, ...)."""
+    """Return numbers, each for all lanes or (lanes,), or tuples of them, as an array (lanes, ...)."""
     if isinstance(values, list | tuple):
         return np.stack([stacked(value, lanes) for value in values], axis=1)
     return np.broadcast_to(np.asarray(values, dtype=float), (lanes,))
 
 
 def _with(table: Any, path: Sequence[str | int], value: Any) -> Any:
-    """A validated table with another value at a path."""
+    """Return a validated table with another value at a path."""
     if not path:
         return value
     name, rest = path[0], path[1:]
@@ -94,10 +94,10 @@ def _with(table: Any, path: Sequence[str | int], value: Any) -> Any:
 
 
 def _differ(values: Any) -> bool:
-    """Whether lanes differ in one of these numbers."""
+    """Return whether lanes differ in one of these numbers."""
     return any(_differ(value) if isinstance(value, list | tuple) else isinstance(value, np.ndarray) for value in values)
 
 
 def _numbers(array: Array) -> tuple[Any, ...]:
-    """The tuples of arrays (lanes,) in an array (lanes, m, n)."""
+    """Return the tuples of arrays (lanes,) in an array (lanes, m, n)."""
     return tuple(tuple(array[:, i, j] for j in range(array.shape[2])) for i in range(array.shape[1]))

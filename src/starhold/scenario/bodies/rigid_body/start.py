@@ -35,20 +35,20 @@ if TYPE_CHECKING:
 
 
 def stated(pointing: Pointing) -> Quaternion:
-    """The unit quaternion that a table states."""
+    """Return the unit quaternion of a table."""
     if pointing.angles is not None:
         return from_angles(*pointing.angles)
     return NO_TURN if pointing.attitude is None else unit_of(pointing.attitude)
 
 
 def unit_of(given: Quaternion) -> Quaternion:
-    """The unit quaternion in the direction of four numbers; an equation."""
-    # Scaled first, so that the squares of odd numbers neither vanish nor overflow.
+    """Return the unit quaternion in the direction of four numbers; an equation."""
+    # Scaled first, so that the squares neither underflow nor overflow.
     return normalise(stretch(1.0 / most(given), given))
 
 
 def target_of(scenario: Scenario) -> Fitted:
-    """The target of the scenario: its [[part]] with this role, or what [target] says."""
+    """Return the target of the scenario: its [[part]] with this role, or that of [target]."""
     table = scenario.table.target
     given_part = next((fitted for fitted in scenario.parts if fitted.part.role == "target"), None)
     if given_part is not None:
@@ -59,15 +59,16 @@ def target_of(scenario: Scenario) -> Fitted:
 
 
 def _tried(scenario: Scenario, target: Fitted, key: str) -> Fitted:
-    """The target itself; InputError for numbers that it refuses, for a start may be relative to it before all parts are
-    tried together."""
+    """Return the target itself; InputError for numbers that it refuses, because a start may be relative to it before all
+    parts are checked together."""
     with input_at(scenario.where, key):
         target.prepared(scenario.table.simulation.control_period)
     return target
 
 
 def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
-    """The target that the raw table of a mode gives, as [target] or as a [[part]] of this role; for None the scenario's."""
+    """Return the target of a mode's raw table, in the form of [target] or of a [[part]] of this role; for None the
+    scenario's."""
     if given is None:
         return target_of(scenario)
     if not isinstance(given, dict):
@@ -85,7 +86,7 @@ def mode_target(scenario: Scenario, given: Any, units: Any, key: str) -> Fitted:
 
 
 def _from_table(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
-    """The target that a table gives."""
+    """Return the target of a table."""
     simulation = scenario.table.simulation
     if table.mode == "orbital":
         return fit("target", "orbital")
@@ -100,8 +101,8 @@ def _from_table(scenario: Scenario, table: TargetTable, key: str) -> Fitted:
 
 
 def date_of_axes(scenario: Scenario) -> Date | None:
-    """The date whose mean equator and equinox the inertial axes are: that of an orbit about the Earth, where the scenario
-    states it or has a part that knows the Sun or the turn of the Earth. None where the axes may be any."""
+    """Return the date whose mean equator and equinox define the inertial axes: that of an orbit about the Earth, where the
+    scenario states it or has a part that uses the Sun or the Earth's rotation. None where the axes are arbitrary."""
     orbit = scenario.table.orbit
     if orbit is None or body_of(orbit.gravitational_parameter) != "Earth":
         return None
@@ -110,7 +111,7 @@ def date_of_axes(scenario: Scenario) -> Date | None:
 
 
 def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[..., Any]) -> Any:
-    """The result of `use` on the times and attitudes in the file of a history. InputError where it cannot be used."""
+    """Return the result of `use` on the times and attitudes in the file of a history. InputError where it cannot be used."""
     path = scenario.folder / str(table.file)
     allowed = "a CSV file of columns time,q0,q1,q2,q3 (in another order if named), unit quaternions, times that increase"
     if path.suffix.lower() == ".aem":
@@ -128,7 +129,7 @@ def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[...
 
 
 def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None) -> State:
-    """The first state of a run with this target; an equation where a unit quaternion or a rate replaces those of
+    """Return the initial state of a run with this target; an equation where a unit quaternion or a rate replaces those of
     [initial]."""
     table = scenario.table
     orbit = table.orbit
@@ -147,7 +148,7 @@ def goal_at_start(goal: Fitted, begun: State) -> Goal:
 
 
 def told_to_design(scenario: Scenario, sign: str) -> Start:
-    """The start that a design form may use; `sign`: the law's quaternion sign policy."""
+    """Return the start that a design form may use; `sign`: the law's quaternion sign policy."""
     table, goal, effectors = scenario.table, target_of(scenario), effectors_of(scenario)
     begun = start_of(scenario, goal)
     aim = goal_at_start(goal, begun)
@@ -165,11 +166,11 @@ COLUMNS = ("time", "q0", "q1", "q2", "q3")
 
 
 def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
-    """Times (n,) in s, quaternions (n, 4), scalar first, and the name of the reference frame, "" for none. Columns that are
-    named may stand in any order; without names they are those of COLUMNS. A file that ends in .aem is an attitude ephemeris
+    """Return times (n,) in s, quaternions (n, 4), scalar first, and the name of the reference frame, "" for none. Named
+    columns may be in any order; unnamed ones are those of COLUMNS. A file that ends in .aem is an attitude ephemeris
     message, whose first epoch is time 0.
 
-    Raises OSError, or ValueError that names the line and what is wrong with it."""
+    Raises OSError, or ValueError that names the line and its error."""
     if path.suffix.lower() == ".aem":
         message = read_aem(path)
         return message.times, message.attitudes, message.frame
@@ -191,7 +192,7 @@ def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], 
 
 
 def _order(names: list[str], line: int) -> list[int]:
-    """Where each of COLUMNS stands among the named columns."""
+    """Return the index of each of COLUMNS among the named columns."""
     given = [name.lower() for name in names]
     if sorted(given) != sorted(COLUMNS):
         raise ValueError(f"line {line}: columns {', '.join(names)}")

@@ -1,4 +1,4 @@
-"""The tables of a scenario of a rigid body as pydantic models. Units and bounds stand with each field."""
+"""The tables of a rigid-body scenario as pydantic models. Each field has its units and bounds."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ MOST_RUNS = 100_000
 
 
 class BudgetTable(Table):
-    """How `starhold budget` takes pointing errors."""
+    """How `starhold budget` samples pointing errors."""
 
     start: Annotated[
-        float | None, *quantity(Gain("s", at_least=0.0, text="errors count from here on; half of the run if absent"))
+        float | None, *quantity(Gain("s", at_least=0.0, text="errors count from this time; half of the run if absent"))
     ] = None
     window: Annotated[
-        float | None, *quantity(Gain("s", above=0.0, text="length of windows; a tenth of what counts if absent"))
+        float | None, *quantity(Gain("s", above=0.0, text="length of windows; a tenth of that time if absent"))
     ] = None
     separation: Annotated[
         float | None,
-        *quantity(Gain("s", above=0.0, text="between the starts of two windows of a drift; half of what counts if absent")),
+        *quantity(Gain("s", above=0.0, text="between the starts of two windows of a drift; half of that time if absent")),
     ] = None
     confidence: Annotated[
         float, *quantity(Gain("1", above=0.0, at_most=1.0, text="share of the errors that are no larger, such as 95 %"))
@@ -134,7 +134,7 @@ class TargetTable(Pointing):
 
     mode: Annotated[
         Literal["inertial", "orbital", "history"],
-        Field(description="fixed, third axis to the centre of attraction, or as a file tells over time"),
+        Field(description="fixed, third axis to the centre of attraction, or as a file gives over time"),
     ] = "inertial"
     file: Annotated[
         str | None, Field(description="history beside the scenario: CSV of time (s), q0, q1, q2, q3, or a CCSDS AEM (.aem)")
@@ -152,7 +152,7 @@ class TargetTable(Pointing):
 class Environment(Table):
     """External torques."""
 
-    gravity_gradient: Annotated[Flag, Field(description="the torque of the central body's gravity; laws know it")] = False
+    gravity_gradient: Annotated[Flag, Field(description="gravity-gradient torque; laws know it")] = False
     torque_noise: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="standard deviation per axis and step"))] = 0.0
 
 
@@ -166,7 +166,7 @@ class Sensor(Table):
 
 
 class Simulation(SeededTiming):
-    """How long and how finely."""
+    """The duration and the steps."""
 
     unit: ClassVar[str] = " s"
     duration: Annotated[float, *quantity(Gain("s", above=0.0, text="length of the run"))]
@@ -238,7 +238,7 @@ class WheelsTable(Rotor):
         Literal["orthogonal", "pyramid", "nasa-standard"] | None, Field(description="three or four wheels of one kind")
     ] = None
     allocation: Annotated[
-        Literal["least-squares", "least-peak"], Field(description="how a torque is shared out among more than three")
+        Literal["least-squares", "least-peak"], Field(description="how a torque is allocated among more than three")
     ] = "least-squares"
 
 
@@ -258,7 +258,7 @@ class FaultTable(Table):
     inertia: Annotated[Any, *INERTIA] = None
     delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
     action: Annotated[
-        Action, Field(description="torque shared out among the other wheels, gains designed anew for what is left, or both")
+        Action, Field(description="torque reallocated to the other wheels, gains redesigned for the torque left, or both")
     ] = "both"
     """Unless it is "none", the law knows the new inertia from the diagnosis on."""
 
@@ -279,19 +279,19 @@ class FaultTable(Table):
 
 
 class CertifyTable(Table):
-    """Claims that certificates are to make; whatever is left out, the most that can be proved."""
+    """The claims of certificates; by default, the most that can be proved."""
 
     rate: Annotated[
         float | None,
         *quantity_or("any", math.inf, Gain("rad/s", above=0.0, text="convergence from every attitude at up to this rate")),
     ] = None
     slew_angle: Annotated[
-        float | None, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="turns from rest within the torque limit"))
+        float | None, *quantity(Gain("rad", above=0.0, at_most=math.pi, text="slews from rest within the torque limit"))
     ] = None
     inertia_tolerance: Annotated[
         float | None, *quantity(Gain("1", above=0.0, at_most=1.0, text="error of J_ij as a share of sqrt(J_ii J_jj)"))
     ] = None
-    disturbance: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="norm of a torque nobody models"))] = 0.0
+    disturbance: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="norm of an unmodelled torque"))] = 0.0
     momentum: Annotated[
         float | None,
         *quantity(
@@ -307,7 +307,7 @@ class AttitudeLawTable(LawTable):
         Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")
     ] = "as_published"
     hysteresis_width: Annotated[float, *quantity(Gain("1", above=0.0, at_most=0.999, text="flips when h q0 < -width"))] = 0.5
-    fault_action: Annotated[Action | None, Field(description="what is done about faults, in place of their own")] = None
+    fault_action: Annotated[Action | None, Field(description="reaction to faults, in place of their own")] = None
 
 
 class RigidBodyTable(ScenarioTable):

@@ -1,4 +1,4 @@
-"""The table of a turn's limits, and of the search for the root that turns fastest within them."""
+"""The table of a slew's limits, and of the search for the root that slews fastest within them."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from starhold.scenario.quantity import quantity, reader
 from starhold.scenario.tables import Table, at_key, refuse
 
 MOST = 100_000
-"""Values that a list may have."""
+"""The most values of a list."""
 ANGLE = Gain("rad", above=0.0, at_most=math.pi, text="initial angles of the search")
 ROOT = Gain("1/s", text="roots that are tried")
 RATE = Gain("rad/s", text="relative to the target at the start of the search: along the axis, or a vector in body axes")
 
 
 def _spread(first: float, last: float, step: float) -> list[float]:
-    """first, first + step, ... up to last."""
+    """Return first, first + step, ... up to last."""
     count = int((last - first) / step * (1.0 + 1e-12) + 1e-9) + 1
-    # Rounded, so that decimal steps give the decimals that are meant.
+    # Rounded, so that decimal steps give the intended decimals.
     return [min(float(f"{first + step * k:.13g}"), last) for k in range(count)]
 
 
@@ -67,7 +67,7 @@ def _number_or_vector(gain: Gain) -> tuple[BeforeValidator, WithJsonSchema]:
 
 
 class TransientTable(Table):
-    """Limits of a turn, when it is over, and from where to where `starhold modal-roots` looks for the fastest."""
+    """Limits of a slew, when it is over, and the range of the search of `starhold modal-roots` for the fastest."""
 
     rate_limit: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="of the norm of the body's rate"))] = math.inf
     acceleration_limit: Annotated[
@@ -85,7 +85,7 @@ class TransientTable(Table):
     rate_end: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="and the rate relative to the target within"))] = (
         math.radians(0.1)
     )
-    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="axis of the turns, body axes"))] = (
+    axis: Annotated[Any, *quantity(Gain("1", shape=(3,), spread=False, text="axis of the slews, body axes"))] = (
         1.0,
         1.0,
         1.0,
@@ -96,7 +96,7 @@ class TransientTable(Table):
 
     @property
     def start_rate(self) -> tuple[float, float, float]:
-        """The rate that turns start with (rad/s)."""
+        """The rate at which slews start (rad/s)."""
         if isinstance(self.rate, tuple):
             return cast(tuple[float, float, float], self.rate)
         x, y, z = (self.rate * part / math.hypot(*self.axis) for part in self.axis)
@@ -111,6 +111,6 @@ class TransientTable(Table):
             raise at_key("roots", "roots below zero; others are not stable", self.roots[-1])
         fast = math.hypot(*self.start_rate)
         if fast > self.rate_limit:
-            most = f"a rate within rate_limit, {math.degrees(self.rate_limit):g} deg/s, which is exceeded from the start"
+            most = f"a rate within rate_limit, {math.degrees(self.rate_limit):g} deg/s, which the start exceeds"
             raise at_key("rate", most, f"{math.degrees(fast):g} deg/s")
         return self

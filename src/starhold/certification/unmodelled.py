@@ -1,4 +1,4 @@
-"""Each claim leaves out by name the parts of its loop that it is not about: the list is computed from what the loop has."""
+"""Computes, from the parts of a loop, the unmodelled ones that each claim leaves out by name, and bounds of the others."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ READ = {
     "effector": ("wheels",),
     "target": ("inertial", "orbital", "history"),
 }
-"""The parts that theorems take in, by role; what a claim takes of their torques and motions its other assumptions say."""
+"""The parts that theorems model, by role; a claim's other assumptions describe their torques and motions."""
 BOUNDED = ("pointing",)
-"""Kinds of claims that take in torques from outside and errors by their bounds."""
+"""Kinds of claims that include external torques and errors by their bounds."""
 SPAN = 3600.0
-"""The time (s) that a claim with a share speaks of where there is no orbit."""
+"""The time (s) covered by a claim with a share where there is no orbit."""
 TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
-"""Roles whose `error` is of what the law is told, and of its command."""
+"""Roles whose `error` affects the law's measurements, and its command."""
 MORE = 1.0 + 1e-12
-"""A little more, for floats are added."""
+"""A margin for the floating-point sum."""
 
 
 class Pushes(NamedTuple):
@@ -58,7 +58,7 @@ class Pushes(NamedTuple):
 
 
 class Driven(NamedTuple):
-    """Errors that noise drives, and the parts whose noise it is, and whose errors."""
+    """Noise-driven errors, the parts with the noise, and the parts with the errors."""
 
     recursion: Recursion
     parts: tuple[Fitted, ...]
@@ -77,7 +77,7 @@ def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
 
 
 def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
-    """Add up the bounds of what the parts of a loop that say theirs do."""
+    """Add up the bounds of the parts of a loop that declare them."""
     torques, errors = [Push(0.0)], [Push(0.0)]
     for fitted in loop.parts:
         for told, found in zip((torques, errors), _pushes(fitted, envelope), strict=True):
@@ -91,9 +91,10 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
 
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
-    """The errors that noise drives, of an estimate, or of readings that the law is told as they are; None without noise,
-    where parts do not say all about it, where sensors of one quantity are not read together, and where the target depends on
-    the law's mode."""
+    """Return the noise-driven errors of an estimate, or of readings that the law uses directly; None without noise, where
+    parts do not fully declare it, where sensors of one quantity are not read together, and where the target depends on the
+    law's mode.
+    """
     estimators = loop.used("estimator")
     wanted = {name for f in estimators for name in f.part.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
@@ -118,7 +119,7 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
 
 
 def samples_of(loop: ClosedLoop) -> int:
-    """Control steps of an orbit, or of an hour where there is none."""
+    """Return the control steps of an orbit, or of an hour where there is none."""
     start = loop.start
     orbit = period_of(start.position, start.velocity, loop.craft.gravity) if loop.has("two-body") else SPAN
     # A little more, for floats tell the period; it goes with the power 3/2 of the distance.
@@ -126,12 +127,12 @@ def samples_of(loop: ClosedLoop) -> int:
 
 
 def assumed_away(loop: ClosedLoop) -> list[str]:
-    """The parts of a loop that no claim but those of the kinds `BOUNDED` is about, as role and name."""
+    """Return the parts of a loop that only claims of the kinds `BOUNDED` include, as role and name."""
     return [_called(f) for f in loop.parts if not _is_read(f)]
 
 
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
-    """The claims with an assumption for each part that they are not about."""
+    """Return the claims with an assumption for each part that they leave out."""
     away, driven = assumed_away(loop), driven_errors(loop)
     estimated = _estimated(loop, driven)
 
@@ -165,8 +166,9 @@ def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool)
 
 
 def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:
-    """Read bounds of a part's torque and of its error of the command, where it says them; of one that could be left out
-    by name only finite ones."""
+    """Read the declared bounds of a part's torque and of its error of the command; for a part that could be left out only
+    finite ones.
+    """
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
@@ -176,19 +178,19 @@ def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | Non
 
 
 def _estimated(loop: ClosedLoop, driven: Driven | None) -> Collection[Fitted]:
-    """Return the parts whose errors do not count beside their noise, for an estimator takes them out."""
+    """Return the parts whose errors other than noise do not count, because an estimator removes them."""
     return driven.parts if driven is not None and loop.used("estimator") else ()
 
 
 def _bounded(fitted: Fitted) -> Errors | None:
-    """Read the largest errors of a part beside its noise, where it says them and they are finite."""
+    """Read the declared largest errors of a part beside its noise, where they are finite."""
     tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
     found = NO_ERRORS if tell is None else tell(fitted.params)
     return None if tell is None or not all(map(isfinite, found)) else found
 
 
 def _field_error(fitted: Fitted, period: float, noisy: bool) -> float:
-    """The largest error (T) of the magnetic field that a sensor shows; its noise has a bound but for a share of times."""
+    """Return the largest error (T) of a measured magnetic field; its noise is bounded except for a share of times."""
     if "magnetic_field" not in _shown(fitted):
         return 0.0
     error, deviation = _bounded(fitted), _noise(fitted, period).field
@@ -196,23 +198,25 @@ def _field_error(fitted: Fitted, period: float, noisy: bool) -> float:
 
 
 def measures_noisy_field(loop: ClosedLoop) -> bool:
-    """Whether a sensor shows the magnetic field with noise."""
+    """Return whether a sensor measures the magnetic field with noise."""
     return any(_noise(fitted, loop.period).field for fitted in loop.used("sensor"))
 
 
 def _noise(fitted: Fitted, period: float) -> Noise:
-    """The noise of a part; one that does not tell any has none."""
+    """Return the noise of a part, by default none."""
     tell: Any = fitted.part.hook("noise")
     return Noise() if tell is None else tell(fitted.params, period)
 
 
 def _is_random(noise: Noise) -> bool:
-    """Whether a reading is not what it is at that time but for what is bounded."""
+    """Return whether a reading differs from the present value by an unbounded error."""
     return any(leaves(noise._replace(every=noise.every - 1)))
 
 
 def _as_read(noise: Noise) -> Recursion | None:
-    """Errors of readings that the law is told as they are; a bias that walks, and an attitude that is held, go anywhere."""
+    """Return the errors of readings that the law uses directly; a random-walk bias, and an attitude that is held, are
+    unbounded.
+    """
     if noise.walk or noise.every > 1:
         return None
 
@@ -224,7 +228,7 @@ def _as_read(noise: Noise) -> Recursion | None:
 
 
 def _rate(loop: ClosedLoop) -> Vector:
-    """The rate (rad/s) at which a body turns on target as the loop starts, to six digits, which all machines agree on."""
+    """Return the rate (rad/s) of a body on target as the loop starts, to six digits, on which all machines agree."""
     target = loop.target
     rate: Any = target.part.module.goal(target.prepared(loop.period), loop.start, 0, NO_TURN).rate
     x, y, z = (float(f"{part:.6g}") for part in rate)
@@ -232,12 +236,12 @@ def _rate(loop: ClosedLoop) -> Vector:
 
 
 def _shown(sensor: Fitted) -> set[str]:
-    """The names of what a sensor shows."""
+    """Return the names of a sensor's readings."""
     return set(sensor.part.module.Reading._fields)
 
 
 def _is_idle(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
-    """Whether a sensor shows nothing but what is read by parts whose torque has a bound, whatever they are shown."""
+    """Return whether all readers of a sensor are parts whose torque is bounded for any reading."""
     if fitted.part.role != "sensor" or _shown(fitted) & {*loop.start._fields, *loop.law.reads}:
         return False
     readers = [f for f in loop.parts if _shown(fitted) & {*f.part.reads, *f.part.needs}]
