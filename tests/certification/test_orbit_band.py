@@ -10,9 +10,9 @@ import pytest
 from starhold.algebra.quaternion import NO_TURN, conjugate, multiply
 from starhold.certification.assumptions import assumption
 from starhold.certification.certificate import ORBIT, Claim, Obligation
-from starhold.certification.openness import named, pushes
 from starhold.certification.orbit_band import band_of, strays
 from starhold.certification.subject import make_subject
+from starhold.certification.unmodelled import named, pushes
 from starhold.parts.catalogue import fit
 from starhold.parts.environments import oblateness
 from starhold.parts.orbit import BODIES, Elements, from_elements, highest, lowest

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from starhold.algebra.elementary import exp
 
 from starhold.algebra.circular import cosine_sine
 from starhold.algebra.dual import differentiate, variables
+from starhold.algebra.elementary import exp
 from starhold.algebra.scalar import clip, less, sqrt, where
 from starhold.algebra.structured import function, repeat, until, when
 from starhold.algebra.words import bits_of, with_bits

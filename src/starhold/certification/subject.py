@@ -10,7 +10,6 @@ from flint import arb, fmpq
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
-from starhold.certification.openness import READ, assumed_away, envelope_of
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.certification.unmodelled import READ, assumed_away, envelope_of
