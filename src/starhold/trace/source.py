@@ -64,7 +64,7 @@ def operator_of(text: str) -> str:
 
 
 def _stands(inner: str, outer: str, place: int) -> bool:
-    """Return whether an operand needs no parentheses; they are also written where only a compiler's warning requires them."""
+    """Return whether an operand needs no parentheses; some are written only to avoid a compiler's warning."""
     if outer == _CALL:
         return True
     if outer in _BITS:

@@ -164,7 +164,7 @@ def below_wheels(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
 
 
 def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
-    """Return from which rates form I does not settle within 12 h; wheels of 0.1 N m balance the gyroscopic torque of none."""
+    """Return the rates from which form I fails to settle in 12 h: wheels of 0.1 N m balance the gyroscopic torque of none."""
     verdicts: dict[str, bool] = {}
     notes: list[str] = []
     for rate in rates:

@@ -141,7 +141,7 @@ def inside_the_interval(desk: Desk) -> Finding:
 
 
 def printed_fit_flies(desk: Desk) -> Finding:
-    """Return whether turns with the printed fit's roots keep the limits, and the limits with the least tolerances printed."""
+    """Return whether slews with the printed fit's roots keep the limits, with and without the least tolerances printed."""
     scenario, search = desk.scenario("landing-limits"), searched(desk)
     problem, hard = problem_of(scenario, scenario.pick("published")), _limits(desk)
     eased = Limits(hard.rate + math.radians(2.0), hard.acceleration + math.radians(3.0))

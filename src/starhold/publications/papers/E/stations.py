@@ -199,7 +199,7 @@ def steepest(desk: Desk) -> Finding:
 
 
 def at_the_axis(desk: Desk, C: float) -> Finding:
-    """Return whether the nominal control is largest where y = 0, for every rate, and whether its peak follows the formula."""
+    """Return whether the nominal control is largest where y = 0, for every rate, with a peak that follows the formula."""
     plant = plant_of(desk, C)
     right: list[bool] = []
     for rate in (0.5, 1.0, best_rate(plant), 2.0, 3.0):
