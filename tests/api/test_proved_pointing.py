@@ -90,7 +90,7 @@ def test_a_source_that_the_claim_leaves_out_has_no_share():
 
 def test_what_is_not_proved_is_told_with_the_reason():
     switching = sh.load("cubesat-mission")
-    assert "each mode by itself" in proved_of(switching).sentence
+    assert "single modes" in proved_of(switching).sentence
     unstable = sh.scenario(HELD | {"law": [HELD["law"][0] | {"k_rate": 1e-6}]}, allow_unstable=True)
     assert proved_of(unstable).angle is None
 

@@ -134,7 +134,7 @@ def test_a_proof_is_met_or_not_decided_and_never_missed():
     tight = verdict(PROOF | {"at_most": 0.5 * angle})
     assert (tight.verdict, tight.number) == ("not decided", angle)
     assert tight.margin < 0.0
-    assert "only so much is proved" in tight.evidence
+    assert "only this bound is proved" in tight.evidence
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_a_proof_is_met_or_not_decided_and_never_missed():
         ({"after": "1 min"}, {}, "not by 60 s"),
         ({"metric": "final_rate_error", "after": 0, "at_most": 1}, {}, "not by 300 s"),
         ({}, {"initial": {"angles": [3.1, 0, 0], "rate": [0.5, 0, 0]}}, "begins outside of the set"),
-        ({}, {"nominal": {"spacecraft": {"inertia": [2, 3, 3.9]}}}, "takes the craft for another one"),
+        ({}, {"nominal": {"spacecraft": {"inertia": [2, 3, 3.9]}}}, "nominal model is not the craft"),
         (
             {"metric": "settling_time", "at_most": "1 h", "after": 0},
             {"settling": {"attitude_tolerance": 1e-6}},
@@ -212,7 +212,10 @@ def test_an_inspection_is_met_as_by_its_record(tmp_path):
         ([STILL, STILL | {"id": "STILL"}], 'requirement[2].id: found "STILL"; allowed: an id that no other'),
         ([{"id": "T"}, STILL | {"parent": "S"}], 'requirement[2].parent: found "S"; allowed: the id of another requirement'),
         ([STILL | {"parent": "i"}, {"id": "i", "parent": "still"}], "requirement[1].parent"),
-        ([STILL | {"in_mode": "nadir"}], 'requirement[1].in_mode: found "nadir"; allowed: no mode, for the law pd has none'),
+        (
+            [STILL | {"in_mode": "nadir"}],
+            'requirement[1].in_mode: found "nadir"; allowed: no mode, because the law pd has none',
+        ),
         ([STILL | {"after": "1 h"}], 'requirement[1].after: found "1 h"; allowed: between 0 s and the flight\'s 400 s'),
         ([BETWEEN | {"window": [5, 4]}], "requirement[1].window: found [5, 4]; allowed: two times, the later one last"),
         ([BETWEEN | {"after": 1}], "requirement[1].window: found [50, '2 min']; allowed: either after or window"),

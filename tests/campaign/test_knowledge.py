@@ -223,7 +223,7 @@ def test_a_scenario_may_say_what_its_laws_suppose():
     )
     assert measured(supposed)["effort"] == measured(unnoticed)["effort"]
     assert compare(supposed)[0].certificates == ()
-    with pytest.raises(InputError, match=r"nominal: found a [nominal] table that differs from the craft"):
+    with pytest.raises(InputError, match=r"nominal: found a \[nominal\] table that differs from the craft"):
         sh.certify(supposed)
     with pytest.raises(InputError, match=r"nominal.sensor: found a table that laws are not designed for"):
         supposed.with_({"nominal.sensor": {"rate_noise": 0.1}})

@@ -79,7 +79,7 @@ def test_limits_of_a_file_are_refused_each_with_its_line(tmp_path, made):
 def test_a_name_that_cannot_be_written_fails(made, name):
     content = made("pd-0")
     content["certificates"][0]["name"] = name
-    assert reasons(content) == ["the certificate has something else than it may under name"]
+    assert reasons(content) == ["the certificate has a value that is not allowed under name"]
 
 
 @pytest.mark.parametrize("size", leading([1e-300, 1e104, 1e-30, 1e30], 2))

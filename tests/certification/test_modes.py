@@ -63,7 +63,7 @@ def test_a_hand_over_that_says_more_is_refused_and_one_that_says_less_is_another
         assert not passed(check_file(told(name, "1.001")))
         assert compare_programs(told(name, "1"), scenario) == []
         less = compare_programs(told(name, "0.99"), scenario)
-        assert less == [f"mission: detumble to point: the mode before may end with a larger {name}"]
+        assert less == [f"mission: detumble to point: the previous mode may end with a larger {name}"]
 
 
 def test_a_hand_over_to_a_law_that_converges_from_everywhere_needs_no_bounds():

@@ -93,7 +93,7 @@ def test_each_number_is_needed():
     refused("circle", "nothing depends on clear", clear="1/1000")
     refused("full", "off it on the whole set", clear="1/100")
     refused("limit", "norm of the control", limit_norm="18/5")
-    refused("limited axis", "the limit reverses motions", width="1/2")
+    refused("limited axis", "the limit turns motions round", width="1/2")
     refused("limited axis", "the law turns motions round", reach=str(10**16))
     refused("limited axis", "x follows", reach="1/10")
     refused("limited axis", "nothing returns", boundary="2/5")

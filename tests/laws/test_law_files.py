@@ -125,7 +125,7 @@ def test_its_proofs_are_not_about_another_text_of_the_law(folder, tmp_path):
     assert compare_programs(proved, sh.load(folder / "own.toml")) == []
     path = folder / "laws" / "my_law.py"
     path.write_text(LAW.replace("scale(-1.0,", "scale(-0.5,"))
-    assert "my-law: the program of the law is another one" in compare_programs(proved, sh.load(folder / "own.toml"))
+    assert "my-law: the program of the law differs" in compare_programs(proved, sh.load(folder / "own.toml"))
     # What the file says of its own programs holds all the same.
     with adopted(from_file(path)):
         assert passed(check_file(proved))
@@ -138,7 +138,7 @@ file = "my_law.py"↵type = "pd" | either a type or a file, not both
 file = 3 | law[1].file: found 3; allowed: the name of a Python file
 file = "my_law.py"↵k = 1↵q = 2 | law[1].q: found an unknown key; allowed: one of
 file = "my_law.py"↵k = -1 | law[1].k: found -1; allowed: above 0
-file = "my_law.py"↵form = "I" | no form; my-law takes its gains
+file = "my_law.py"↵form = "I" | no form; my-law needs its gains
 k = 1 | law[1].type: found nothing; allowed: one of
 """)
 
@@ -155,7 +155,7 @@ BROKEN = rows("""
 def torque | def torques | a law needs control or torque
 gains.k, measurement.rate | gains.k, measurement.rates | law my-law: my_law.py, line 19: AttributeError
 , memory↵↵ | ↵↵ | torque must return three numbers and the memory
-, memory↵↵ | , (1.0,)↵↵ | the memory that torque returns must be formed as it was given
+, memory↵↵ | , (1.0,)↵↵ | the memory that torque returns must have the form of its argument
 """)
 
 

@@ -195,10 +195,10 @@ def test_the_command_line_writes_runs_pictures_and_the_report_and_proves_nothing
     starhold("compare", "pull.toml", "-o", "out", cwd=folder, code=0)
     names = {path.relative_to(folder / "out").as_posix() for path in (folder / "out").rglob("*") if path.is_file()}
     assert {"report.html", "rein/run.nc", "slack/run.nc", "position.png", "force.png", "command.png"} <= names
-    assert "nothing is known of the body sledge" in (folder / "out" / "report.html").read_text()
+    assert "no theorem is about the body sledge" in (folder / "out" / "report.html").read_text()
     assert json.loads((folder / "out" / "summary.json").read_text())["laws"]["rein"]["peak_command"] == 0.4
     said = starhold("certify", "pull.toml", "-o", "proof", cwd=folder, code=4)
-    assert "nothing is known of the body sledge" in said.stdout
+    assert "no theorem is about the body sledge" in said.stdout
     path = folder / "proof" / "certificate.json"
     content = json.loads(path.read_text())
     found = [(one["name"], one["outcome"], one["claims"]) for one in content["certificates"]]
@@ -217,7 +217,7 @@ def test_a_lost_motion_is_told(folder: Path) -> None:
 
 
 FAULTS = {
-    "no such body": ("pull.toml", 'file = "sledge.py"', 'type = "sled"', 'found "sled"; allowed: a file, for no other'),
+    "no such body": ("pull.toml", 'file = "sledge.py"', 'type = "sled"', 'found "sled"; allowed: a file, because no other'),
     "a body with a table": ("pull.toml", 'file = "sledge.py"', 'type = "rigid-body"', "allowed: the [spacecraft] table"),
     "no file": ("pull.toml", '"sledge.py"', '"sled.py"', 'body.file: found "sled.py": No such file or directory'),
     "another role": ("pull.toml", '"sledge.py"', '"rein.py"', 'body.file: "rein.py": '),

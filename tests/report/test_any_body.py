@@ -50,7 +50,7 @@ def test_every_recorded_quantity_is_drawn_and_told(balloon: Balloon, tmp_path: P
     assert sorted(path.stem for path in flown.draw(flights, tmp_path, balloon)) == sorted(names)
     page = write_results(balloon, flights, tmp_path)
     assert page.exists()
-    assert "nothing is known of the body hot-air-balloon" in page.read_text()
+    assert "no theorem is about the body hot-air-balloon" in page.read_text()
     assert (tmp_path / "certificate.json").exists()
 
 

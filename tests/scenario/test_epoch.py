@@ -275,7 +275,7 @@ def test_a_campaign_chooses_among_dates_and_draws_no_others():
     over = {"orbit.epoch": {"distribution": "choice", "values": ["2026-03-20T12:00:00Z", [2026, 6, 21, 0, 0, 0]]}}
     normal, noon = {"distribution": "normal", "sigma": 1}, {"distribution": "choice", "values": ["noon", "2026-01-01"]}
     for key, bad, told in (
-        ("orbit.epoch", normal, 'distribution: found "normal"; allowed: choice, for the key holds a date'),
+        ("orbit.epoch", normal, 'distribution: found "normal"; allowed: choice, because the key holds a date'),
         ("orbit.epoch", noon, 'values[1]: found "noon"; allowed: a date as'),
         ("part.sun-sensor.epoch", over["orbit.epoch"], "epoch in [orbit], which gives it to all parts"),
     ):

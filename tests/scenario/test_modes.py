@@ -164,7 +164,7 @@ def test_each_mode_has_one_effector_for_its_command(first, second, told):
 
 def test_without_modes_two_effectors_for_a_command_are_refused_with_what_helps():
     text = BASE.replace("[[law]]", RODS).partition('type = "modes"')[0] + 'type = "pd"\nk_rate = 0.01\nk_attitude = 0.001\n'
-    with pytest.raises(InputError, match=r'a second effector for the command.* type "modes" whose modes say which'):
+    with pytest.raises(InputError, match=r'a second effector for the command.* type "modes" whose modes name theirs'):
         read(text)
 
 

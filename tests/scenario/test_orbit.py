@@ -139,7 +139,7 @@ STATE↵inclination = 1 | orbit.inclination | either
 altitude = 5e5↵semi_major_axis = 7e6↵inclination = 1 | orbit.semi_major_axis | either
 altitude = 5e5 | orbit.inclination | angle
 altitude = 5e5↵inclination = 1↵eccentricity = 0.1 | orbit.eccentricity | semi_major_axis
-altitude = 5e5↵inclination = 1↵gravitational_parameter = 1e10 | orbit.radius | altitude counts from
+altitude = 5e5↵inclination = 1↵gravitational_parameter = 1e10 | orbit.radius | altitude is measured
 semi_major_axis = 7e6↵eccentricity = 1↵inclination = 1 | orbit.semi_major_axis | eccentricity
 semi_major_axis = 7e6↵eccentricity = 2↵inclination = 1 | orbit.semi_major_axis | negative
 semi_major_axis = -7e6↵eccentricity = 2↵inclination = 1↵true_anomaly = 2.2 | orbit.true_anomaly | 120
@@ -154,7 +154,7 @@ semi_major_axis = 7000↵inclination = 1 | orbit.semi_major_axis | in m
 position = ["6300 km", 0, 0]↵velocity = [0, 7900, 0] | orbit.position | the Earth's radius
 STATE↵radius = 8e6 | orbit.position | 8000 km
 STATE↵gravitational_parameter = 398600.4 | orbit.gravitational_parameter | Earth | km^3/s^2
-position = [50, 0, 0]↵velocity = [0, 3, 0]↵gravitational_parameter = 4.46e5 | orbit.position | not inside
+position = [50, 0, 0]↵velocity = [0, 3, 0]↵gravitational_parameter = 4.46e5 | orbit.position | outside the central body
 position = ["7000 km", 0, 0]↵velocity = [0, 7.55, 0] | orbit.velocity | surface | after 385 | m/s
 position = ["7000 km", 0, 0]↵velocity = [0, 0, 0] | orbit.velocity | through
 position = ["7000 km", 0, 0]↵velocity = [100, 0, 0] | orbit.velocity | through

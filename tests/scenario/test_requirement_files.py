@@ -112,5 +112,5 @@ def test_reqif_goes_in_and_out_without_loss(tmp_path):
     starhold("export", "requirements", "own.toml", "-o", "o.reqif", "--original", "spec.reqif", cwd=tmp_path, code=0)
     complains(starhold("export", "requirements", "own.toml", "-o", "o.reqif", cwd=tmp_path), "already there")
     complains(starhold("export", "requirements", "own.toml", "-o", "o.txt", cwd=tmp_path), ".csv or .reqif")
-    with refused("it is no plain text"):
+    with refused("it is not plain text"):
         reqif.written([keyed[1] | {"ReqIF.Text": "other", "text": "other"}], "t", data, "x")

@@ -76,7 +76,7 @@ UNREACHABLE = rows("""
 "50 deg/s^2" | "5 deg/s^2" | acceleration_limit: found 5 deg/s^2 | from 10 deg no root | 1/s
 rate_limit = "30 deg/s" | rate_limit = "20.01 deg/s" | rate_limit | at least 25.6 | from 180 deg no root
 duration = 40.0 | duration = 4.0 | acceleration_limit | within 4 s
-duration = 40.0 | duration = 1.0 | simulation.duration: found 1 s | from 10 deg no root comes to its end
+duration = 40.0 | duration = 1.0 | simulation.duration: found 1 s | from 10 deg no root settles
 """)
 
 

@@ -111,7 +111,7 @@ def _unreachable(scenario: Scenario, problem: SlewProblem, angle: float, limits:
     why, duration = unmet(problem, angle, table.roots, limits), f"{problem.steps * problem.loop.period:g} s"
     ended = f"from {math.degrees(angle):.4g} deg no root that settles within {duration}"
     if why.what == "end":
-        text = f"a longer one, or other roots: {ended.replace(' that comes', ' comes')}"
+        text = f"a longer one, or other roots: {ended.replace(' that settles', ' settles')}"
         return InputError(scenario.where, "simulation.duration", duration, text)
     if why.what == "both":
         return InputError(

@@ -183,7 +183,7 @@ class Station:
         wanted, _ = obligations(
             self.claim(LIMITED, limit=limit, width=1.0, reach=1.0, boundary=1.0, root_low=1.0, root_high=1.0), self.by_digest
         )
-        pull = wanted["the limit reverses motions"]
+        pull = wanted["the limit turns motions round"]
         assert isinstance(pull, Exceeds)
         p = Fraction(pull.small)
         if p <= 0:
