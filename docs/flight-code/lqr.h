@@ -16,7 +16,7 @@
 
    Program of the law: sha256 851ab1c92f50234498ca20e7141e8ad0edc5898615f514d663a47b1df0e15661
 
-   Certificate: certificate.json, sha256 a77cc222d9fa719032436149e4ecc3197bded1e545824d052a38028538952566:
+   Certificate: certificate.json, sha256 b4b73987bdc09b3e42bd2c83424dfba514422f831f11772684b84a95ac865eb9:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
@@ -64,7 +64,7 @@ typedef struct {
     lqr_vector_t torque; /* N m: torque commanded, within the limits, body axes */
 } lqr_command_t;
 
-/* What the law remembers: nothing. C has no empty structs. */
+/* The law has no memory. C has no empty structs. */
 typedef struct {
     double unused;
 } lqr_state_t;

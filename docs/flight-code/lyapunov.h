@@ -14,7 +14,7 @@
 
    Program of the law: sha256 d5137098524b4413b6d496ad62634b43647fe728da0c5962b960f411facfefe2
 
-   Certificate: certificate.json, sha256 c162a597f0643d4eecc5646440141836dcecc9340fbf21329ce7d4261123de72:
+   Certificate: certificate.json, sha256 ee33b10e288ad1c3f9bb50b4c55009ecc49d49654a1c58de0c199c43faa69cec:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on
@@ -65,7 +65,7 @@ typedef struct {
     lyapunov_vector_t torque; /* N m: torque commanded, within the limits, body axes */
 } lyapunov_command_t;
 
-/* What the law remembers: nothing. C has no empty structs. */
+/* The law has no memory. C has no empty structs. */
 typedef struct {
     double unused;
 } lyapunov_state_t;

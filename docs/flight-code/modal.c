@@ -211,8 +211,8 @@ static vector_t apply(vector_t m, vector_t a)
 
 /* -------------------------------------- laws.modal -------------------------------------- */
 
-/* Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if it could be
-   steered by the momentum. */
+/* Return K_1 (first, rest), which would give the quaternion the spectra phi_1 and b |w|2, if the momentum
+   were its input. */
 static vector_t upper(vector_t q, vector_t w, const gains_t *gains, const craft_t *craft, double first,
     vector_t rest)
 {

@@ -15,7 +15,7 @@
 
    Program of the law: sha256 99130acbe6b13c7bcd3c5cbc219c37d087ae6db2517dfd9e6fe729d84998d648
 
-   Certificate: certificate.json, sha256 f6a0e055e7f42ac34a377ae14cc881285b0d08be2a3a1fafd9aa8bb7b9325459:
+   Certificate: certificate.json, sha256 cad79d88c6f9f37059d8b5abf61d803b8aaf043f8c20934953fd051a245b581c:
    proved
    Claims:
      proved: region of attraction: from the level set of V that holds rest at every attitude told by the
@@ -57,7 +57,7 @@ typedef struct {
     modal_vector_t torque; /* N m: torque commanded, within the limits, body axes */
 } modal_command_t;
 
-/* What the law remembers: nothing. C has no empty structs. */
+/* The law has no memory. C has no empty structs. */
 typedef struct {
     double unused;
 } modal_state_t;

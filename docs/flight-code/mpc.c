@@ -1227,7 +1227,7 @@ static repelled_result_t repelled(const limits_t *limits, vector_t v, vector_t m
         m.e[5] + multipliers.z * (1.0 + d.z * d.z / s.z)}}, .push = push};
 }
 
-/* Tell which axes of a box press against a limit, for the gradient g. */
+/* Return which axes of a box press against a limit, for the gradient g. */
 static bools3_t pressing(const limits_t *limits, vector_t v, vector_t g)
 {
     const bool t7 = (g.x < 0.0 && limits->high.x <= v.x) || (0.0 < g.x && v.x <= limits->low.x);
@@ -2128,7 +2128,7 @@ static attempt_t newton(double *numbers, const progress_t *now)
 
 /* ------------------------------- laws.predictive.interior ------------------------------- */
 
-/* Put the plan aside, and start well inside. */
+/* Store the plan, and start well inside the limits. */
 static void begin(double *numbers, double barrier)
 {
     const limits_t bounds = limits_1(numbers);
@@ -2268,7 +2268,7 @@ static void settle(double *numbers)
     }
 }
 
-/* Take back the plan put aside; gives half its cost. */
+/* Restore the stored plan; return half its cost. */
 static double restore(double *numbers)
 {
     for (int32_t k = 0; k < 10; k++) {

@@ -19,7 +19,7 @@
    wheels.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 17bc635dc0b5b6050eba4f9671b10b6c1a1aeeeda5200bb0ec29047e09956620:
+   Certificate: certificate.json, sha256 e536df4a07aa4a9fd28a04d192ff968da50ced344e3a09c61c61bd3f991b2741:
    undecided
    Claims:
    Check it independently: starhold check certificate.json */
@@ -54,7 +54,7 @@ typedef struct {
     mpc_vector_t torque; /* N m: torque commanded, within the limits, body axes */
 } mpc_command_t;
 
-/* What is remembered from step to step: set it by the function below, and leave it alone. */
+/* The memory from step to step: set it by the function below, and do not change it. */
 typedef struct {
     double numbers[697];
 } mpc_state_t;

@@ -20,7 +20,7 @@
    0.1 s.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 eb9c7f669777bff36ad24cf15c3a955e3c0096b985224e9f38686a076ed5f710:
+   Certificate: certificate.json, sha256 5f4e5ffa9c2d401f70f80cd5b7d4b864417c34a83be9e3764f08649fd1363b6f:
    undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches
@@ -61,7 +61,7 @@ typedef struct {
     sliding_vector_t torque; /* N m: torque commanded, within the limits, body axes */
 } sliding_command_t;
 
-/* What the law remembers: nothing. C has no empty structs. */
+/* The law has no memory. C has no empty structs. */
 typedef struct {
     double unused;
 } sliding_state_t;

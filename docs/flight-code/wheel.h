@@ -14,7 +14,7 @@
 
    Program of the law: sha256 4f874e55fa16eec8b64cc78923eef683c9775f1cdd52baf71d83b3a67f9942c4
 
-   Certificate: certificate.json, sha256 b64ee89e3f79f9ced86701eff87a38baba707a484a6e2e352c2c9e18c773a5f1:
+   Certificate: certificate.json, sha256 0e97f9dd6a2c0d12f7a4600b5246e82f14a43ddef18c736bebb3334862011637:
    proved
    Claims:
      proved: converges: with wheels that have neither limits nor friction, from every attitude and rate the
@@ -79,7 +79,7 @@ typedef struct {
     wheel_vector_t torque; /* N m: torque commanded, within the limits, body axes */
 } wheel_command_t;
 
-/* What is remembered from step to step: set it by the function below, and leave it alone. */
+/* The memory from step to step: set it by the function below, and do not change it. */
 typedef struct {
     wheel_quaternion_t followed;
 } wheel_state_t;
