@@ -37,6 +37,12 @@ class InputError(Exception):
         return InputError, (self.where, self.key, self.given, self.allowed)
 
 
+class CutShortError(InputError):
+    """A flight ended early by what is outside of it; recording: what was flown until then, where anything was."""
+
+    recording: Any = None
+
+
 @contextmanager
 def input_at(where: str, key: str, given: str = "") -> Generator[None]:
     """Refuse as the user's input there what raises a ValueError."""

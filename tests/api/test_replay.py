@@ -46,7 +46,7 @@ def test_readings_alone_give_the_estimates_to_the_bit(tmp_path):
     names = [head for head in table() if head.startswith(("time", "gyro", "star", "magnet", "mekf")) or head == "command_x"]
     result = replayed(table()[names], tmp_path)
     estimates = [one for one in result.comparisons if one.name.startswith("mekf")]
-    assert len(estimates) == 3
+    assert len(estimates) == 4
     assert all(one.same_bits for one in estimates)
     assert any("Not recorded" in note and "wheel_momentum" in note for note in result.notes)
     # Nothing of the model is left in what is recorded: another craft has the same estimates.

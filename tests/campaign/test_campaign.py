@@ -168,7 +168,7 @@ def test_goes_on_after_a_crash_with_more_runs_and_not_after_a_change(result, tmp
     assert len(held) == 3
     held[1].write_bytes(held[1].read_bytes()[:-9] + b"corrupted")
     (folder / "campaign.json").unlink()
-    with pytest.warns(UserWarning, match="not those that were written; runs 32 to 63 are flown again"):
+    with pytest.warns(UserWarning, match="its bytes were changed; runs 32 to 63 are flown again"):
         again = fly(folder, metrics=["overshoot", "iterations"], resume=True)
     assert again.digest == result.digest
     assert again.flown == 32 + 20 + 20

@@ -109,8 +109,8 @@ REFUSED = {
     "simulation.duration": "all runs share",
     "transient.rate": "no [transient] table",
     "initial.rate[4]": "1 to 3",
-    "sensor.rate_noise[1]": "no vector",
-    "spacecraft.inertia.x": "component",
+    "sensor.rate_noise[1]": "not a vector",
+    "spacecraft.inertia.x": "index",
     "a..b": "not a key",
     "": "not a key",
 }

@@ -100,7 +100,7 @@ WRITTEN = rows("""
 @pytest.mark.parametrize("epoch", [epoch for row in WRITTEN for epoch in row])
 def test_every_part_gets_the_epoch_of_the_orbit_however_it_is_written(epoch):
     found = epochs(scenario(epoch, law=MODES))
-    assert len(found) == 10
+    assert len(found) == 11
     assert set(found.values()) == {NOON}
 
 

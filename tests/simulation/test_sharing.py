@@ -19,7 +19,7 @@ from tests.making import built
 STEP = {
     "cubesat-detumble": (1138, 21, 1941, 28),
     "cubesat-mission": (1847, 43, 3545, 42),
-    "cubesat-nadir": (1434, 37, 4261, 33),
+    "cubesat-nadir": (1441, 37, 4261, 33),
     "cubesat-slew": (513, 36, 2791, 50),
     "flexible-slew": (111, 1, 6012, 8),
     "geostationary": (215, 17, 796, 0),

@@ -12,7 +12,7 @@ import pytest
 
 from starhold.algebra.scalar import both, either, less, sqrt, where
 from starhold.algebra.structured import Buffer, at, function, repeat, unless, until, when
-from starhold.algebra.words import number_of, word_add, word_xor
+from starhold.algebra.words import word_add, word_xor
 from starhold.errors import InputError
 from starhold.trace.handles import RecordingError
 from starhold.trace.program import Branch, Call, Load, Loop, Op, Program, Store, single_turns, statements
@@ -310,7 +310,6 @@ REFUSED: list[tuple[Callable[..., Any], str, str]] = [
     (lambda c, t, n, w: where(t[0], 1.0, 2.0), "select of a value of kind number", "a truth, as less gives"),
     (lambda c, t, n, w: both(less(t[0], 0.0), 1.0), "both of a value of kind float", "a truth, as less gives"),
     (lambda c, t, n, w: word_xor(w, t[0]), "word_xor of a value of kind number", "a word"),
-    (lambda c, t, n, w: number_of(t[0]), "number_of of a value of kind number", "a count or a counter"),
     (lambda c, t, n, w: c.put(0, (n,)), "a value of kind index in a buffer", "a number"),
     (lambda c, t, n, w: t.put(0, (1.0,)), "writing to a table", "a buffer of the law's memory"),
     (lambda c, t, n, w: repeat(3, lambda k, x: (x, x), t[0]), "takes number and gives number, number", "the same"),

@@ -30,7 +30,7 @@ from starhold.cli.arguments import (
     Unstable,
 )
 from starhold.cli.study import Outlet, open_outlets
-from starhold.errors import InputError, InterruptedByUserError
+from starhold.errors import CutShortError, InputError, InterruptedByUserError
 from starhold.report.commands import names
 
 if TYPE_CHECKING:
@@ -107,7 +107,6 @@ def _fly(
     scenario = load(file, allow_unstable)
     from starhold.cli.console import console
     from starhold.cli.show import flying, print_outcome, print_results
-    from starhold.link.process import LostLawError
     from starhold.report.results import open_folder, write_results, write_run
     from starhold.studies import compare as studies
     from starhold.studies.timing import Stopwatch
@@ -134,7 +133,7 @@ def _fly(
                     keep(flight)
                 try:
                     flights.append(studies.fly_law(scenario, entry, loop, notice, process))
-                except LostLawError as error:
+                except CutShortError as error:
                     # Nothing that was flown is lost.
                     if error.recording is not None:
                         write_run(error.recording, folder / "run.nc")

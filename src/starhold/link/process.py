@@ -11,11 +11,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from starhold.errors import InputError
+from starhold.errors import CutShortError, InputError
 from starhold.link.plant import Ending, Plant, Rules
 from starhold.link.protocol import Decoder
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.simulation.lane import Progress, Recording
+from starhold.simulation.lane import Progress
 from starhold.simulation.stepper import Stepper
 
 PATIENCE = 60.0
@@ -26,16 +26,12 @@ EVERY = 100
 """Control steps between two reports of progress."""
 
 
-class LostLawError(InputError):
-    """A law's process failed. flight: what was flown until then; recording: the same under its names, where there is one."""
+class LostLawError(CutShortError):
+    """A law's process failed. flight: what was flown until then."""
 
     def __init__(self, flight: Stepper, found: str, allowed: str) -> None:
         super().__init__("run", "--law-process", found, allowed)
         self.flight = flight
-        self.recording: Recording | None = None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return InputError, (self.where, self.key, self.given, self.allowed)
 
 
 def fly_by_process(

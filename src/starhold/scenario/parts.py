@@ -1,6 +1,5 @@
 """Reads the [[part]] tables of a scenario: parts of any role, each in a file of its own, here or in another package."""
 
-import csv
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -13,7 +12,6 @@ from starhold.algebra.quantity import quantities
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError, input_at, is_interrupt
-from starhold.files import read_text
 from starhold.laws.catalogue import Law
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_be_inactive, is_recorded
@@ -24,6 +22,7 @@ from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
+from starhold.scenario.csv_files import csv_lines, number_in
 from starhold.scenario.schema import columns
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
@@ -132,24 +131,6 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
             except ValueError as error:
                 raise InputError(where, f"{key}.{item.name}", f"{given}: {error}", allowed) from None
     return filled
-
-
-def csv_lines(path: Path) -> list[tuple[int, list[str]]]:
-    """The lines of a CSV file that are neither empty nor comments: their numbers, and their cells without spaces around.
-    Raises OSError, or ValueError where it is no CSV file."""
-    try:
-        rows = [(k, [cell.strip() for cell in row]) for k, row in enumerate(csv.reader(read_text(path).splitlines()), 1)]
-    except csv.Error as error:
-        raise ValueError(str(error)) from None
-    return [(number, cells) for number, cells in rows if any(cells) and not cells[0].startswith("#")]
-
-
-def number_in(text: str) -> float | None:
-    """Return the number in a cell of a CSV file; None for words."""
-    try:
-        return float(text)
-    except ValueError:
-        return None
 
 
 def check_fit(loop: ClosedLoop, where: str) -> None:

@@ -15,7 +15,7 @@ from starhold.algebra.structure import flatten, unflatten
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
-from starhold.scenario.parts import number_in
+from starhold.scenario.csv_files import number_in
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import Recording, fly, recorded
 from starhold.simulation.replay import given_like, replay

@@ -28,7 +28,8 @@ from starhold.parts.targets import history
 from starhold.scenario.bodies.rigid_body.craft import effectors_of, sure_torque, torque_limit
 from starhold.scenario.bodies.rigid_body.tables import Pointing, TargetTable
 from starhold.scenario.checking import show, validate
-from starhold.scenario.parts import csv_lines, number_in, read_part
+from starhold.scenario.csv_files import csv_lines, number_in
+from starhold.scenario.parts import read_part
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
