@@ -131,6 +131,9 @@ def test_every_number_that_disturbs_is_a_source_and_what_shapes_the_loop_is_none
     names = [source.name for source in sources(sh.scenario(FULL))]
     sensed = ["gyro noise", "gyro bias", "star-tracker cross", "star-tracker roll"]
     assert names == ["gravity gradient", "wheel friction", *sensed, "leak"]
+    skewed = sh.scenario(FULL).with_({"part.gyro.axis_errors": [[0, 1e-3, 0], [0, 0, 0], [0, 0, 0]]})
+    (axes,) = [source for source in sources(skewed) if source.name == "gyro axis errors"]
+    assert not np.any(skewed.with_(dict(axes.without)).parts[0].params.axis_errors)
     assert [row.name for row in full.rows if row.kind == "source"] == names
     # Neither what is constant nor noise moves the error of an estimate that knows the motion.
     assert full.level("leak", "APE") > 100.0 * full.level("leak", "AKE") > 0.0

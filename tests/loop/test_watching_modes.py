@@ -88,7 +88,11 @@ def test_a_lost_tracker_leads_to_the_safe_mode_and_a_fix_out_of_it():
         + mode("work")
         + mode("safe", 'until = { tracker_age_below = "0.6 s", to = "work" }')
     )
-    run = flown(built(parse(text, "m.toml")), 500)
+    scenario = parse(text, "m.toml")
+    run = record(scenario, built(scenario))
+    assert [(one.mode, one.monitor) for one in modes_flown(scenario.laws[0].law, run)] == [
+        ("work", ""), ("safe", "tracker"), ("work", "")
+    ]  # fmt: skip
     safe = run["time"][run["mode"] == 2.0]
     # The last attitude comes at 99 s, the next at 160 s.
     assert (safe[0], safe[-1]) == (104.0, 159.5)

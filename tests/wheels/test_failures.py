@@ -210,6 +210,15 @@ def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
     assert [row["limit (1)"] for row in rows] == ["norm", "norm"]
 
 
+def test_the_losses_that_a_mode_waits_for_are_no_gain(tmp_path, capsys):
+    gains = 'type = "wheel"\nk_rate = 0.6\nk_attitude = 0.01\n'
+    law = 'type = "modes"\nquaternion_sign = "shortest"\non_loss = "safe"\nwheels_lost = 2\n'
+    law += f'[[law.mode]]\nname = "work"\n{gains}[[law.mode]]\nname = "safe"\n{gains}'
+    _, said, _ = intact_and_struck(law, tmp_path, capsys)
+    assert "wheels_lost" not in said
+    assert "The gains are the same in all of them." in said
+
+
 def test_a_law_that_what_is_left_does_not_suit_leaves_the_rest_of_the_study(tmp_path, capsys):
     law = 'type = "pd"\nk_rate = 0.3\nk_attitude = 0.013\nlimit = "axis"\n'
     (intact, struck), said, rows = intact_and_struck(law, tmp_path, capsys)

@@ -118,10 +118,11 @@ def print_table(flights: Sequence[Flight]) -> None:
     for flight in flights:
         if flight.modes:
             first, *later = flight.modes
-            stretches = "".join(
-                f", {one.mode} from {metric_set.moment(one.time, 6)}{f' ({one.utc} UTC)' if one.utc else ''}"
-                for one in later
-            )
+            stretches = ""
+            for one in later:
+                notes = [f"{one.utc} UTC"] * bool(one.utc) + [f"the monitor {one.monitor} is tripped"] * bool(one.monitor)
+                said = f" ({'; '.join(notes)})" if notes else ""
+                stretches += f", {one.mode} from {metric_set.moment(one.time, 6)}{said}"
             console.print(escape(f"Modes of {flight.name}: {first.mode}{stretches}."))
 
 

@@ -280,7 +280,7 @@ def _errors_of(fitted: Fitted) -> dict[str, Any]:
 
 
 def _may_be_zero(gain: Parameter) -> bool:
-    plain = not (gain.whole or gain.choices or gain.columns or len(gain.shape) > 1)
+    plain = not (gain.whole or gain.choices or gain.columns)
     # Delays and intervals shape the loop: without them the same noise would have another effect.
     return plain and gain.unit != "s" and gain.above is None and (gain.at_least or 0.0) <= 0.0 <= (gain.at_most or 0.0)
 

@@ -21,11 +21,13 @@ if TYPE_CHECKING:
 
 
 class Begun(NamedTuple):
-    """A mode of this name begins at a time (s), on a date (UTC) where the law's conditions know of dates."""
+    """A mode of this name begins at a time (s), on a date (UTC) where the law's conditions know of dates, because of the
+    monitor that is tripped then, if one is."""
 
     mode: str
     time: float
     utc: str = ""
+    monitor: str = ""
 
     @property
     def results(self) -> dict[str, Any]:

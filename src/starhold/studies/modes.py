@@ -54,11 +54,15 @@ def stretches(run: Recording) -> list[Stretch]:
 def modes_flown(law: Law, run: Recording, epoch: Date | None = None) -> tuple[Begun, ...]:
     """The modes of a recorded run by their names, with the times at which they begin, which are control instants; epoch: of
     a flight whose modes have dates."""
-    period = run.attrs["control_period"]
-    times = [(one.mode, one.first * period) for one in stretches(run)]
-    return tuple(
-        Begun(law.module.modes[mode - 1].name, time, date_after(epoch, time) if epoch else "") for mode, time in times
-    )
+    period, module = run.attrs["control_period"], law.module
+    begun: list[Begun] = []
+    for mode, first, _ in stretches(run):
+        time, monitor = first * period, 0
+        if module.on_loss == mode - 1:
+            monitor = int(run["tripped"][np.searchsorted(run["time"], time - 0.5 * period)])
+        date, name = date_after(epoch, time) if epoch else "", module.monitors[monitor - 1].name if monitor else ""
+        begun.append(Begun(module.modes[mode - 1].name, time, date, name))
+    return tuple(begun)
 
 
 def epoch_of(scenario: Scenario, law: Law) -> Date | None:

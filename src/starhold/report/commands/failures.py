@@ -19,6 +19,8 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
 
     flown = [failure.gains for failure in failures if failure.gains is not None]
     retuned = [name for name in flown[0] if any(number_text(g[name]) != number_text(flown[0][name]) for g in flown)]
+    # What counts the losses left until the mode for them is no gain.
+    retuned = [name for name in retuned if name != "wheels_lost"]
     sentences: list[str] = []
     if any(not failure.controllable for failure in failures):
         sentences.append("not (x, y, z): no control torque is left about this body direction.")
