@@ -39,7 +39,8 @@ class Dealer:
         return self._socket.recv()
 
     def close(self):
-        self._context.destroy(linger=0)
+        # What was sent leaves first.
+        self._context.destroy(linger=1000)
 
 
 class Board:
