@@ -66,7 +66,7 @@ def verdicts(scenario: Scenario, flights: Sequence[Flight]) -> tuple[str, str]:
         measure = flights[0].metric_set.measures.get(first.metric) or plain_measure(first.metric, first.unit)
         limit = next((text for one in same if (text := amount(one, one.limit))), "")
         limit = f"{'≤' if first.at_most else '≥'} {limit}" if limit else ""
-        subject = "the motion is not lost" if first.metric == LOST else measure.heading
+        subject = "the motion does not diverge" if first.metric == LOST else measure.heading
         cells = [Markup(f"{pill(one.verdict)} {escape(amount(one, one.number) or '')}") for one in same]
         how = dict.fromkeys(_evidence(one, flights[number].name) for number, one in zip(judged, same, strict=True))
         name = Markup(f'<small class="id">{escape(first.id)}</small> {escape(first.text or subject)}')

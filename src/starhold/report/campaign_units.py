@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 DASH = "—"
 LOST = "lost"
-"""In the requirement that a motion is not lost, this takes the place of the metric."""
+"""In the requirement that a motion does not diverge, this takes the place of the metric."""
 INDEPENDENT = "random"
 """The sampling whose draws are independent of each other."""
 
@@ -52,7 +52,7 @@ class Wording:
         return self.measure(self.requirements[name].column if name in self.requirements else name)
 
     def is_loss(self, name: str) -> bool:
-        """Return whether the requirement of this name is that the motion is not lost."""
+        """Return whether the requirement of this name is that the motion does not diverge."""
         return name in self.requirements and self.requirements[name].column == LOST
 
     def asks(self, name: str) -> str:
@@ -61,7 +61,7 @@ class Wording:
             return ""
         item, measure = self.requirements[name], self.required(name)
         if self.is_loss(name):
-            return "the motion is not lost"
+            return "the motion does not diverge"
         return f"{measure.heading} at {'most' if item.at_most else 'least'} {with_unit(item.bound, measure)}"
 
     def called(self, name: str) -> str:

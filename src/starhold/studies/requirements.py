@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 ORBITS = re.compile(r"([0-9]+(?:\.[0-9]+)?) ?orbits?")
 """A time in orbits of the flight."""
 LOST = "lost"
-"""Beside metrics and the exclusion-cone it may be required that the motion is not lost."""
+"""Beside metrics and the exclusion-cone it may be required that the motion does not diverge."""
 
 
 @dataclass(frozen=True)
