@@ -105,6 +105,7 @@ def test_real_time_keeps_to_the_clock_and_counts_what_is_missing(tmp_path, monke
     assert (kept["period"], kept["periods"], kept["missed"]) == (period, 21, plant.missed)
     assert (kept["latencies"], kept["lateness"]) == (plant.latencies, plant.lateness)
     assert spent >= 20.5 * period
+    assert result.recording.attrs["without_command"] == "zero"
     assert plant.missed + plant.commanded == 21
     assert plant.commanded <= 1
     assert plant.faults[Fault.LATE] >= 1

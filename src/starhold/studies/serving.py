@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,9 +53,11 @@ class Served:
 
     @cached_property
     def recording(self) -> Recording:
-        """The flight since the last reset, as `simulate` records it, but for the program of the law, which nobody knows."""
-        flight, every = self.plant.flight, self.scenario.table.simulation.record_every
-        return commanded_by("a peer", name_samples(self.scenario, flight.loop, *flight.samples(every)))
+        """The flight since the last reset, as `simulate` records it, but for the program of the law, which nobody knows. Of
+        one in real time an attribute says what flew a period without a command."""
+        flight, every, rules = self.plant.flight, self.scenario.table.simulation.record_every, self.plant.rules
+        run = commanded_by("a peer", name_samples(self.scenario, flight.loop, *flight.samples(every)))
+        return run if rules.rate is None else replace(run, attrs=run.attrs | {"without_command": rules.missing.value})
 
 
 @shortly
