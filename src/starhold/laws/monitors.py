@@ -21,7 +21,7 @@ KINDS: dict[Kind, str] = {
     "stuck": "longest time without a change",
     "residual": "largest difference of a new reading from the estimate",
 }
-"""What a monitor looks at, with the meaning of its limit."""
+"""A monitor is of one of these kinds; each comes with the meaning of its limit."""
 TIMES = Gain("1", at_least=1.0, text="so many values in a row, or instants of a range, must be beyond the limit")
 
 

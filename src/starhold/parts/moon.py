@@ -28,7 +28,7 @@ _LONGITUDE = (
 )
 _LATITUDE = ((5.13, 93.3, 483202.02), (0.28, 228.2, 960400.89), (-0.28, 318.3, 6003.15), (-0.17, 217.6, -407332.21))
 _PARALLAX = (0.0518, 0.0095, 0.0078, 0.0028)
-"""Of the cosines of the longitude's first angles; beside 0.9508 deg."""
+"""The parallax has these cosines of the longitude's first angles (deg), beside 0.9508 deg."""
 
 
 class Numbers(NamedTuple):

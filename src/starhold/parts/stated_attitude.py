@@ -18,7 +18,7 @@ START = Parameter(
 )
 """The declaration of the initial estimate, common to all estimators."""
 VALID = Quantity("1", "1 where the estimated attitude rests on one that was measured, else 0")
-"""What says whether an estimate can be relied on, common to all estimators."""
+"""The quantity says whether an estimate can be relied on; all estimators have it."""
 
 
 def unit_quaternion(stated: Quaternion) -> Quaternion:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 MANY = 9
-"""Of a setting with more numbers than this only the first and the last are shown."""
+"""A setting with more numbers than this is shown by its first and its last."""
 
 
 def settings(scenario: Scenario) -> str:

@@ -12,7 +12,7 @@ from starhold.report.plots import COLOURS
 from starhold.report.results import TIMING
 
 LEAST = 1e-6
-"""What is quicker is drawn as this (s)."""
+"""The histogram begins at this time (s), and counts shorter ones there."""
 BINS = 60
 
 

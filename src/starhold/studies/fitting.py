@@ -32,7 +32,7 @@ from starhold.trace.tangent import MARK, tangent
 Array: TypeAlias = NDArray[np.float64]
 Nodes: TypeAlias = Callable[[int, Array], Array]
 START = tuple(f"{name}_{axis}" for name in ("initial turn", "initial rate") for axis in "xyz")
-"""Of the start, which is always free: a rotation vector (rad) of the attitude, body axes, and the rate (rad/s)."""
+"""The start is always free: a rotation vector (rad) of the attitude, body axes, and the rate (rad/s)."""
 WIDTH = 16
 """Slopes that are computed at once."""
 NUDGE = 1e-6

@@ -34,7 +34,7 @@ NONE: dict[str, Any] = {
     "dynamic_imbalance": 0.0,
     "position": (0.0, 0.0, 0.0),
 }
-"""What wheels may have besides, and what stands for none."""
+"""Wheels may have these further numbers; each comes with the value that means none."""
 
 
 def written_out(scenario: Scenario, target: Fitted, effectors: tuple[Fitted, ...]) -> tuple[Fitted, ...]:

@@ -121,7 +121,7 @@ def _struck(wheels: Wheels, fault: FaultTable) -> Wheels:
 
 
 def _told(gains: Any, wheels: Wheels, fault: FaultTable) -> Any:
-    """The gains of a law that is told of a lost wheel: one less is left of those whose loss begins another mode."""
+    """Return the gains of a law that knows of a lost wheel: one less is left of those whose loss begins another mode."""
     if not hasattr(gains, "wheels_lost") or wheels.torque_limit[_index(fault)] > 0.0:
         return gains
     return gains._replace(wheels_lost=gains.wheels_lost - 1.0)
