@@ -34,6 +34,7 @@ from starhold.algebra.vector import (
 )
 from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
+from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import Card, Noise, Parameter, Recursion
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, VALID, unit_quaternion
@@ -199,10 +200,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 def spread_of(cross: float, roll: float, boresight: Vector) -> Matrix:
     """The covariance of the error of a star tracker's attitude (rad2, body axes)."""
-    size = math.hypot(*boresight)
-    if not size > 0.0:
-        raise ValueError("the boresight needs a direction")
-    return along_axis(scale(1.0 / size, boresight), roll**2, cross**2)
+    return along_axis(unit_boresight(boresight), roll**2, cross**2)
 
 
 def remember(params: Numbers, state: Any) -> Memory:

@@ -10,6 +10,7 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, both, less, maximum, opposite, sqrt, where
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, unit
 from starhold.parts import as_built
+from starhold.parts.boresight import field_cosine, unit_boresight
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.orbit import BODIES
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -71,13 +72,10 @@ class Reading(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for a boresight without direction and a bad outage."""
-    size = math.hypot(*params.boresight)
-    if not size > 0.0:
-        raise ValueError("the boresight needs a direction")
     return Numbers(
         params.noise,
-        scale(1.0 / size, params.boresight),
-        math.cos(params.half_angle) - 1e-12,
+        unit_boresight(params.boresight),
+        field_cosine(params.half_angle),
         params.limb_height,
         in_steps(params.outage, period),
         as_built.axes_of(params.mounting_error, ZERO),

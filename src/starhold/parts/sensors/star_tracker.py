@@ -11,6 +11,7 @@ from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, wh
 from starhold.algebra.structured import when
 from starhold.algebra.vector import ZERO, Vector, add, along_axis, dot, scale, subtract
 from starhold.parts import as_built, blinding
+from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
@@ -93,13 +94,10 @@ class Reading(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a control step. ValueError for a boresight without direction, too long a delay, a bad outage,
     and cones that blind always."""
-    size = math.hypot(*params.boresight)
-    if not size > 0.0:
-        raise ValueError("the boresight needs a direction")
     late = round(params.delay / period)
     if late > MOST:
         raise ValueError(f"the delay must be at most {MOST} control periods, {MOST * period:g} s")
-    boresight, mounted = scale(1.0 / size, params.boresight), as_built.turn_of(params.mounting_error)
+    boresight, mounted = unit_boresight(params.boresight), as_built.turn_of(params.mounting_error)
     looks = to_reference(mounted, boresight) if mounted else boresight
     return Numbers(
         params.cross,

@@ -8,9 +8,10 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, where
-from starhold.algebra.vector import ZERO, Vector, add, dot, scale, unit
+from starhold.algebra.vector import ZERO, Vector, add, dot, unit
 from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
+from starhold.parts.boresight import field_cosine, unit_boresight
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -73,14 +74,10 @@ class Reading(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for a boresight without direction, a bad epoch and a bad outage."""
-    size = math.hypot(*params.boresight)
-    if not size > 0.0:
-        raise ValueError("the boresight needs a direction")
-    # The margin for rounding lets a sensor with half a turn see all.
-    cosine = math.cos(params.half_angle) - 1e-12
+    cosine = field_cosine(params.half_angle)
     outage = in_steps(params.outage, period)
     axes = as_built.axes_of(params.mounting_error, ZERO)
-    boresight = scale(1.0 / size, params.boresight)
+    boresight = unit_boresight(params.boresight)
     return Numbers(params.noise, boresight, cosine, sun.prepared(params.epoch), period, outage, axes)
 
 
