@@ -13,7 +13,7 @@ from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, renormalise
 from starhold.algebra.rotation import short_turn
-from starhold.algebra.scalar import Scalar, Truth, both, less, less_equal, maximum, sqrt, where
+from starhold.algebra.scalar import Scalar, Truth, both, less, less_equal, maximum, where
 from starhold.algebra.structure import chosen
 from starhold.algebra.structured import when
 from starhold.algebra.vector import (
@@ -36,6 +36,7 @@ from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
 from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import Card, Noise, Parameter, Recursion
+from starhold.parts.covariance import carried, deviations, summed, symmetric
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
@@ -288,11 +289,7 @@ def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) ->
     """The estimate a control period on: the rate between the gyro's two readings is their mean."""
     mean = subtract(scale(0.5, add(memory.rate, rate)), memory.bias)
     turn, axes, drift = turned(mean, period)
-    mixed = summed(product(axes, memory.mixed), product(drift, memory.walk))
-    spread = summed(
-        product(summed(product(axes, memory.turn), product(drift, transpose(memory.mixed))), transpose(axes)),
-        product(mixed, transpose(drift)),
-    )
+    spread, mixed = carried(memory.turn, memory.mixed, memory.walk, axes, drift)
     return memory._replace(
         attitude=renormalise(multiply(memory.attitude, turn)),
         turn=symmetric(combine(1.0, spread, params.reading + params.turned, IDENTITY)),
@@ -327,21 +324,21 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
     (_, axes, drift), reading, walk = turned(rate, period), noise.rate, noise.walk
     known = -2.0 * numbers.reading / period
 
-    def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+    def drifted(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         (turn, bias, last), now, walked = errors, scale(reading, random[0]), scale(walk, random[1])
         mean = subtract(scale(0.5, add(add(last, now), walked)), bias)
         ahead, bias = subtract(apply(axes, turn), apply(drift, mean)), subtract(bias, walked)
         return (ahead, bias, now), ahead, subtract(now, bias)
 
     def corrected(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
-        (ahead, bias, now), *_ = carried(errors, random)
+        (ahead, bias, now), *_ = drifted(errors, random)
         deviation = subtract(reduce(add, map(apply, seen, random[2:])), ahead)
         bias = add(bias, apply(gain.bias, deviation))
         rate = subtract(subtract(now, bias), scale(known, apply(gain.sure, deviation)))
         kept = (add(ahead, apply(gain.ahead, deviation)), bias, now)
         return kept, add(ahead, apply(gain.turn, deviation)), rate
 
-    return Recursion(corrected, carried, noise.every, 3, 2 + len(seen))
+    return Recursion(corrected, drifted, noise.every, 3, 2 + len(seen))
 
 
 @cache
@@ -358,22 +355,6 @@ def settled(params: Numbers, every: int, rate: Vector, period: float) -> Gains |
             return gain
         before = gain
     return None
-
-
-def summed(a: Matrix, b: Matrix) -> Matrix:
-    """Return a + b."""
-    return combine(1.0, a, 1.0, b)
-
-
-def symmetric(a: Matrix) -> Matrix:
-    """Return the mean of a matrix and its transpose, which differ by rounding."""
-    x, y, z = 0.5 * (a[0][1] + a[1][0]), 0.5 * (a[0][2] + a[2][0]), 0.5 * (a[1][2] + a[2][1])
-    return ((a[0][0], x, y), (x, a[1][1], z), (y, z, a[2][2]))
-
-
-def deviations(a: Matrix) -> Vector:
-    """Return the square roots of the diagonal."""
-    return (sqrt(a[0][0]), sqrt(a[1][1]), sqrt(a[2][2]))
 
 
 def examples() -> list[Params]:
