@@ -117,7 +117,7 @@ def errors(run):
 
 
 def test_it_finds_attitude_and_rate_of_a_body_that_tumbles():
-    """With a gyro, through an outage: errors over deviations before it, at its end and long after it lie in a 99.9 % band."""
+    """With a gyro and an outage: errors over deviations before it, at its end and long after it are in a 99.9 % band."""
     squares, outage = [], (1800.0, 2100.0)
     for seed in range(1, 17):
         run = tumbling(True, seed, "45 min", outage=list(outage))

@@ -1,13 +1,17 @@
 """Estimates say whether they rest on a measurement, and their deviations are right between measurements too."""
 
 import math
+import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 
 import starhold as sh
+from starhold.report.attitude_plots import unsure
 from starhold.scenario.building import build
+from starhold.simulation.lane import Recording
 from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, errors, scenario, tracker
 
 LATE = FIRST | {"outage": [0.0, 10.0]}
@@ -43,6 +47,25 @@ def test_an_estimate_that_is_too_uncertain_is_not_valid():
     deviation = run["mekf_attitude_deviation"].values.max(axis=1)
     assert run["mekf_is_valid"].values.tolist() == (deviation <= 100.0 * ARCSEC).astype(float).tolist()
     assert 0.2 < run["mekf_is_valid"].values.mean() < 0.9
+
+
+def test_time_without_a_valid_estimate_is_required_flown_many_times_and_drawn():
+    """Of a tracker that comes up at 10 s of 40: 20 of 81 instants. Where no estimator says it, there is no such metric."""
+    required = [
+        {"id": "share", "metric": "invalid_share", "method": "flight", "at_most": 20 / 81},
+        {"id": "longest", "metric": "longest_invalid", "method": "campaign", "at_most": "9.9 s"},
+    ]
+    drawn = {
+        "requirement": required,
+        "campaign": {"runs": 4, "over": {"initial.rate": {"distribution": "normal", "sigma": 1e-3}}},
+    }
+    text = tomllib.loads(scenario(GYRO, LATE, FILTER, record_every=1).text)
+    share, longest = sh.verify(sh.scenario(text | drawn))
+    assert (share.verdict, share.number, longest.verdict) == ("met", 20 / 81, "missed")
+    run = sh.simulate(sh.scenario(text))
+    assert unsure([SimpleNamespace(recording=Recording.of(run))]) == ((0.0, 10.0),)
+    with pytest.raises(sh.InputError, match=r"invalid_share.* limit_share"):
+        sh.verify(sh.scenario(tomllib.loads(scenario().text) | {"requirement": required[:1]}))
 
 
 def test_errors_are_as_large_as_the_filter_says_between_updates_too():

@@ -1,5 +1,5 @@
-"""Attitude, and rate or a gyro's bias, from the magnetic field alone, by an extended Kalman filter that begins anew where the
-fields measured contradict it: for a body that tumbles, and of which nothing is known."""
+"""Attitude, and rate or a gyro's bias, from the magnetic field alone, by an extended Kalman filter that begins anew where
+the fields measured contradict it: for a body that tumbles, and of which nothing is known."""
 
 from __future__ import annotations
 
