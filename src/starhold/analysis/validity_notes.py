@@ -22,8 +22,8 @@ class Validity(NamedTuple):
 def column_of(names: Iterable[str]) -> str | None:
     """The name among recorded quantities of the one that says whether the estimate is valid, None without any; estimators
     are recorded last."""
-    found = [name for name in names if name == IS_VALID or name.endswith(f"_{IS_VALID}")]
-    return found[-1] if found else None
+    saying = [name for name in names if name == IS_VALID or name.endswith(f"_{IS_VALID}")]
+    return saying[-1] if saying else None
 
 
 def begun(wanted: bool) -> Any:
