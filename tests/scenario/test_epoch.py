@@ -109,7 +109,8 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
     declaring = {name for role in PACKAGES for name, part in parts(role).items() if name in named and _declares(part)}
     assert declaring == {
         "residual-dipole", "solar-pressure", "magnetometer", "sun-sensor", "triad", "magnetic-unloading", "magnetorquers",
-        "ground-station", "sun", "yaw-steering", "star-tracker", "coarse-sun-sensors", "quest", "slew", "magnetometer-filter",
+        "ground-station", "sun", "yaw-steering", "star-tracker", "coarse-sun-sensors", "quest", "slew",
+        "magnetometer-filter",
     }  # fmt: skip
     assert declaring - {
         "magnetorquers",
