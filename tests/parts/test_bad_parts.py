@@ -79,7 +79,7 @@ COMPOSED = {
     "what another table gives": (part('type = "wheels"\n'), '"wheels"', "the [wheels] table, which gives it"),
     "single brackets": ('[part]\ntype = "gyro"\n', "part: found", "[[part]] tables, with double brackets"),
     "another unit": (part('type = "gyro"\nnoise = "1 N m"\n'), 'part[1].noise: found "1 N m"', "rad"),
-    "below the bound": (part('type = "gyro"\nnoise = -0.01\n'), "part[1].noise: found -1", "at least 0"),
+    "below the bound": (part('type = "gyro"\nnoise = -0.01\n'), "part[1].noise: found -0.01", "at least 0"),
     "two numbers of three": (part('type = "gyro"\nbias = [0, 1]\n'), "part[1].bias", "3 numbers"),
     "a name twice": (GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n'), "part[2].name", "a name that"),
     "too late a tracker": (
