@@ -81,3 +81,19 @@ def test_errors_are_as_large_as_the_filter_says_between_updates_too():
     totals = np.sum(squares, axis=(0, 2))
     assert ((low < totals) & (totals < high)).all(), totals / 240.0
     assert math.isclose(run["time"].values[-5] % 2.0, 0.0)
+
+
+def test_errors_are_as_large_as_the_filter_says_through_an_outage():
+    """Before it, in it, at its end and after it, of 60 flights: squares over the deviation's are in the 99.9 % band."""
+    random, squares = np.random.default_rng(12), []
+    head = FIRST | {"outage": [10.0, 30.0], "interval": 1.0}
+    for seed in range(60):
+        gyro = GYRO | {"bias": random.normal(scale=3e-4, size=3).tolist()}
+        run = sh.simulate(scenario(gyro, head, FILTER, seed=seed + 1, record_every=1))
+        places = [np.searchsorted(run["time"].values, time) for time in (9.5, 20.0, 29.5, 30.5, 34.5, 39.5)]
+        deviations = run["mekf_attitude_deviation"].values[places]
+        squares.append((errors(run)[places] / deviations) ** 2)
+        assert (deviations[2, :2] > 5.0 * deviations[0, :2]).all()
+    low, high = stats.chi2(180).ppf([0.0005, 0.9995])
+    totals = np.sum(squares, axis=(0, 2))
+    assert ((low < totals) & (totals < high)).all(), totals / 180.0
