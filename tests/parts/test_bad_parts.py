@@ -53,8 +53,8 @@ COMPOSED = {
     "two estimators": (GYRO + TRACKER + FILTER * 2, "a second estimator", "one estimator"),
     "two sensors of the rate": (GYRO * 2, "a second sensor of rate, beside gyro", "one of each"),
     "a sensor of the attitude that a filter is not told of": (
-        GYRO + TRACKER * 2 + MEKF,
-        "part mekf: found more_trackers of length 0 for star-tracker-2",
+        GYRO + TRACKER * 3 + MEKF + "more_trackers = [[1e-5, 1e-4, 0, 1, 0]]\n",
+        "part mekf: found more_trackers of length 1 for star-tracker-2, star-tracker-3",
         "a row for each sensor of attitude after the first",
     ),
     "a sensor that a filter is told of and that is not there": (

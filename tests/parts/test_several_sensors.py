@@ -25,6 +25,25 @@ def test_errors_of_two_trackers_are_as_large_as_the_filter_says():
     assert low < np.square(found).sum() < high
 
 
+def test_a_filter_takes_the_trackers_own_numbers_where_it_states_none():
+    """A campaign may draw them only as known to it; what the filter states itself it keeps."""
+    assumed, stated = scenario(GYRO, FIRST, SECOND, MEKF), scenario(GYRO, FIRST, SECOND, TWO)
+    assert sh.simulate(assumed).identical(sh.simulate(stated).assign_attrs(scenario=assumed.text))
+    tuned = scenario(GYRO, FIRST, MEKF | {"cross": 1e-3})
+    assert build(tuned, tuned.laws[0]).find("mekf").params[3:5] == (1e-3, FIRST["roll"])
+    for parts, told in (
+        ((GYRO, MEKF), "cross: found nothing"),
+        ((GYRO, tracker(0.0, 0.0), MEKF), "cross: found 0.0, of star-"),
+    ):
+        with pytest.raises(sh.InputError, match=told):
+            scenario(*parts)
+    for given, key in ((assumed, "star-tracker.cross"), (assumed, "star-tracker-2.roll")):
+        over = {f"part.{key}": {"distribution": "normal", "sigma": "1 arcsec"}}
+        with pytest.raises(sh.InputError, match="known_to_law: found false; allowed: true"):
+            sh.campaign(given, runs=2, over=over, search=False)
+        assert len(sh.campaign(stated, runs=2, over=over, search=False).frame()) == 2
+
+
 def test_two_equal_trackers_are_one_of_half_the_variance():
     own, half = tracker(10.0 * ARCSEC, 10.0 * ARCSEC), 10.0 * ARCSEC / math.sqrt(2.0)
     even = MEKF | {"cross": own["cross"], "roll": own["roll"]}

@@ -51,11 +51,8 @@ class MetricSet:
 
     def columns(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """Return the metrics that some of the laws have, in order."""
-        return [
-            name
-            for name, measure in self.measures.items()
-            if any(name in row and (measure.at_zero or row[name]) for row in results.values())
-        ]
+        shown = {name: one.at_zero for name, one in self.measures.items()}
+        return [name for name, zero in shown.items() if any(name in row and (zero or row[name]) for row in results.values())]
 
     def ranked(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """Return names from best to worst."""

@@ -43,14 +43,7 @@ def warm_up() -> None:
     figure.savefig(BytesIO())
 
 
-def over_time(
-    plot: Plot,
-    times: Any,
-    marks: Sequence[Mark],
-    flights: Sequence[Flight],
-    name: str,
-    shaded: Sequence[tuple[float, float]] = (),
-) -> Any:
+def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str, shaded: Any = ()) -> Any:
     """A figure of panels over one time axis, grey where the estimate is not valid."""
     count = len(plot.panels)
     end = max(float(times[-1]), 1e-9)

@@ -62,11 +62,7 @@ CARD = Card(
 ROLE = "estimator"
 ABOUT = "Earth"
 NEEDS = ("magnetic_field", "position")
-FIRST = {
-    "rate": ZERO,
-    "gyro_bias": ZERO,
-    "attitude_deviation": ZERO,
-    "rate_deviation": ZERO,
+FIRST = dict.fromkeys(("rate", "gyro_bias", "attitude_deviation", "rate_deviation"), ZERO) | {
     "surprise": 0.0,
     "is_valid": 0.0,
 }
@@ -230,14 +226,10 @@ def propagated(memory: Memory, reading: Vector, drive: Drive, craft: Craft, peri
         middle = add(slow, scale(0.5 * period, _acceleration(slow, craft)))
         old = slow
         slow = new = add(slow, scale(period, _acceleration(middle, craft)))
-        slope = _slope(middle, craft)
-        kept = summed(
-            combine(1.0, IDENTITY, period, slope), combine(0.5 * period * period, product(slope, slope), 0.0, slope)
-        )
-        sign = 1.0
+        sign, slope = 1.0, _slope(middle, craft)
+        kept = summed(IDENTITY, product(slope, combine(period, IDENTITY, 0.5 * period * period, slope)))
     # The second term is of a rate whose direction changes.
-    half = add(scale(0.25 * period, add(old, new)), scale(period * period / 24.0, cross(old, new)))
-    turn = short_turn(half)
+    turn = short_turn(add(scale(0.25 * period, add(old, new)), scale(period * period / 24.0, cross(old, new))))
     axes = from_quaternion(turn)
     drift = combine(0.5 * sign * period, axes, 0.5 * sign * period, kept)
     spread, mixed = carried(memory.turn, memory.mixed, memory.walk, axes, drift)
@@ -260,14 +252,10 @@ def _acceleration(rate: Vector, craft: Craft) -> Vector:
 
 def _slope(rate: Vector, craft: Craft) -> Matrix:
     """The derivative of that acceleration by the rate (1/s)."""
-    columns = [
-        apply(
-            craft.inverse_inertia,
-            subtract(cross(apply(craft.inertia, rate), axis), cross(rate, apply(craft.inertia, axis))),
-        )
-        for axis in IDENTITY
-    ]
-    return transpose((columns[0], columns[1], columns[2]))
+    inertia, inverted = craft.inertia, craft.inverse_inertia
+    spun = apply(inertia, rate)
+    x, y, z = (apply(inverted, subtract(cross(spun, axis), cross(rate, apply(inertia, axis)))) for axis in IDENTITY)
+    return transpose((x, y, z))
 
 
 def aligned(now: Memory, shown: Vector, true: Vector, params: Numbers, begin: Matrix) -> Memory:

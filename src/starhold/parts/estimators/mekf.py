@@ -58,6 +58,7 @@ CARD = Card(
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 SEVERAL = {"attitude": "more_trackers"}
+ASSUMES = {"attitude": ("cross", "roll", "boresight")}
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO, "is_valid": 0.0}
 HOUR = 3600.0
 MOST = 100_000
@@ -79,13 +80,15 @@ class Params(NamedTuple):
         Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h"),
     ]
     bias: Annotated[float, Parameter("rad/s", above=0.0, text="of the gyro: deviation of the bias at the start")]
-    cross: Annotated[float, Parameter("rad", above=0.0, text="of the star tracker: deviation across the boresight")]
-    roll: Annotated[float, Parameter("rad", above=0.0, text="of the star tracker: deviation about the boresight")]
-    boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="of the star tracker, body axes")] = (
-        0.0,
-        0.0,
-        1.0,
-    )
+    cross: Annotated[
+        float, Parameter("rad", above=0.0, text="of the star tracker: deviation across the boresight; its own if absent")
+    ] = math.inf
+    roll: Annotated[
+        float, Parameter("rad", above=0.0, text="of the star tracker: deviation about the boresight; its own if absent")
+    ] = math.inf
+    boresight: Annotated[
+        Vector, Parameter("1", shape=(3,), spread=False, text="of the star tracker, body axes; its own if absent")
+    ] = (0.0, 0.0, 1.0)
     start: Annotated[Quaternion, START] = NO_TURN
     start_deviation: Annotated[
         float, Parameter("rad", above=0.0, text="of that attitude: deviation about each axis; 76 deg if nothing is known")
@@ -98,7 +101,7 @@ class Params(NamedTuple):
         Parameter(
             "rad, rad, 1, 1, 1",
             columns=("cross", "roll", "x", "y", "z"),
-            text="a row for each star tracker after the first, in their order: its deviations and boresight",
+            text="a row for each star tracker after the first: its deviations and boresight; theirs if absent",
         ),
     ] = ()
 
