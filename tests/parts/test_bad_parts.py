@@ -65,7 +65,7 @@ COMPOSED = {
     "a tracker without noise": (
         GYRO + TRACKER * 2 + MEKF + "more_trackers = [[0, 1e-4, 0, 1, 0]]\n",
         "part mekf",
-        "the deviations of more_trackers must be above 0",
+        "the deviations cross and roll of each star tracker must be above 0",
     ),
     "a sensor beside [sensor]": ("[sensor]\nrate_noise = 1e-4\n" + GYRO, "a second sensor of rate"),
     "a part that is about the Earth elsewhere": (

@@ -11,8 +11,7 @@ from starhold.parts.stated_attitude import IS_VALID
 
 
 class Validity(NamedTuple):
-    """Notes on the instants without a valid estimate: their number, how many have come last in a row, and the most in a
-    row; a row counts the periods that instants begin."""
+    """Notes on instants without a valid estimate: their number, and of those in a row that begin a period, last and most."""
 
     invalid: float
     row: float
@@ -20,8 +19,7 @@ class Validity(NamedTuple):
 
 
 def column_of(names: Iterable[str]) -> str | None:
-    """The name among recorded quantities of the one that says whether the estimate is valid, None without any; estimators
-    are recorded last."""
+    """The recorded quantity that says whether the estimate is valid, None without any; estimators are recorded last."""
     saying = [name for name in names if name == IS_VALID or name.endswith(f"_{IS_VALID}")]
     return saying[-1] if saying else None
 
@@ -42,9 +40,5 @@ def noted(seen: Any, quantities: Mapping[str, Any], now: Any, last: Any) -> Any:
 
 def table(rows: Any, period: float) -> dict[str, Metric]:
     """The metrics of notes that lie at these rows."""
-    if not rows:
-        return {}
-    return {
-        "invalid_share": Metric("1", "number", (rows.invalid,), over=("samples", 1.0)),
-        "longest_invalid": Metric("s", "number", (rows.longest,), (period,)),
-    }
+    share = Metric("1", "number", (rows.invalid,), over=("samples", 1.0)) if rows else None
+    return {"invalid_share": share, "longest_invalid": Metric("s", "number", (rows.longest,), (period,))} if share else {}

@@ -6,56 +6,38 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from starhold.algebra.structure import flatten
-from starhold.errors import InputError
+from starhold.algebra.structure import leaves
 from starhold.parts.part import Fitted
-from starhold.scenario.checking import show
 
 
-def with_assumed(parts: Sequence[Fitted], tables: Sequence[Mapping[str, Any]], where: str) -> tuple[Fitted, ...]:
-    """Return the parts of raw tables with these numbers. InputError where a table lacks one that no sensor gives, or one
-    that the estimator cannot assume."""
-    return tuple(
-        replace(fitted, params=fitted.params._replace(**_missing(fitted, table, parts, where, f"part[{number}]")))
-        if hasattr(fitted.part.module, "ASSUMES")
-        else fitted
-        for number, (fitted, table) in enumerate(zip(parts, tables, strict=True), 1)
-    )
-
-
-def _missing(fitted: Fitted, table: Mapping[str, Any], parts: Sequence[Fitted], where: str, place: str) -> dict[str, Any]:
-    module, added = fitted.part.module, dict[str, Any]()
-    gains = {item.name: item.gain for item in fitted.part.fields()}
-    for reading, keys in module.ASSUMES.items():
-        first, *others = _sensors(parts, reading) or [Fitted(fitted.part)]
-        for key in keys:
-            if key in table:
-                continue
-            value = getattr(first.params, key, None)
-            try:
-                added[key] = gains[key].check(value)
-            except ValueError as error:
-                allowed = f"{error}, in this table" if value is not None else "this key, for no sensor gives it"
-                given = "nothing" if value is None else f"{show(value)}, of {first.called}"
-                raise InputError(where, f"{place}.{key}", given, allowed.removeprefix("must be ")) from None
-        more = module.SEVERAL[reading]
-        if more not in table and all(hasattr(other.params, key) for other in others for key in keys):
-            rows = [[getattr(other.params, key) for key in keys] for other in others]
-            added[more] = tuple(tuple(flatten(tuple(row))) for row in rows)
-    return added
+def with_assumed(parts: Sequence[Fitted], tables: Sequence[Mapping[str, Any]]) -> tuple[Fitted, ...]:
+    """Return the parts of raw tables with these numbers."""
+    made: list[Fitted] = []
+    for fitted, table in zip(parts, tables, strict=True):
+        added: dict[str, Any] = {}
+        for keys, more, sensors in _assumed(fitted, parts):
+            rows = [{key: getattr(one.params, key) for key in keys} for one in sensors]
+            added |= {key: value for key, value in rows[0].items() if key not in table}
+            added |= {} if more in table else {more: tuple(tuple(leaves(tuple(row.values()))) for row in rows[1:])}
+        made.append(replace(fitted, params=fitted.params._replace(**added)) if added else fitted)
+    return tuple(made)
 
 
 def is_assumed(parts: Sequence[Fitted], tables: Sequence[Mapping[str, Any]], place: int, key: str) -> bool:
     """Whether an estimator assumes this number of the part at a place, because its table does not state its own."""
-    for fitted, table in zip(parts, tables, strict=True):
-        for reading, keys in getattr(fitted.part.module, "ASSUMES", {}).items():
-            sensors = _sensors(parts, reading)
-            if key in keys and parts[place] in sensors:
-                stated = key if parts[place] is sensors[0] else fitted.part.module.SEVERAL[reading]
-                return stated not in table
-    return False
+    return any(
+        key in keys and parts[place] in sensors and (key if parts[place] is sensors[0] else more) not in table
+        for fitted, table in zip(parts, tables, strict=True)
+        for keys, more, sensors in _assumed(fitted, parts)
+    )
 
 
-def _sensors(parts: Sequence[Fitted], reading: str) -> list[Fitted]:
-    """The sensors of a reading, in order."""
-    return [one for one in parts if one.part.role == "sensor" and reading in one.part.module.Reading._fields]
+def _assumed(fitted: Fitted, parts: Sequence[Fitted]) -> list[tuple[tuple[str, ...], str, list[Fitted]]]:
+    """The keys that an estimator may leave to sensors, the key of a row for each sensor after the first, and those that
+    have them all."""
+    module, listed = fitted.part.module, list[tuple[tuple[str, ...], str, list[Fitted]]]()
+    for reading, keys in getattr(module, "ASSUMES", {}).items():
+        sensors = [one for one in parts if one.part.role == "sensor" and reading in one.part.module.Reading._fields]
+        if sensors and all(hasattr(one.params, key) for one in sensors for key in keys):
+            listed.append((keys, module.SEVERAL[reading], sensors))
+    return listed

@@ -72,7 +72,7 @@ def read_parts(
         read = read_part(cast(dict[str, Any], data), body, folder, where, key, shared, units)
         taken = {fitted.name for fitted in collected}
         collected.append(replace(read, name=free_name(read.name or None, read.part.name, taken, where, key)))
-    return with_assumed(collected, tables, where)
+    return with_assumed(collected, tables)
 
 
 def read_part(

@@ -175,11 +175,11 @@ class Instant(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a control step. ValueError for a boresight without direction, a start that is no quaternion, or a
-    further tracker without noise."""
-    trackers = [spread_of(params.cross, params.roll, params.boresight)]
-    for cross, roll, *boresight in params.more_trackers:
-        if not min(cross, roll) > 0.0:
-            raise ValueError("the deviations of more_trackers must be above 0")
+    tracker without noise."""
+    trackers: list[Matrix] = []
+    for cross, roll, *boresight in ((params.cross, params.roll, *params.boresight), *params.more_trackers):
+        if not 0.0 < min(cross, roll) <= max(cross, roll) < math.inf:
+            raise ValueError("the deviations cross and roll of each star tracker must be above 0, here or in its own table")
         trackers.append(spread_of(cross, roll, cast(Vector, tuple(boresight))))
     # The rate between two readings is their mean: each turns the attitude by its noise for half a period, and so does the
     # step of the bias between them.

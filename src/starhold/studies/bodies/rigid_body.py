@@ -82,13 +82,10 @@ class RigidBodyStudy(BodyStudy):
         settling = scenario.table.settling
         tolerances = settling.attitude_tolerance, settling.rate_tolerance
         steps, still = scenario.table.simulation.steps, loop.target.part.flag("STILL")
-        wheels, estimated = "wheel_momentum" in recorded_of(loop), says_valid(loop.composition())
-        there: Any = {
-            "begins": begins_asked(scenario, loop.law),
-            "fault": first_fault(scenario, loop),
-            "estimated": estimated,
-        }
-        return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **there)
+        wheels = "wheel_momentum" in recorded_of(loop)
+        more: Any = {"begins": begins_asked(scenario, loop.law), "fault": first_fault(scenario, loop)}
+        more["estimated"] = says_valid(loop.composition())
+        return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **more)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return METRICS
