@@ -183,7 +183,7 @@ def test_what_has_no_value_is_missed():
     slow = {"law": [{"type": "pd", "k_rate": 0.3, "k_attitude": 1e-6}]}
     found = verdict(SETTLES, **slow)
     assert (found.verdict, found.number, found.margin) == ("missed", None, None)
-    wild = {"initial": {"angles": [1, 0, 0], "rate": [3e3, 0, 0]}}
+    wild = {"initial": {"angles": [1, 0, 0], "rate": ["3e3 rad/s", 0, 0]}}
     assert [one.verdict for one in sh.verify(turn({"method": "flight", "metric": "lost"}, STILL, **wild))] == ["missed"] * 2
     unstable = {"law": [{"type": "pd", "k_rate": 30, "k_attitude": 3}]}
     assert verdict(PHASE, **unstable).evidence == "the linear loop is not stable"
