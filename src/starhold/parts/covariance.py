@@ -1,9 +1,15 @@
-"""Covariances of errors of an attitude and of three numbers that its rate depends on, in blocks, for filters."""
+"""Filters keep covariances of errors of an attitude and of three numbers that its rate depends on, in blocks; what they
+assume of a gyro."""
 
 from __future__ import annotations
 
 from starhold.algebra.scalar import sqrt
 from starhold.algebra.vector import Matrix, Vector, combine, multiply, transpose
+from starhold.parts.contract import Parameter
+
+GYRO_NOISE = Parameter("rad/s", also="rad/sqrt(s)", at_least=0.0, text="of the gyro: deviation of the mean over a second")
+GYRO_WALK = Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h")
+GYRO_BIAS = Parameter("rad/s", above=0.0, text="of the gyro: deviation of the bias at the start")
 
 
 def carried(turn: Matrix, mixed: Matrix, walk: Matrix, axes: Matrix, drift: Matrix) -> tuple[Matrix, Matrix]:

@@ -37,7 +37,7 @@ from starhold.algebra.vector import multiply as product
 from starhold.parts import magnetic_field
 from starhold.parts.attitudes import turned_by
 from starhold.parts.contract import Card, Parameter
-from starhold.parts.covariance import carried, deviations, summed, symmetric
+from starhold.parts.covariance import GYRO_BIAS, GYRO_NOISE, GYRO_WALK, carried, deviations, summed, symmetric
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.stated_attitude import START as ATTITUDE
@@ -82,14 +82,9 @@ class Params(NamedTuple):
     field: Annotated[
         float, Parameter("T", above=0.0, text="deviation of each component of the field from the one computed, bias and all")
     ]
-    noise: Annotated[
-        float, Parameter("rad/s", also="rad/sqrt(s)", at_least=0.0, text="of a gyro: deviation of the mean over a second")
-    ] = 0.0
-    bias_walk: Annotated[
-        float,
-        Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="of a gyro: deviation of the bias's change in 1 h"),
-    ] = 0.0
-    bias: Annotated[float, Parameter("rad/s", above=0.0, text="of a gyro: deviation of the bias at the start")] = 0.01
+    noise: Annotated[float, GYRO_NOISE] = 0.0
+    bias_walk: Annotated[float, GYRO_WALK] = 0.0
+    bias: Annotated[float, GYRO_BIAS] = 0.01
     rate: Annotated[
         float, Parameter("rad/s", above=0.0, text="without a gyro: deviation of the rate about each axis at the start")
     ] = math.radians(10.0)

@@ -36,7 +36,7 @@ from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
 from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import Card, Noise, Parameter, Recursion
-from starhold.parts.covariance import carried, deviations, summed, symmetric
+from starhold.parts.covariance import GYRO_BIAS, GYRO_NOISE, GYRO_WALK, carried, deviations, summed, symmetric
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
@@ -72,14 +72,9 @@ Tracker: TypeAlias = tuple[float, float, float, float, float]
 class Params(NamedTuple):
     """The noise of gyro and star tracker that the filter assumes, in the terms of those sensors."""
 
-    noise: Annotated[
-        float, Parameter("rad/s", also="rad/sqrt(s)", at_least=0.0, text="of the gyro: deviation of the mean over a second")
-    ]
-    bias_walk: Annotated[
-        float,
-        Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h"),
-    ]
-    bias: Annotated[float, Parameter("rad/s", above=0.0, text="of the gyro: deviation of the bias at the start")]
+    noise: Annotated[float, GYRO_NOISE]
+    bias_walk: Annotated[float, GYRO_WALK]
+    bias: Annotated[float, GYRO_BIAS]
     cross: Annotated[
         float, Parameter("rad", above=0.0, text="of the star tracker: deviation across the boresight; its own if absent")
     ] = math.inf
