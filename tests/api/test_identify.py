@@ -273,6 +273,7 @@ def test_telemetry_that_does_not_fit_is_refused_in_a_line(cubesat, tmp_path):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_numbers_of_a_basilisk_flight():
     """Other code flies the truth: a tumbling hub under a known torque, its recorded states with noise of our own."""
     from tests.oracles.basilisk import need, simulation

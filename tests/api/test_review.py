@@ -37,6 +37,7 @@ class Reader(HTMLParser):
         self.texts.append(data)
 
 
+@pytest.mark.slow
 def test_a_review_tells_all_that_is_known_and_computes_each_once(monkeypatch, tmp_path):
     used = []
 

@@ -15,6 +15,7 @@ from starhold.scenario.building import build
 from starhold.studies.body import study_of
 from starhold.studies.compare import compare, record
 from tests.campaign.flown import SMALL, fly, normal, short, uniform
+from tests.tiers import leading
 
 INERTIA = normal("4 %", relative=True)
 LIMIT = uniform(0.05, 0.2)
@@ -109,7 +110,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", leading(CASES))
 def test_the_runs_are_those_of_their_own_scenarios_however_they_are_made(case, monkeypatch):
     laws, tables, over = CASES[case]
     scenario = turn(laws, **tables)
@@ -194,6 +195,7 @@ def examples():
 """
 
 
+@pytest.mark.slow
 def test_what_every_command_is_computed_with_is_drawn_only_as_known(tmp_path):
     """Else a verdict would be that of a law that is told, and not say so."""
     (tmp_path / "leak.py").write_text(MODELLED, encoding="utf-8")

@@ -66,6 +66,7 @@ def test_nothing_is_proved_of_what_effectors_make_of_a_command():
         assert worst.proved_of(job, *asked) == (None, "")
 
 
+@pytest.mark.slow
 def test_claims_about_motions_in_the_end_bound_no_flight():
     """Such a claim is proved of this loop, and some of its flights are far from their end."""
     tables = tomllib.loads(BASE + DETUMBLE + POINT)

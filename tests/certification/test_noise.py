@@ -162,6 +162,7 @@ def test_a_claim_is_about_the_noise_of_its_loop(name, params, told):
     assert differences(claim, nadir()) == ["the samples differs"]
 
 
+@pytest.mark.slow
 def test_a_share_is_told_and_a_flight_before_the_filter_settles_leaves_it():
     (claim,) = checked(flying("noisy"))
     assert claim.numbers["share"] == pytest.approx(0.9973)

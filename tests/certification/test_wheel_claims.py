@@ -148,6 +148,7 @@ def test_momentum_that_piles_up_is_not_passed_over():
     assert "known-outside-torque" not in found.assumptions
 
 
+@pytest.mark.slow
 def test_claims_that_are_not_built_say_so():
     loop = rotors("wheel", EVEN)
     found = certify(loop, "", Wanted(disturbance=1e3)).claim("pointing")
@@ -229,6 +230,7 @@ def test_flights_keep_within_the_wheels_and_catch_what_does_not():
         fly_claims(loop, Certificate("too strong", certificate.subject, (strong,)), flights=512)
 
 
+@pytest.mark.slow
 def test_a_torque_limit_of_the_wheel_law_without_wheels():
     """Where other actuators give the torque the limit is the craft's, and the claim a set of turns up to a half."""
     loop = loop_of("wheel", wheel.Gains(0.05, (0.01, 0.01, 0.01)), make_craft(tensor(FULL.inertia), torque_limit=0.04))
@@ -283,6 +285,7 @@ def test_every_law_with_a_function_on_wheels_is_sound(tmp_path):
             fly_claims(loop, certificate, flights=128)
 
 
+@pytest.mark.slow
 def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
     """A body that follows the orbit at rest on target has momentum; one with none is told of by nobody."""
     loop = rotors("wheel", catalogue()["wheel"].examples()[0], target=ORBITAL)

@@ -133,7 +133,7 @@ class Against(Oracle):
         return s(q, w), self.J @ (s(q + h * qd, w + h * wd) - s(q - h * qd, w - h * wd)) / (2.0 * h)
 
 
-@pytest.mark.parametrize("name", leading(CASES, len(CASES) - 1))
+@pytest.mark.parametrize("name", leading(CASES, 4))
 def test_what_is_false_is_refuted_and_the_refutation_holds_when_computed_otherwise(name, tmp_path):
     loop, wanted, _ = made(name)
     content = content_of(name)

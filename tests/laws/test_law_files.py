@@ -116,6 +116,7 @@ def test_command_line_compares_it_and_checks_its_certificate(folder):
     assert "stiffness" in starhold("laws", "laws/my_law.py", cwd=folder).stdout
 
 
+@pytest.mark.slow
 def test_its_proofs_are_not_about_another_text_of_the_law(folder, tmp_path):
     from starhold.certification.certificate import write
     from starhold.studies.certificates import compare_programs
