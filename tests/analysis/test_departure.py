@@ -262,6 +262,7 @@ def test_a_fault_ends_the_claims_of_the_first_certificate():
     assert all((0.0, CHANGES) in departed for departed in left.values())
 
 
+@pytest.mark.slow
 def test_a_fault_ends_the_claims_of_the_mode_that_flies_and_of_all_that_follow():
     wheels = '[wheels]\nlayout = "pyramid"\ninertia = 2.2e-5\ntorque_limit = 0.002\nmomentum_limit = 0.015\n'
     text = MISSION.replace("torque_limit = 0.002\n", "").replace("[initial]", f"{wheels}[initial]") + DETUMBLE

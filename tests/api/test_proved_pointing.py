@@ -69,6 +69,7 @@ def test_no_flight_of_the_budget_exceeds_what_is_proved(held):
     assert held.proof.share == pytest.approx(0.9973)
 
 
+@pytest.mark.slow
 def test_shares_are_what_the_bound_without_each_source_lacks(held):
     assert set(held.proof.shares) == {"gravity gradient", "attitude noise", "rate noise"}
     assert all(share > 0.0 for share in held.proof.shares.values())

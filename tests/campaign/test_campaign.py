@@ -180,6 +180,7 @@ def test_goes_on_after_a_crash_with_more_runs_and_not_after_a_change(result, tmp
     assert Store.open(folder).missing("pd") == []
 
 
+@pytest.mark.slow
 def test_the_worst_is_flown_again_by_its_file(tmp_path, brief):
     clean = {"sensor": None, "spacecraft.actuator_lag": None}
     scenario = sh.load("cubesat-slew").with_({"simulation.record_every": 1, "simulation.duration": 60, **clean})

@@ -153,6 +153,7 @@ def test_an_interrupt_while_workers_start_ends_all_of_them_quietly(tmp_path):
     wait_for_end(driver)
 
 
+@pytest.mark.slow
 def test_another_process_that_writes_there_is_refused(tmp_path):
     folder = tmp_path / "campaign"
     driver = start("tests.campaign.toy", str(folder), "threads", "100", "16", "5", stdout=subprocess.PIPE)

@@ -148,6 +148,7 @@ def test_workers_of_a_script_without_its_guard_leave_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_few_blocks_are_under_way_however_many_there_are(tmp_path, running):
     trail = tmp_path / "trail"
     trail.mkdir()

@@ -124,6 +124,7 @@ def test_what_only_reading_refuses_is_left_out_too(brief):
     assert np.isnan(found["effort"]).tolist() == refused.tolist()
 
 
+@pytest.mark.slow
 def test_the_search_finds_worse_than_many_flights_at_random():
     """The worst of it and of twenty thousand random flights of the same box."""
     over = {"initial.attitude": {"distribution": "rotations"}, "initial.rate": {"distribution": "shell", "high": "4 deg/s"}}

@@ -54,6 +54,7 @@ def test_a_function_that_is_another_on_a_surface_is_not_continuous(on, surface, 
         assert "V jumps at a state" in said[0].obligation
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on", leading(ON))
 def test_rates_that_are_others_on_a_surface_count(on, tmp_path):
     """(0, y) stays on x = 0 and grows there."""

@@ -52,6 +52,7 @@ def changed(loop, name, **params):
     return loop.with_parts(replace(fitted, params=fitted.params._replace(**params)))
 
 
+@pytest.mark.slow
 def test_a_claim_for_a_share_takes_in_the_parts_that_say_their_noise():
     assert left_out(nadir(), 0.9973) == set()
     assert left_out(nadir(), None) == SENSORS

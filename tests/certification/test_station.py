@@ -32,6 +32,7 @@ def claims_of(*given, **changes):
 # --- round the point --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_the_law_does_not_undo_is_told():
     claim = claims_of(BEST, model="nonlinear")["circle"]
     assert claim.outcome == "undecided"

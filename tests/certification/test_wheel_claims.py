@@ -179,8 +179,7 @@ def test_a_loop_that_counts_on_a_lost_wheel_claims_nothing():
             ("pd", (10.0, 0.3), "wheel_momentum"),
             ("pd", (0.02, 10.0), "motors"),
             ("wheel", (10.0, 0.3), "wheel_momentum"),
-        ],
-        2,
+        ]
     ),
 )
 def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
@@ -250,7 +249,7 @@ def struck(action):
     return parse(BUILTIN[:at] + STRUCK.format(action) + BUILTIN[at:], "here")
 
 
-@pytest.mark.parametrize(("action", "names"), [("both", ["wheel", "wheel from 70 s"]), ("none", ["wheel"])])
+@pytest.mark.parametrize(("action", "names"), leading([("both", ["wheel", "wheel from 70 s"]), ("none", ["wheel"])]))
 def test_the_certificate_is_issued_again_once_the_fault_is_known(action, names, tmp_path):
     scenario = struck(action)
     entry = scenario.laws[0]

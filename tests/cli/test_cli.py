@@ -241,6 +241,7 @@ def test_what_the_system_refuses_is_one_line(failure, said, monkeypatch, capsys)
     assert error.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", leading([signal.SIGINT, signal.SIGTERM]))
 def test_what_ends_a_command_leaves_nothing_half_written(number, short):
     (short / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0\nrecord_every = 10000"))

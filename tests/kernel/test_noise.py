@@ -53,6 +53,7 @@ def test_the_bound_of_a_tail_is_not_below_it_and_near(k):
     assert stats.chi(3).sf(k) <= found <= stats.chi(3).sf(k) * (1.0 + 0.7 / k**2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", leading([0.3, 0.02]))
 def test_errors_leave_their_radii_no_more_often_than_is_claimed(nadir, share, monkeypatch):
     """Nor the motion that they cause, in many spans of 4000 samples. A radius of the quantile itself is at most 1.35 times

@@ -213,6 +213,7 @@ def test_singular_stiffness_is_not_decided():
     assert certify(loop).claim("convergence").outcome == "undecided"
 
 
+@pytest.mark.slow
 def test_a_larger_box_of_inertias_than_the_largest_is_not_claimed():
     gains = lqr.design(PRINCIPAL, lqr.FormII((1e-3,) * 3 + (1.0, 30.0, 4.0), (1e3,) * 3))
     loop = loop_of("lqr", gains, PRINCIPAL)

@@ -99,6 +99,7 @@ def test_it_is_read_again_where_its_text_has_changed_and_only_then(folder):
     assert first.gains._field_defaults["p"] == 0.009
 
 
+@pytest.mark.slow
 def test_command_line_compares_it_and_checks_its_certificate(folder):
     starhold("compare", "own.toml", "--pictures", "page", "-o", "out", cwd=folder, code=0)
     told = json.loads((folder / "out" / "certificate.json").read_text())["certificates"]

@@ -94,6 +94,7 @@ def test_it_listens_on_this_machine_alone(served: Served) -> None:
             assert link.connect_ex((str(address), served.port)) != 0
 
 
+@pytest.mark.slow
 def test_a_campaign_of_a_broken_scenario_is_refused(served: Served) -> None:
     broken = flown.text().replace("k_rate = 0.09", "k_rat = 0.09")
     before = served.ask("GET", "/jobs")[1]
@@ -186,6 +187,7 @@ def press(browser: Browser, value: str, name: str | None = None) -> None:
     browser.ask(f"""document.querySelector('#asking button[value="{value}"]').click()""")
 
 
+@pytest.mark.slow
 def test_save_loses_nothing_that_was_typed(served: Served) -> None:
     text = flown.text()
     served.path.write_text(text, encoding="utf-8")

@@ -65,6 +65,7 @@ def test_a_pyramid_bears_every_single_loss_and_no_double_one(found):
         assert np.linalg.norm(failure.lacking[0]) == pytest.approx(1.0, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_less_torque_gives_a_smaller_degree_of_stability_and_a_later_settling(found):
     for failure in found[1:5]:
         assert failure.eta_intact == found[0].eta
