@@ -78,7 +78,8 @@ def repeat(count: Index, body: Callable[..., Any], *state: Any, stop: Callable[.
 
 
 def until(done: Callable[..., Truth], body: Callable[..., Any], *state: Any, at_most: Index) -> State:
-    """Return the state once done(*state) holds, or after `at_most` iterations of body(*state). `done` must not write to buffers."""
+    """Return the state once done(*state) holds, or after `at_most` iterations of body(*state). `done` must not write to
+    buffers."""
     recorder = RECORDER.get()
     if recorder is not None:
         return recorder.loop(at_most, done, body, state, counted=False)
