@@ -103,9 +103,8 @@ class Memory(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for a plate without direction, a table with gaps or without this solar flux, and a
     force without a mass."""
-    density, height, scale_height, bends = params.density, params.height, params.scale_height, ()
-    if params.table:
-        density, height, scale_height, bends = _layers(params.table, params.flux)
+    air = (params.density, params.height, params.scale_height, ())
+    density, height, scale_height, bends = _layers(params.table, params.flux) if params.table else air
     areas, normals, centres = plates_of(params.plates)
     inverse = inverse_mass(params.moves_orbit, params.mass)
     return Numbers(
@@ -132,8 +131,9 @@ def _layers(table: tuple[Layer, ...], flux: float) -> tuple[float, float, float,
         raise ValueError("the table needs densities above 0 that fall with the height")
     if not fluxes[0] <= flux <= fluxes[-1]:
         raise ValueError(f"a flux of {flux:g} is outside the table's, {fluxes[0]:g} to {fluxes[-1]:g}")
-    logs = [float(np.interp(flux, fluxes, row)) for row in np.log(densities)]
-    slopes = [*(np.diff(logs) / np.diff(heights)).tolist()]
+    rows: list[list[float]] = np.log(densities).tolist()
+    logs = [float(np.interp(flux, fluxes, row)) for row in rows]
+    slopes: list[float] = (np.diff(logs) / np.diff(heights)).tolist()
     turns = [after - before for before, after in pairwise(slopes)] + [0.0]
     bends = [x for height, turn in zip(heights[1:].tolist(), turns, strict=True) for x in (RADIUS + height, turn)]
     return math.exp(logs[0]), float(heights[0]), -1.0 / slopes[0], Buffer(bends)
