@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from starhold.errors import InputError, optional, shortly
+from starhold.export.oem import export_oem as export_oem
+from starhold.export.oem import read_oem as read_oem
 from starhold.files import passing_folder
 from starhold.scenario import reading
 from starhold.scenario.reading import make_scenario as make_scenario
@@ -268,10 +270,8 @@ def export_aem(
     be written."""
     from starhold.export.aem import write_run
 
-    into = Path(file)
     about = {"object_name": object_name, "object_id": object_id, "frame": frame, "version": version}
-    write_run(run, into, epoch, about)
-    return into
+    return write_run(run, Path(file), epoch, about)
 
 
 @shortly

@@ -10,10 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
-from starhold.certification.unmodelled import named
 from starhold.parts.catalogue import find, fit
 from starhold.parts.craft import EARTH as GRAVITY
-from starhold.parts.environments import drag, solar_pressure
+from starhold.parts.environments import drag
 from starhold.parts.epoch import days_of
 from starhold.parts.sun import EARTH, PRESSURE
 from tests.making import flown, hub
@@ -83,7 +82,7 @@ def test_drag_against_scipy(air):
 def test_a_circle_decays_as_its_derivative_says():
     density, height = 1e-11, 4e5
     part = find("environment", "drag").params(ROWS, 2.2, density, 0.0, 1e12, 0.0, moves_orbit=1, mass=MASS)
-    ball = part._replace(plates=tuple((1.0, *row[1:]) for row in ROWS[:2]) + ((1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0),))
+    ball = part._replace(plates=(*((1.0, *row[1:]) for row in ROWS[:2]), (1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)))
     loop = orbiting([fit("environment", "drag", *ball)], height)
     orbit = math.tau * math.sqrt((EARTH + height) ** 3 / GRAVITY)
     run = flown(replace(loop, period=orbit / 3000.0), 3000)

@@ -8,12 +8,9 @@ from importlib import resources
 import erfa
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import starhold as sh
-from starhold.parts.craft import EARTH
 from starhold.parts.epoch import days_of
-from starhold.parts.orbit import carried
 from starhold.scenario.element_sets import ElementSet, with_orbit
 
 pytest.importorskip("sgp4")
@@ -61,19 +58,6 @@ def test_states_are_those_published_turned_by_erfa(name):
         # Epochs are told to a microsecond; 0.2" are a millionth of the distance.
         assert np.abs(np.array(position) / 1e3 - expected[0]).max() < 1e-6 * np.linalg.norm(expected[0]) + 1e-5
         assert np.abs(np.array(velocity) / 1e3 - expected[1]).max() < 1e-6 * np.linalg.norm(expected[1]) + 1e-7
-
-
-def test_two_body_motion_by_keplers_equation_against_scipy():
-    lines = (ISS, published()["08195"][0])
-    for elements in (ElementSet("own", pair) for pair in lines):
-        r, v = elements.state(elements.epoch)
-        times = np.linspace(0.0, 40_000.0, 9)
-
-        def slope(_, y):
-            return [*y[3:], *(-EARTH * y[:3] / np.linalg.norm(y[:3]) ** 3)]
-
-        exact = solve_ivp(slope, (0.0, times[-1]), [*r, *v], "DOP853", times, rtol=1e-12, atol=1e-9).y[:3].T
-        assert np.abs(carried(r, v, EARTH, times) - exact).max() < 0.05
 
 
 def written(folder, text, name="own.tle"):
