@@ -12,6 +12,8 @@ import pytest
 import starhold as sh
 from starhold.parts.epoch import days_of
 from starhold.scenario.element_sets import ElementSet, with_orbit
+from starhold.scenario.writing import toml_text
+from tests.running import starhold
 
 pytest.importorskip("sgp4")
 PACKAGE = resources.files("sgp4")
@@ -81,6 +83,18 @@ def test_a_flight_begins_where_sgp4_says_and_the_difference_is_said(tmp_path):
         sh.scenario(TABLES | {"orbit": orbit | {"epoch": "2009-01-01T00:00:00Z"}}, folder=tmp_path)
     assert any(
         re.search(r"the elements are of \[2008, 9, 20, .*, 102 days from the epoch", str(one.message)) for one in said
+    )
+
+
+def test_a_command_says_the_distance_once_and_of_the_motion_that_flies(tmp_path):
+    """It knows a nominal model, and reads the scenario again for its page."""
+    tables = TABLES | {"orbit": written(tmp_path, "\n".join(ISS)), "part": [{"type": "oblateness"}]}
+    tables |= {"nominal": {"spacecraft": {"inertia": [2.0, 3.0, 4.1]}}}
+    (tmp_path / "own.toml").write_text(toml_text(tables))
+    _, err = starhold("run", "own.toml", "--pictures", "page", cwd=tmp_path, code=0)
+    (line,) = [line for line in err.splitlines() if "SGP4" in line]
+    assert re.search(
+        r"two-body motion with oblateness from its state comes to lie 0?\.?\d* km from SGP4's orbit in 5400 s$", line
     )
 
 

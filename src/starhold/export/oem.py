@@ -57,7 +57,7 @@ def export_oem(
     turned; any other name is what the inertial axes are called. center: the body that is orbited. Numbers have all their
     digits. InputError for a run without an orbit, a word that does not fit, and a file that cannot be written."""
     flown: Any = open_run(run) if isinstance(run, str | Path) else run
-    if "position" not in flown or not np.linalg.norm(flown["position"].to_numpy(), axis=1).all():
+    if "attitude" not in flown or not np.linalg.norm(flown["position"].to_numpy(), axis=1).all():
         raise InputError("export oem", "", "a run without an orbit", "one of a scenario with [orbit]")
     states = np.concatenate([flown["position"].to_numpy(), flown["velocity"].to_numpy()], axis=1)
     if flown.attrs.get("frame") == OF_DATE and frame == OF_J2000:
