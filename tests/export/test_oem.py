@@ -107,7 +107,7 @@ def test_a_flight_begins_between_the_states_and_says_how_far_it_comes(run, tmp_p
 @pytest.mark.parametrize(
     ("change", "orbit", "said"),
     [
-        ({}, 'epoch = "2027-03-20T11:00:00Z"', r"orbit\.epoch: .* is before the first state of own\.oem; allowed: a date of"),
+        ({}, 'epoch = "2027-03-20T11:00:00Z"', r"orbit\.epoch: .* is before the first state of own\.oem; allowed: a date"),
         ({}, 'epoch = "2027-03-21"', r"orbit\.epoch: found .* is after the last state of own\.oem; .* for 1200 s"),
         ({}, 'altitude = "500 km"', r"orbit\.altitude: found a key beside oem; allowed: oem alone, or with epoch"),
         ({"= EME2000": "= ITRF2000"}, "", r"REF_FRAME = ITRF2000, of which EME2000, ICRF, GCRF, MOD_EARTH, TEME are read"),

@@ -91,8 +91,8 @@ def test_a_command_says_the_distance_once_and_of_the_motion_that_flies(tmp_path)
     tables = TABLES | {"orbit": written(tmp_path, "\n".join(ISS)), "part": [{"type": "oblateness"}]}
     tables |= {"nominal": {"spacecraft": {"inertia": [2.0, 3.0, 4.1]}}}
     (tmp_path / "own.toml").write_text(toml_text(tables))
-    _, err = starhold("run", "own.toml", "--pictures", "page", cwd=tmp_path, code=0)
-    (line,) = [line for line in err.splitlines() if "SGP4" in line]
+    done = starhold("run", "own.toml", "--pictures", "page", cwd=tmp_path, code=0)
+    (line,) = [line for line in done.stderr.splitlines() if "SGP4" in line]
     assert re.search(
         r"two-body motion with oblateness from its state comes to lie 0?\.?\d* km from SGP4's orbit in 5400 s$", line
     )
