@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Any, cast
 
 from pydantic import BeforeValidator, WithJsonSchema, model_validator
@@ -12,6 +13,7 @@ from pydantic import BeforeValidator, WithJsonSchema, model_validator
 from starhold.algebra.vector import Vector, cross, norm
 from starhold.laws.interface import Gain
 from starhold.parts.craft import EARTH
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, date_of
 from starhold.parts.orbit import BODIES, NEWTON, Elements, body_of, from_elements, lowest, meets_at
 from starhold.scenario.element_sets import ElementSet, Ephemeris
@@ -110,6 +112,10 @@ class Orbit(Table):
     ] = None
 
     epoch: Annotated[Any, *EPOCH_KEY] = None
+    ephemeris: Annotated[
+        int | None,
+        *quantity(replace(EPHEMERIS, text="how Sun and Moon move, for all parts that use them; almanac if absent")),
+    ] = None
     tle: Annotated[Any, *_file("two lines (TLE)")] = None
     omm: Annotated[Any, *_file("an orbit mean-elements message (OMM)")] = None
     oem: Annotated[

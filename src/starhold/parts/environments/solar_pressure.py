@@ -16,6 +16,7 @@ from starhold.parts import sun
 from starhold.parts.contract import Card, Envelope, Parameter
 from starhold.parts.contract import Push as Bound
 from starhold.parts.craft import Craft
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
 from starhold.parts.pushes import MASS, MOVES, inverse_mass
@@ -55,6 +56,7 @@ class Params(NamedTuple):
     epoch: Annotated[Date, EPOCH] = START
     moves_orbit: Annotated[int, MOVES] = 0
     mass: Annotated[float, MASS] = math.inf
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Push(NamedTuple):
@@ -107,7 +109,7 @@ def prepare(params: Params, period: float) -> Numbers:
         tuple(scale(area * (1.0 - s), centre) for area, centre, (s, _) in zip(areas, centres, shares, strict=True)),
         tuple(scale(2.0 * s, arm) for arm, (s, _) in zip(across, shares, strict=True)),
         tuple(scale(2.0 / 3.0 * d, arm) for arm, (_, d) in zip(across, shares, strict=True)),
-        sun.prepared(params.epoch),
+        sun.prepared(params.epoch, params.ephemeris),
         period,
         push,
     )
@@ -159,4 +161,4 @@ def examples() -> list[Params]:
     """The six sides of a 6U CubeSat, and one mirror at another time that light pushes along."""
     sides = tuple((*row, 0.1, 0.3) for row in BOX)
     mirror, epoch = ((0.5, 0.0, 0.6, 0.8, 0.1, -0.2, 0.3, 0.9, 0.05),), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0)
-    return [Params(sides), Params(mirror, epoch, moves_orbit=1, mass=12.0)]
+    return [Params(sides), Params(mirror, epoch, moves_orbit=1, mass=12.0, ephemeris=1)]

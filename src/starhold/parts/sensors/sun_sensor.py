@@ -13,6 +13,7 @@ from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
 from starhold.parts.boresight import field_cosine, unit_boresight
 from starhold.parts.contract import Card, Parameter
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
@@ -50,6 +51,7 @@ class Params(NamedTuple):
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -78,7 +80,7 @@ def prepare(params: Params, period: float) -> Numbers:
     outage = in_steps(params.outage, period)
     axes = as_built.axes_of(params.mounting_error, ZERO)
     boresight = unit_boresight(params.boresight)
-    return Numbers(params.noise, boresight, cosine, sun.prepared(params.epoch), period, outage, axes)
+    return Numbers(params.noise, boresight, cosine, sun.prepared(params.epoch, params.ephemeris), period, outage, axes)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:

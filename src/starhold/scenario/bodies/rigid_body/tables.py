@@ -328,7 +328,7 @@ class RigidBodyTable(ScenarioTable):
     wheels: WheelsTable | None = None
     wheel: list[WheelTable] = Field(default_factory=list[WheelTable])
     fault: list[FaultTable] = Field(default_factory=list[FaultTable])
-    SHARED = MappingProxyType({"orbit.epoch": START, "spacecraft.mass": math.inf})
+    SHARED = MappingProxyType({"orbit.epoch": START, "orbit.ephemeris": 0, "spacecraft.mass": math.inf})
 
     @model_validator(mode="after")
     def _wheels_have_axes(self) -> RigidBodyTable:
