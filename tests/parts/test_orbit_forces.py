@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import erfa
 import numpy as np
@@ -11,9 +12,11 @@ from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.parts.catalogue import find, fit
+from starhold.parts.contract import Envelope
 from starhold.parts.craft import EARTH as GRAVITY
 from starhold.parts.environments import drag
 from starhold.parts.epoch import days_of
+from starhold.parts.plates import BOX
 from starhold.parts.sun import EARTH, PRESSURE
 from tests.making import flown, hub
 
@@ -77,6 +80,20 @@ def test_drag_against_scipy(air):
     # Held for a control period, the force is late by half of one.
     assert errors[1] < 2e-3
     assert errors[0] == pytest.approx(4.0 * errors[1], rel=0.1)
+
+
+def test_no_torque_in_the_air_of_a_table_exceeds_the_bound():
+    """Below, between and above the rows."""
+    params, random = find("environment", "drag").params(BOX, table=TABLE, flux=130.0), np.random.default_rng(3)
+    numbers = drag.prepare(params, 1.0)
+    for place in EARTH + np.linspace(2.5e5, 4.8e5, 12):
+        speed, torques = math.sqrt(GRAVITY / place), []
+        for attitude in Rotation.random(200, random_state=random).as_quat().tolist():
+            state = SimpleNamespace(position=(place, 0.0, 0.0), velocity=(0.0, -speed, 0.0), attitude=attitude)
+            memory = drag.update(None, state, numbers, None, 0)
+            torques.append(np.linalg.norm(drag.torque(state, numbers, None, memory)))
+        bound = drag.bound(params, Envelope(place, speed, 0.0, 0.0)).torque
+        assert 0.5 * bound < max(torques) <= bound
 
 
 def test_a_circle_decays_as_its_derivative_says():

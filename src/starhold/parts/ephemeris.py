@@ -2,8 +2,8 @@
 
 The Sun's longitude is that of VSOP87 (Bretagnon and Francou 1988) with the terms above 0.3", less the aberration; its
 latitude, below 1.2", is left out. The Moon's place is that of Meeus, Astronomical Algorithms, chapter 47, without light
-time, after ELP-2000/82 (Chapront-Touze and Chapront 1983). Both are in the mean equator and equinox of the epoch, where the axes
-rest. What changes over decades is taken at the epoch with its rate, which holds for flights of up to a year.
+time, after ELP-2000/82 (Chapront-Touze and Chapront 1983). Both are in the mean equator and equinox of the epoch, where the
+axes rest. What changes over decades is taken at the epoch with its rate, which holds for flights of up to a year.
 """
 
 from __future__ import annotations

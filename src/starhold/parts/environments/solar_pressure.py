@@ -13,8 +13,7 @@ from starhold.algebra.several import weighted
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.algebra.words import number_of
 from starhold.parts import sun
-from starhold.parts.contract import Card, Envelope, Parameter
-from starhold.parts.contract import Push as Bound
+from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
@@ -59,18 +58,12 @@ class Params(NamedTuple):
     ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
-class Push(NamedTuple):
-    """For each plate its area over the mass (m2/kg) times the share of absorbed light, and that along its normal times the
-    shares of mirrored and scattered light."""
-
-    taken: tuple[Scalar, ...]
-    mirrored: tuple[Vector, ...]
-    scattered: tuple[Vector, ...]
-
-
 class Numbers(NamedTuple):
     """For each plate its normal, and the arms (m3) of absorbed, mirrored and scattered light: area and share times the
-    centre, or times centre x normal; the Sun, and the control period (s); what pushes the orbit, () for nothing."""
+    centre, or times centre x normal; the Sun, and the control period (s).
+
+    push: where the orbit is moved, for each plate its area over the mass (m2/kg) times the share of absorbed light, and
+    along its normal twice that times the share of mirrored, and 2/3 of it times that of scattered light; else ()."""
 
     normals: tuple[Vector, ...]
     taken: tuple[Vector, ...]
@@ -78,7 +71,7 @@ class Numbers(NamedTuple):
     scattered: tuple[Vector, ...]
     sun: sun.Numbers
     period: Scalar
-    push: Push | tuple[()] = ()
+    push: tuple[Any, ...] = ()
 
 
 class Memory(NamedTuple):
@@ -99,11 +92,9 @@ def prepare(params: Params, period: float) -> Numbers:
     inverse, push = inverse_mass(params.moves_orbit, params.mass), ()
     if inverse is not None:
         light = [(area * inverse, normal, *share) for area, normal, share in zip(areas, normals, shares, strict=True)]
-        push = Push(
-            tuple(area * (1.0 - s) for area, _, s, _ in light),
-            tuple(scale(2.0 * s * area, normal) for area, normal, s, _ in light),
-            tuple(scale(2.0 / 3.0 * d * area, normal) for area, normal, _, d in light),
-        )
+        taken = tuple(area * (1.0 - s) for area, _, s, _ in light)
+        mirrored = tuple(scale(2.0 * s * area, normal) for area, normal, s, _ in light)
+        push = taken, mirrored, tuple(scale(2.0 / 3.0 * d * area, normal) for area, normal, _, d in light)
     return Numbers(
         normals,
         tuple(scale(area * (1.0 - s), centre) for area, centre, (s, _) in zip(areas, centres, shares, strict=True)),
@@ -139,8 +130,8 @@ def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> V
     if not params.push:
         return None
     toward, cosines, squares = _seen(state, params, memory)
-    along = weighted((*squares, *cosines), (*params.push.mirrored, *params.push.scattered))
-    push = add(scale(sum(map(mul, params.push.taken, cosines)), toward), along)
+    taken, mirrored, scattered = params.push
+    push = add(scale(sum(map(mul, taken, cosines)), toward), weighted((*squares, *cosines), (*mirrored, *scattered)))
     return to_reference(state.attitude, scale(-memory.pressure, push))
 
 
@@ -151,10 +142,10 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     return scale(-memory.pressure, add(cross(weighted(cosines, params.taken), toward), along))
 
 
-def bound(params: Params, envelope: Envelope) -> Bound:
+def bound(params: Params, envelope: Envelope) -> Push:
     """The largest norm of the torque, from any side, at the perihelion."""
     numbers = prepare(params, 1.0)
-    return Bound(sun.STRONGEST * largest_torque(*numbers[:4]))
+    return Push(sun.STRONGEST * largest_torque(*numbers[:4]))
 
 
 def examples() -> list[Params]:

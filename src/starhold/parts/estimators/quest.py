@@ -74,12 +74,8 @@ def prepare(params: Params, period: float) -> Numbers:
     # Of one in all they would be as good; so the largest is 1.
     least = min(params.sun, params.field, params.nadir)
     weights = ((least / params.sun) ** 2, (least / params.field) ** 2, (least / params.nadir) ** 2)
-    return Numbers(
-        sun.prepared(params.epoch, params.ephemeris),
-        magnetic_field.prepared(params.epoch),
-        weights,
-        math.sin(params.apart) ** 2,
-    )
+    light, field = sun.prepared(params.epoch, params.ephemeris), magnetic_field.prepared(params.epoch)
+    return Numbers(light, field, weights, math.sin(params.apart) ** 2)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:

@@ -59,9 +59,8 @@ class Numbers(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known."""
-    return Numbers(
-        sun.prepared(params.epoch, params.ephemeris), magnetic_field.prepared(params.epoch), math.sin(params.apart) ** 2
-    )
+    light = sun.prepared(params.epoch, params.ephemeris)
+    return Numbers(light, magnetic_field.prepared(params.epoch), math.sin(params.apart) ** 2)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:

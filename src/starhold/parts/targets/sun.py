@@ -52,9 +52,8 @@ def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for axes that leave the attitude open, and for an epoch that is no date."""
     if not norm(params.reference) > 0.0:
         raise ValueError("the reference needs a direction")
-    return Numbers(
-        body_axes(params.axis, params.other), params.reference, sun.prepared(params.epoch, params.ephemeris), period
-    )
+    light = sun.prepared(params.epoch, params.ephemeris)
+    return Numbers(body_axes(params.axis, params.other), params.reference, light, period)
 
 
 def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:

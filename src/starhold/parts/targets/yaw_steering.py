@@ -53,9 +53,8 @@ class Numbers(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for axes that leave the attitude open, and for an epoch that is no date."""
-    return Numbers(
-        body_axes(params.axis, params.other), sun.prepared(params.epoch, params.ephemeris), params.gravity, period
-    )
+    light = sun.prepared(params.epoch, params.ephemeris)
+    return Numbers(body_axes(params.axis, params.other), light, params.gravity, period)
 
 
 def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
