@@ -126,10 +126,10 @@ class Ephemeris(NamedTuple):
         rows = np.array(self.rows[begin : begin + NEAREST])
         # Each time twice: with the position, and with its derivative.
         nodes, values = np.repeat(rows[:, 0] - time, 2), rows[:, 1:].reshape(-1, 3)
-        found = KroghInterpolator(nodes, values).derivatives(0.0, der=2)
+        interpolated = KroghInterpolator(nodes, values).derivatives(0.0, der=2)
         days = days_of(epoch)
         turns = {OF_DATE: (1.0, 0.0, 0.0, 0.0), "TEME": true_to_mean(days)}
-        x, y = (to_body(turns.get(self.frame) or precession(days), tuple(vector)) for vector in found.tolist())  # pyright: ignore
+        x, y = (to_body(turns.get(self.frame) or precession(days), tuple(vector)) for vector in interpolated.tolist())  # pyright: ignore
         return x, y
 
 
