@@ -296,14 +296,9 @@ def export_requirements(
 def read_aem(file: str | Path) -> Aem:
     """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
     the reference frame to the body's axes), and what it is about. InputError where it is none."""
-    from starhold.export.aem import read_aem as read
+    from starhold.export import aem
 
-    try:
-        return read(Path(file))
-    except OSError as error:
-        raise InputError(str(file), "", f"{error.strerror}", "a file that can be read") from None
-    except ValueError as error:
-        raise InputError(str(file), "", str(error), "a CCSDS attitude ephemeris message") from None
+    return aem.read_message(file, aem.read_aem, "a CCSDS attitude ephemeris message")
 
 
 @shortly

@@ -6,11 +6,11 @@ B."""
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, date, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ OFF_UNIT = 1e-3
 VALUES = {"QUATERNION": 4, "QUATERNION/DERIVATIVE": 8, "QUATERNION/RATE": 7, "QUATERNION/ANGVEL": 7}
 """The attitude types that are read, and the numbers in a line; all but the quaternion are skipped."""
 NAME = re.compile(r"[ -~]*[!-~][ -~]*")
+_Message = TypeVar("_Message")
 _EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")
 SECOND = 10**9
 """Nanoseconds, in which instants are counted."""
@@ -138,6 +139,16 @@ def write_message(path: Path, version: str, metadata: list[str], rows: list[str]
     lines = [version, *made, "", "META_START", *metadata, "META_STOP", "", *rows, ""]
     with atomic_write(path) as hidden:
         hidden.write_text("\n".join(lines), encoding="ascii", newline="\n")
+
+
+def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str) -> _Message:
+    """Read a message of a kind by its function. InputError where it cannot be read."""
+    try:
+        return parse(Path(file))
+    except OSError as error:
+        raise InputError(str(file), "", f"{error.strerror}", "a file that can be read") from None
+    except ValueError as error:
+        raise InputError(str(file), "", str(error), kind) from None
 
 
 def read_aem(path: Path) -> Aem:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import to_reference
 from starhold.errors import InputError, shortly
-from starhold.export.aem import SECOND, UNDATED, Lines, open_run, stamp_of, stamps_of, write_message
+from starhold.export.aem import SECOND, UNDATED, Lines, open_run, read_message, stamp_of, stamps_of, write_message
 from starhold.files import read_text
 from starhold.parts.epoch import OF_DATE, OF_J2000, date_of, days_of, precession
 
@@ -80,12 +80,7 @@ def export_oem(
 def read_oem(file: str | Path) -> Oem:
     """Read a CCSDS orbit ephemeris message of one segment: `times` (s, since the first), `states` (positions and velocities,
     m and m/s), and what it is about. Accelerations and covariances are skipped. InputError where it is none."""
-    try:
-        return parse_oem(Path(file))
-    except OSError as error:
-        raise InputError(str(file), "", f"{error.strerror}", "a file that can be read") from None
-    except ValueError as error:
-        raise InputError(str(file), "", str(error), "a CCSDS orbit ephemeris message") from None
+    return read_message(file, parse_oem, "a CCSDS orbit ephemeris message")
 
 
 def parse_oem(path: Path) -> Oem:

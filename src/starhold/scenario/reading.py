@@ -107,7 +107,8 @@ class Scenario:
         s"}; a law's or a part's table is found by its name, or by its index as "law[1]"; None removes a key. InputError as
         for a file."""
         other = changed(self, changes)
-        if getattr(other.table, "orbit", None) != getattr(self.table, "orbit", None):
+        flown, before = ((getattr(s.table, "orbit", None), s.parts, s.table.simulation.duration) for s in (other, self))
+        if flown != before:
             say_distance(other)
         return other
 
