@@ -18,6 +18,7 @@ from tests.missions import BASE, DETUMBLE, POINT
 from tests.refusals import complains, refused
 from tests.required import ALL, BETWEEN, ERROR, KEPT, MANY, OFF, PHASE, PROOF, SETTLES, STILL, TURN, turn
 from tests.running import starhold
+from tests.tiers import leading
 
 
 def verdict(*required, **changes):
@@ -139,17 +140,19 @@ def test_a_proof_is_met_or_not_decided_and_never_missed():
 
 @pytest.mark.parametrize(
     ("asked", "changes", "why"),
-    [
-        ({"after": "1 min"}, {}, "not by 60 s"),
-        ({"metric": "final_rate_error", "after": 0, "at_most": 1}, {}, "not by 300 s"),
-        ({}, {"initial": {"angles": [3.1, 0, 0], "rate": [0.5, 0, 0]}}, "begins outside of the set"),
-        ({}, {"nominal": {"spacecraft": {"inertia": [2, 3, 3.9]}}}, "nominal model is not the craft"),
-        (
-            {"metric": "settling_time", "at_most": "1 h", "after": 0},
-            {"settling": {"attitude_tolerance": 1e-6}},
-            "tolerances",
-        ),
-    ],
+    leading(
+        [
+            ({"after": "1 min"}, {}, "not by 60 s"),
+            ({"metric": "final_rate_error", "after": 0, "at_most": 1}, {}, "not by 300 s"),
+            ({}, {"initial": {"angles": [3.1, 0, 0], "rate": [0.5, 0, 0]}}, "begins outside of the set"),
+            ({}, {"nominal": {"spacecraft": {"inertia": [2, 3, 3.9]}}}, "nominal model is not the craft"),
+            (
+                {"metric": "settling_time", "at_most": "1 h", "after": 0},
+                {"settling": {"attitude_tolerance": 1e-6}},
+                "tolerances",
+            ),
+        ]
+    ),
 )
 def test_what_no_proof_speaks_of_is_not_decided(asked, changes, why):
     found = verdict(PROOF | asked, **changes)

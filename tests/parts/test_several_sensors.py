@@ -15,6 +15,7 @@ from starhold.scenario.building import build
 from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, MEKF, SECOND, TWO, errors, row, scenario, tracker
 
 
+@pytest.mark.slow
 def test_errors_of_two_trackers_are_as_large_as_the_filter_says():
     random, found = np.random.default_rng(5), []
     for seed in range(60):

@@ -269,6 +269,7 @@ def test_with_changes_it_for_all_and_writes_what_reads_back():
     assert set(epochs(made).values()) == set(epochs(parse(made.text, "again")).values()) == {NOON}
 
 
+@pytest.mark.slow
 def test_a_campaign_chooses_among_dates_and_draws_no_others():
     read = scenario("2026-03-20")
     assert locate(read, "orbit.epoch").value == (2026.0, 3.0, 20.0, 0.0, 0.0, 0.0)

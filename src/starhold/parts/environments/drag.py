@@ -36,7 +36,7 @@ CARD = Card(
         "plates do not shade one another",
         "density and direction of the wind are held for a control period",
         'the torque alone, unless moves_orbit = "yes": then the orbit decays by it',
-        "no law knows of it",
+        "unknown to all laws",
     ),
 )
 ROLE = "environment"

@@ -32,7 +32,7 @@ CARD = Card(
         "the light is held for a control period",
         'the torque alone, unless moves_orbit = "yes": then the orbit is pushed by it',
         "no light from the Earth",
-        "no law knows of it",
+        "unknown to all laws",
     ),
 )
 ROLE = "environment"
