@@ -14,7 +14,7 @@ certificates = sh.certify(scenario)              # what is proved of every law
 designs = sh.design("my.toml")                   # gains that formulas give, and figures to judge them by
 exported = sh.export_c(scenario, "flight")       # a law as C99, with a self-test that demands the simulation's bits
 linear = sh.linearise(scenario, "lyapunov")       # the loop near rest as systems of python-control; sh.margins tells margins
-path = sh.export_aem(run, "run.aem")              # attitudes as a CCSDS message; sh.read_aem reads one
+path = sh.export_aem(run, "run.aem")              # attitudes as a CCSDS message; sh.export_oem the orbit
 certificate = sh.invariant("van-der-pol")        # what is proved of an invariant set of any small system
 made = sh.reproduce("D")                         # a publication's figures and numbers, beside what it prints
 told = sh.budget("cubesat-slew")                 # the pointing error by source, over the windows of ECSS
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         environment,
         export_aem,
         export_c,
+        export_oem,
         export_requirements,
         failures,
         invariant,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
         modal_roots,
         place,
         read_aem,
+        read_oem,
         reproduce,
         review,
         serve,
@@ -71,6 +73,7 @@ __all__ = [
     "environment",
     "export_aem",
     "export_c",
+    "export_oem",
     "export_requirements",
     "failures",
     "invariant",
@@ -81,6 +84,7 @@ __all__ = [
     "modal_roots",
     "place",
     "read_aem",
+    "read_oem",
     "reproduce",
     "review",
     "scenario",

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from starhold.errors import InputError, optional, shortly
+from starhold.export.oem import export_oem as export_oem
+from starhold.export.oem import read_oem as read_oem
 from starhold.files import passing_folder
 from starhold.scenario import reading
 from starhold.scenario.reading import make_scenario as make_scenario
@@ -268,10 +270,8 @@ def export_aem(
     be written."""
     from starhold.export.aem import write_run
 
-    into = Path(file)
     about = {"object_name": object_name, "object_id": object_id, "frame": frame, "version": version}
-    write_run(run, into, epoch, about)
-    return into
+    return write_run(run, Path(file), epoch, about)
 
 
 @shortly
@@ -296,14 +296,9 @@ def export_requirements(
 def read_aem(file: str | Path) -> Aem:
     """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
     the reference frame to the body's axes), and what it is about. InputError where it is none."""
-    from starhold.export.aem import read_aem as read
+    from starhold.export import aem
 
-    try:
-        return read(Path(file))
-    except OSError as error:
-        raise InputError(str(file), "", f"{error.strerror}", "a file that can be read") from None
-    except ValueError as error:
-        raise InputError(str(file), "", str(error), "a CCSDS attitude ephemeris message") from None
+    return aem.read_message(file, aem.read_aem, "a CCSDS attitude ephemeris message")
 
 
 @shortly

@@ -124,7 +124,7 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
 
 
 def _declares(part):
-    return any(item.gain.shared for item in part.fields())
+    return any(item.gain.shared == EPOCH.shared for item in part.fields())
 
 
 def test_a_date_alone_is_its_midnight_and_fractions_of_a_second_are_kept():

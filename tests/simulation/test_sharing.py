@@ -98,6 +98,20 @@ def test_an_orbit_that_differs_is_not_shared():
     lanes_end_as_flights_alone([loop] * 3, apart, 40)
 
 
+def test_an_orbit_that_drag_moves_is_a_lanes_own():
+    """Drag depends on the attitude, so only a force that moves the orbit makes lanes that differ in it part."""
+    plates = {"type": "drag", "plates": [[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]], "density": 1e-11}
+    for moves, shared in (("no", True), ("yes", False)):
+        scenario = load("three-laws").with_({"spacecraft.mass": 12.0, "part": [plates | {"moves_orbit": moves}]})
+        loop = build(scenario, scenario.pick("lyapunov"))
+        starts = starts_of(loop, 3)
+        state = RunningBatch(loop, carry_columns(loop, starts), 0, 2).rows.state
+        orbit = {*state.position, *state.velocity}
+        stay = set(halves_of(loop, starts)[1])
+        assert (orbit <= stay) if shared else orbit.isdisjoint(stay)
+        lanes_end_as_flights_alone([loop] * 3, starts, 40)
+
+
 def test_two_zeros_differ():
     loop = three_laws()
     starts = starts_of(loop)

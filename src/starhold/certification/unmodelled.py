@@ -19,6 +19,7 @@ from starhold.parts.contract import DEVIATIONS, NO_ERRORS, Envelope, Errors, Noi
 from starhold.parts.craft import tensor
 from starhold.parts.orbit import highest_speed, lowest, period_of
 from starhold.parts.part import Fitted
+from starhold.parts.pushes import moves
 
 READ = {
     "environment": ("two-body", "gravity-gradient", "linear-gravity", "three-body-gravity"),
@@ -158,6 +159,9 @@ def _is_read(fitted: Fitted) -> bool:
 
 def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool) -> bool:
     """Whether all that a part does to a loop has a bound. estimated: an estimator takes its errors out."""
+    if moves(fitted.params):
+        # No claim follows an orbit that such a force changes.
+        return False
     if fitted in movers(loop) and band_of(loop).share and not fitted.part.hook("torque"):
         return True
     if _is_idle(loop, fitted, envelope) or any(push is not None for push in _pushes(fitted, envelope)):

@@ -12,6 +12,13 @@ from starhold.cli.arguments import Certified, ExportOutput, Force, ScenarioFile,
 if TYPE_CHECKING:
     from starhold.export.folder import Exported
 
+RunFile = Annotated[Path, typer.Argument(metavar="RUN", help="a run.nc, or the folder of one")]
+Epoch = Annotated[
+    str | None, typer.Option(help="UTC at the start of the run; else the scenario's, else 2000-01-01T12:00:00")
+]
+ObjectName = Annotated[str, typer.Option("--object", help="name of the spacecraft")]
+ObjectId = Annotated[str, typer.Option("--id", help="its international designator")]
+Frame = Annotated[str, typer.Option(help="EME2000 (axes of date are rotated to it), or the inertial axes' name")]
 app = typer.Typer(help="Write a law as flight code, a run, or requirements.", no_args_is_help=True, rich_markup_mode=None)
 
 
@@ -44,16 +51,12 @@ def c(
 
 @app.command()
 def aem(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="a run.nc, or the folder of one")],
+    run: RunFile,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the message, such as run.aem")],
-    epoch: Annotated[
-        str | None, typer.Option(help="UTC at the start of the run; else the scenario's, else 2000-01-01T12:00:00")
-    ] = None,
-    object_name: Annotated[str, typer.Option("--object", help="name of the spacecraft")] = "SPACECRAFT",
-    object_id: Annotated[str, typer.Option("--id", help="its international designator")] = "0000-000A",
-    frame: Annotated[
-        str, typer.Option(help="EME2000 (axes of date are rotated to it), or the inertial axes' name")
-    ] = "EME2000",
+    epoch: Epoch = None,
+    object_name: ObjectName = "SPACECRAFT",
+    object_id: ObjectId = "0000-000A",
+    frame: Frame = "EME2000",
     version: Annotated[str, typer.Option(help="of the message, 1.0 or 2.0")] = "2.0",
     force: Force = False,
 ) -> None:
@@ -64,6 +67,26 @@ def aem(
     _refuse_present(output, force)
     words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
     console.print(f"{export_aem(run, output, version=version, **words)}", soft_wrap=True)  # type: ignore
+
+
+@app.command()
+def oem(
+    run: RunFile,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="the message, such as run.oem")],
+    epoch: Epoch = None,
+    object_name: ObjectName = "SPACECRAFT",
+    object_id: ObjectId = "0000-000A",
+    frame: Frame = "EME2000",
+    center: Annotated[str, typer.Option(help="the body that is orbited")] = "EARTH",
+    force: Force = False,
+) -> None:
+    """Write the orbit of a run as a CCSDS orbit ephemeris message."""
+    from starhold.api import export_oem
+    from starhold.cli.console import console
+
+    _refuse_present(output, force)
+    words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
+    console.print(f"{export_oem(run, output, center=center, **words)}", soft_wrap=True)
 
 
 @app.command()

@@ -6,11 +6,11 @@ B."""
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, date, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,12 @@ OFF_UNIT = 1e-3
 VALUES = {"QUATERNION": 4, "QUATERNION/DERIVATIVE": 8, "QUATERNION/RATE": 7, "QUATERNION/ANGVEL": 7}
 """The attitude types that are read, and the numbers in a line; all but the quaternion are skipped."""
 NAME = re.compile(r"[ -~]*[!-~][ -~]*")
+_Message = TypeVar("_Message")
 _EPOCH = re.compile(r"(\d{4})-(?:(\d{2})-(\d{2})|(\d{3}))T(\d{2}):(\d{2}):(\d{2})(?:\.(\d*))?Z?")
-_SECOND = 10**9
+SECOND = 10**9
+"""Nanoseconds, in which instants are counted."""
+UNDATED = "2000-01-01T12:00:00"
+"""The epoch of a run without one."""
 
 
 def from_date(attitudes: Any, epoch: Date, back: bool = False) -> NDArray[np.float64]:
@@ -52,21 +56,22 @@ class Aem(NamedTuple):
     time_system: str
 
 
-def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) -> None:
-    """Write the attitudes of a run, a Dataset, a run.nc or its folder, as a message. epoch: UTC at its start, None for its
-    own; about: further arguments of `write_aem`. InputError for a run without attitudes, a word that does not fit, and a
-    file that cannot be written."""
+def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) -> Path:
+    """Write the attitudes of a run, a Dataset, a run.nc or its folder, as a message, and return its path. epoch: UTC at its
+    start, None for its own; about: further arguments of `write_aem`. InputError for a run without attitudes, a word that
+    does not fit, and a file that cannot be written."""
     run = open_run(run) if isinstance(run, str | Path) else run
     if "attitude" not in run:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
     times, attitudes = run["time"].to_numpy(), run["attitude"].to_numpy()
     if run.attrs.get("frame") == OF_DATE and about["frame"] == OF_J2000:
         attitudes = from_date(attitudes, date_of(run.attrs["epoch"]))
-    begun = run.attrs.get("epoch", "2000-01-01T12:00:00") if epoch is None else epoch
+    begun = run.attrs.get("epoch", UNDATED) if epoch is None else epoch
     try:
         write_aem(path, times, attitudes, epoch=begun, **about)
     except ValueError as error:
         raise InputError("export aem", "", str(error), "a word that a CCSDS message may hold") from None
+    return path
 
 
 def open_run(place: str | Path) -> Any:
@@ -94,22 +99,11 @@ def write_aem(
 ) -> None:
     """Write attitudes as a message. times: (n,) s since the epoch, increasing; attitudes: (n, 4), scalar first, from the
     frame to the body's axes. ValueError where a word does not fit, InputError where the file cannot be written."""
-    begun = _instant(epoch)
-    for text in (object_name, object_id, frame, time_system):
-        if not NAME.fullmatch(text):
-            raise ValueError(f"{text!r}, which is no line of printable ASCII")
+    stamps = stamps_of(times, epoch, (object_name, object_id, frame, time_system))
     if version not in ("1.0", "2.0"):
         raise ValueError(f"version {version}, which is neither 1.0 nor 2.0")
-    stamps = [_stamp(begun + round(float(time) * _SECOND)) for time in times]
-    if len(set(stamps)) < max(len(stamps), 2):
-        raise ValueError("fewer than two different times")
     old = version == "1.0"
-    lines = [
-        f"CCSDS_AEM_VERS = {version}",
-        f"CREATION_DATE = {datetime.now(UTC):%Y-%m-%dT%H:%M:%S}",
-        "ORIGINATOR = STARHOLD",
-        "",
-        "META_START",
+    metadata = [
         f"OBJECT_NAME = {object_name}",
         f"OBJECT_ID = {object_id}",
         f"REF_FRAME_A = {frame}",
@@ -120,19 +114,46 @@ def write_aem(
         f"STOP_TIME = {stamps[-1]}",
         "ATTITUDE_TYPE = QUATERNION",
         *["QUATERNION_TYPE = LAST"] * old,
-        "META_STOP",
-        "",
-        "DATA_START",
     ]
-    for stamp, (q0, q1, q2, q3) in zip(stamps, np.asarray(attitudes, dtype=float).tolist(), strict=True):
-        lines.append(f"{stamp} {q1!r} {q2!r} {q3!r} {q0!r}")
+    rows = zip(stamps, np.asarray(attitudes, dtype=float).tolist(), strict=True)
+    lines = [f"{stamp} {q1!r} {q2!r} {q3!r} {q0!r}" for stamp, (q0, q1, q2, q3) in rows]
+    write_message(path, f"CCSDS_AEM_VERS = {version}", metadata, ["DATA_START", *lines, "DATA_STOP"])
+
+
+def stamps_of(times: Any, epoch: str, words: Iterable[str]) -> list[str]:
+    """The epochs of times (s) since one. ValueError for fewer than two different ones, and for words that a message cannot
+    hold."""
+    begun = instant_of(epoch)
+    for text in words:
+        if not NAME.fullmatch(text):
+            raise ValueError(f"{text!r}, which is no line of printable ASCII")
+    stamps = [stamp_of(begun + round(float(time) * SECOND)) for time in times]
+    if len(set(stamps)) < max(len(stamps), 2):
+        raise ValueError("fewer than two different times")
+    return stamps
+
+
+def write_message(path: Path, version: str, metadata: list[str], rows: list[str]) -> None:
+    """Write a message of one segment. InputError where the file cannot be written."""
+    made = [f"CREATION_DATE = {datetime.now(UTC):%Y-%m-%dT%H:%M:%S}", "ORIGINATOR = STARHOLD"]
+    lines = [version, *made, "", "META_START", *metadata, "META_STOP", "", *rows, ""]
     with atomic_write(path) as hidden:
-        hidden.write_text("\n".join([*lines, "DATA_STOP", ""]), encoding="ascii", newline="\n")
+        hidden.write_text("\n".join(lines), encoding="ascii", newline="\n")
+
+
+def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str) -> _Message:
+    """Read a message of a kind by its function. InputError where it cannot be read."""
+    try:
+        return parse(Path(file))
+    except OSError as error:
+        raise InputError(str(file), "", f"{error.strerror}", "a file that can be read") from None
+    except ValueError as error:
+        raise InputError(str(file), "", str(error), kind) from None
 
 
 def read_aem(path: Path) -> Aem:
     """Read the attitudes of a message of one segment. OSError, or ValueError that names the line and its error."""
-    lines = _Lines(read_text(path))
+    lines = Lines(read_text(path))
     version = lines.value("CCSDS_AEM_VERS")
     if version not in ("1.0", "2.0"):
         raise ValueError(f"line {lines.number}: CCSDS_AEM_VERS = {version}, of which 1.0 and 2.0 are read")
@@ -140,7 +161,7 @@ def read_aem(path: Path) -> Aem:
     metadata = dict(lines.pair(line) for line in lines.before("META_STOP"))
     list(lines.before("DATA_START"))
     count = _numbers(metadata)
-    rows = [lines.row(line, count) for line in lines.before("DATA_STOP")]
+    rows = [lines.attitude(line, count) for line in lines.before("DATA_STOP")]
     if lines.following() is not None:
         raise ValueError(f"line {lines.number}: a second segment; only messages of one segment are read")
     if len(rows) < 2:
@@ -148,16 +169,16 @@ def read_aem(path: Path) -> Aem:
     instants, table = [row[0] for row in rows], np.array([row[1] for row in rows])
     for earlier, later in pairwise(instants):
         if later <= earlier:
-            raise ValueError(f"the epoch {_stamp(later)} after {_stamp(earlier)}")
+            raise ValueError(f"the epoch {stamp_of(later)} after {stamp_of(earlier)}")
     # In version 1.0 the scalar may come first.
     first = metadata.get("QUATERNION_TYPE") == "FIRST"
     attitudes = table if first else np.roll(table, 1, axis=1)
     frame = metadata["REF_FRAME_A"]
     if (metadata.get("ATTITUDE_DIR") == "B2A") != frame.startswith(BODY):
         attitudes = attitudes * np.array([1.0, -1.0, -1.0, -1.0])
-    times = np.array([(instant - instants[0]) / _SECOND for instant in instants])
+    times = np.array([(instant - instants[0]) / SECOND for instant in instants])
     name = metadata["REF_FRAME_B"] if frame.startswith(BODY) else frame
-    return Aem(times, attitudes, _stamp(instants[0]), metadata["OBJECT_NAME"], name, metadata["TIME_SYSTEM"])
+    return Aem(times, attitudes, stamp_of(instants[0]), metadata["OBJECT_NAME"], name, metadata["TIME_SYSTEM"])
 
 
 def _numbers(metadata: dict[str, str]) -> int:
@@ -175,7 +196,7 @@ def _numbers(metadata: dict[str, str]) -> int:
     return VALUES[metadata["ATTITUDE_TYPE"]]
 
 
-class _Lines:
+class Lines:
     """The lines of a message that are neither empty nor comments, in order; `number` is that of the last line read."""
 
     def __init__(self, text: str) -> None:
@@ -212,22 +233,27 @@ class _Lines:
             raise ValueError(f"line {self.number}: {line!r} in place of key = value")
         return key.strip(), value.strip()
 
-    def row(self, line: str, count: int) -> tuple[int, list[float]]:
-        """Return the instant (ns) and the quaternion of a line of so many numbers."""
+    def row(self, line: str, counts: tuple[int, ...]) -> tuple[int, list[float]]:
+        """Return the instant (ns) and the numbers of a line of one of these counts."""
         epoch, *cells = line.split()
         try:
-            values, instant = [float(cell) for cell in cells], _instant(epoch)
-            if len(values) != count:
-                raise ValueError(f"{len(values)} numbers behind the epoch, {count} are wanted")
-            length = math.hypot(*values[:4])
-            if not abs(length - 1.0) <= OFF_UNIT:
-                raise ValueError(f"a quaternion of length {length:.6g}")
+            values, instant = [float(cell) for cell in cells], instant_of(epoch)
+            if len(values) not in counts:
+                raise ValueError(f"{len(values)} numbers behind the epoch, {' or '.join(map(str, counts))} are wanted")
         except ValueError as error:
             raise ValueError(f"line {self.number}: {error}") from None
+        return instant, values
+
+    def attitude(self, line: str, count: int) -> tuple[int, list[float]]:
+        """Return the instant (ns) and the quaternion of a line of so many numbers."""
+        instant, values = self.row(line, (count,))
+        length = math.hypot(*values[:4])
+        if not abs(length - 1.0) <= OFF_UNIT:
+            raise ValueError(f"line {self.number}: a quaternion of length {length:.6g}")
         return instant, values[:4]
 
 
-def _instant(epoch: str) -> int:
+def instant_of(epoch: str) -> int:
     """Return the nanoseconds from the year 1 to an epoch, by days of 86400 s. ValueError if it is not an epoch."""
     match = _EPOCH.fullmatch(epoch)
     if match is None:
@@ -237,11 +263,12 @@ def _instant(epoch: str) -> int:
     if not (int(hour) < 24 and int(minute) < 60 and int(second) <= 60) or when.year != int(year):
         raise ValueError(f"{epoch!r}, which is no time of a day")
     seconds = 86400 * when.toordinal() + 3600 * int(hour) + 60 * int(minute) + int(second)
-    return seconds * _SECOND + int(f"{part or '0':0<9}"[:9])
+    return seconds * SECOND + int(f"{part or '0':0<9}"[:9])
 
 
-def _stamp(instant: int) -> str:
-    seconds, part = divmod(instant, _SECOND)
+def stamp_of(instant: int) -> str:
+    """Return the epoch so many nanoseconds from the year 1."""
+    seconds, part = divmod(instant, SECOND)
     days, second = divmod(seconds, 86400)
     clock = f"{second // 3600:02}:{second // 60 % 60:02}:{second % 60:02}"
     fraction = f".{part:09}".rstrip("0") if part else ""

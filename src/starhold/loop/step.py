@@ -51,10 +51,11 @@ class Sensed(NamedTuple):
 
 
 def total(vectors: Any) -> Any:
-    """The sum of vectors from the first to the last; None without any."""
+    """The sum of vectors from the first to the last, of which some may be None; None without any."""
     result = None
     for vector in vectors:
-        result = vector if result is None else add(result, vector)
+        if vector is not None:
+            result = vector if result is None else add(result, vector)
     return result
 
 
@@ -195,13 +196,15 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         commands = begun.commands
         if commands is None:
             commands = tuple(_commands(applied, effectors, setup, carry.memory))
-        reactions, inertias = [], []
+        reactions, inertias, pushes = [], [], [outside("acceleration", state, craft, carry.memories, setup)]
         for effector, inner, command, params in zip(parts.effectors, effectors, commands, setup.effectors, strict=True):
+            if effector.hook("push") is not None:
+                pushes.append(effector.module.push(inner, command, state, params))
             reactions.append(effector.module.reaction(inner, command, state, params))
             if effector.hook("inertia") is not None:
                 inertias.append(effector.module.inertia(inner, params))
         loads = Loads(
-            outside("acceleration", state, craft, carry.memories, setup),
+            total(pushes),
             outside("torque", state, craft, carry.memories, setup),
             total(reactions),
             None if not inertias else _matrices(inertias),

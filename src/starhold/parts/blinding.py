@@ -55,7 +55,13 @@ class Cones(NamedTuple):
 
 
 def prepared(
-    boresight: Vector, sun_cone: float, moon_cone: float, limb_cones: tuple[float, float], epoch: Date, period: float
+    boresight: Vector,
+    sun_cone: float,
+    moon_cone: float,
+    limb_cones: tuple[float, float],
+    epoch: Date,
+    ephemeris: int,
+    period: float,
 ) -> Cones | tuple[()]:
     """The cones of a head, () without any. ValueError for one that blinds always, and for a bad epoch."""
     for name, cone in (("Sun", sun_cone), ("Moon", moon_cone), ("lit limb", limb_cones[0]), ("dark limb", limb_cones[1])):
@@ -72,8 +78,8 @@ def prepared(
         (math.cos(moon_cone),) if moon_cone else (),
         lit if earth else (),
         dark if earth else (),
-        sun.prepared(epoch),
-        moon.prepared(epoch) if moon_cone else (),
+        sun.prepared(epoch, ephemeris),
+        moon.prepared(epoch, ephemeris) if moon_cone else (),
         period,
     )
 

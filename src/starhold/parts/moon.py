@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from math import cos, radians, sin
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from starhold.algebra.circular import cosine_sine
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector
+from starhold.parts import ephemeris as series
 from starhold.parts.epoch import DAY, Date, days_of
 from starhold.parts.orbit import BODIES
 
 SOURCES = ("The Astronomical Almanac: low-precision formulas for the Moon",)
-ASSUMPTIONS = ("the Moon's direction, as the Earth sees it, to 0.4 deg from 1950 to 2050",)
+ASSUMPTIONS = (
+    "the Moon's direction, as the Earth sees it, to 0.4 deg from 1950 to 2050, or to 0.005 deg by the precise ephemeris",
+)
 EARTH = BODIES["Earth"].radius
 CENTURY, LATE = 36525.0, 69.2
 """Days in a Julian century, and by how many seconds Terrestrial Time is ahead of UTC."""
@@ -31,7 +34,7 @@ _PARALLAX = (0.0518, 0.0095, 0.0078, 0.0028)
 """The parallax has these cosines of the longitude's first angles (deg), beside 0.9508 deg."""
 
 
-class Numbers(NamedTuple):
+class Almanac(NamedTuple):
     """At the start the mean longitude and the angles of the terms of longitude and latitude (turns), and cosine and sine of
     the equator's slope."""
 
@@ -42,8 +45,14 @@ class Numbers(NamedTuple):
     sine: Scalar
 
 
-def prepared(epoch: Date) -> Numbers:
-    """The numbers of the Moon for a flight that begins at an epoch (UTC); ValueError for one that is no date."""
+Numbers: TypeAlias = Almanac | series.Lunar
+
+
+def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
+    """The numbers of the Moon for a flight that begins at an epoch (UTC), by the almanac's formulas or by precise series;
+    ValueError for one that is no date."""
+    if ephemeris:
+        return series.lunar(epoch)
     days = days_of(epoch)
     centuries = (days + LATE / DAY) / CENTURY
 
@@ -52,11 +61,13 @@ def prepared(epoch: Date) -> Numbers:
 
     along, across = (tuple(begun(*term[1:]) for term in terms) for terms in (_LONGITUDE, _LATITUDE))
     slope = radians(23.439 - 4e-7 * days)
-    return Numbers(begun(*_MEAN), along, across, cos(slope), sin(slope))
+    return Almanac(begun(*_MEAN), along, across, cos(slope), sin(slope))
 
 
 def position(time: Scalar, params: Numbers) -> Vector:
     """The Moon's place (m, inertial axes, from the Earth's centre) so many seconds after the start."""
+    if isinstance(params, series.Lunar):
+        return series.moon_at(time, params)
 
     def angle(begin: Scalar, rate: float) -> Scalar:
         return begin + rate / (360.0 * CENTURY * DAY) * time

@@ -6,9 +6,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from starhold.algebra.vector import Vector
 
 
@@ -80,21 +77,6 @@ def from_elements(elements: Elements, gravity: float) -> tuple[Vector, Vector]:
         return (u, v, w)
 
     return placed(distance, along, across), placed(speed, *onward)
-
-
-def carried(position: Vector, velocity: Vector, gravity: float, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Positions (n, 3; m) at times (n,) (s) after this state of a closed two-body orbit, by Kepler's equation."""
-    r, v = np.array(position), np.array(velocity)
-    distance, energy, radial, _ = _invariants(position, velocity, gravity)
-    a = -0.5 * gravity / energy
-    rate = math.sqrt(gravity / a**3)
-    # e cos E and e sin E at the start; x: by how much E grows.
-    c, s = 1.0 - distance / a, radial / math.sqrt(gravity * a)
-    x = rate * times
-    for _ in range(50):
-        x = x - (x - c * np.sin(x) + s * (1.0 - np.cos(x)) - rate * times) / (1.0 - c * np.cos(x) + s * np.sin(x))
-    f, g = 1.0 - a / distance * (1.0 - np.cos(x)), times - (x - np.sin(x)) / rate
-    return f[:, None] * r + g[:, None] * v
 
 
 def lowest(position: Vector, velocity: Vector, gravity: float) -> float:

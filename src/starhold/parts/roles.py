@@ -30,9 +30,9 @@ class Goal(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """All that acts on a body, None for a kind that the loop lacks: the acceleration by environments, the torque by
-    environments, the reaction of the effectors (N m, body), and the inertia that these add (3, 3); `direct`: whether
-    the actuators act on the body itself, because no effector takes the command."""
+    """All that acts on a body, None for a kind that the loop lacks: the acceleration by environments and
+    effectors, the torque by environments, the reaction of the effectors (N m, body), and the inertia that these add
+    (3, 3); `direct`: whether the actuators act on the body itself, because no effector takes the command."""
 
     acceleration: Vector | None
     torque: Vector | None
@@ -102,8 +102,8 @@ class Environment(Protocol):
         """The torque on the body (N m, body axes)."""
         ...
 
-    def acceleration(self, state: State, params: Any, craft: Any, memory: Any, /) -> Vector:
-        """The acceleration of the body, in the axes of its position."""
+    def acceleration(self, state: State, params: Any, craft: Any, memory: Any, /) -> Vector | None:
+        """The acceleration of the body, in the axes of its position; None for numbers that do not move it."""
         ...
 
     def perturbation(self, params: Any, craft: Any, distance: float, /) -> tuple[float, float]:
@@ -147,6 +147,10 @@ class Effector(Protocol):
     def reaction(self, state: Any, command: Any, body: State, params: Any, /) -> Vector:
         """The torque on the body (N m), with -w x h of its momentum h and without the terms in the body's angular
         acceleration."""
+        ...
+
+    def push(self, state: Any, command: Any, body: State, params: Any, /) -> Vector | None:
+        """The acceleration of the body by its force, in the axes of its position; None for numbers that do not move it."""
         ...
 
     def inertia(self, state: Any, params: Any, /) -> Matrix:

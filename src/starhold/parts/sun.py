@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from math import cos, pi, radians, sin
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from starhold.algebra.circular import cosine_sine
 from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import Scalar, both, clip, less, maximum, sqrt, where
 from starhold.algebra.structured import when
 from starhold.algebra.vector import Vector, dot
+from starhold.parts import ephemeris as series
 from starhold.parts.epoch import DAY, Date, date_text, days_of
 from starhold.parts.orbit import BODIES
 
-SOURCES = ("The Astronomical Almanac: low-precision formulas for the Sun",)
+SOURCES = ("The Astronomical Almanac: low-precision formulas for the Sun", *series.SOURCES)
 ASSUMPTIONS = (
-    "the Sun's direction, as the Earth sees it, to 0.011 deg from 1950 to 2050",
+    "the Sun's direction, as the Earth sees it, to 0.011 deg from 1950 to 2050, or to 1e-3 deg by the precise ephemeris",
     "inertial axes of the equator and equinox of date",
 )
 SHADOW = "the Earth's shadow is that of a sphere without air, its edge straight across the Sun's disc"
@@ -31,13 +32,16 @@ RADIUS, EARTH = BODIES["Sun"].radius, BODIES["Earth"].radius
 _LONGITUDE, _ANOMALY = (280.460, 0.9856474), (357.528, 0.9856003)
 
 
-class Numbers(NamedTuple):
+class Almanac(NamedTuple):
     """At the start the Sun's mean longitude and mean anomaly (turns), and cosine and sine of the equator's slope."""
 
     longitude: Scalar
     anomaly: Scalar
     cosine: Scalar
     sine: Scalar
+
+
+Numbers: TypeAlias = Almanac | series.Solar
 
 
 class Sun(NamedTuple):
@@ -47,20 +51,24 @@ class Sun(NamedTuple):
     distance: Scalar
 
 
-def prepared(epoch: Date) -> Numbers:
-    """The numbers of the Sun for a flight that begins at an epoch (UTC).
+def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
+    """The numbers of the Sun for a flight that begins at an epoch (UTC), by the almanac's formulas or by precise series.
 
     ValueError for an epoch that is no date, or not from 1950 to 2050."""
     days = days_of(epoch)
     if not 1950.0 <= epoch[0] <= 2050.0:
         raise ValueError(f"the Sun's place is known from 1950 to 2050, not at the epoch {date_text(epoch)}")
+    if ephemeris:
+        return series.solar(epoch)
     longitude, anomaly = (((at_j2000 + daily * days) / 360.0) % 1.0 for at_j2000, daily in (_LONGITUDE, _ANOMALY))
     slope = radians(23.439 - 4e-7 * days)
-    return Numbers(longitude, anomaly, cos(slope), sin(slope))
+    return Almanac(longitude, anomaly, cos(slope), sin(slope))
 
 
 def sun(time: Scalar, params: Numbers) -> Sun:
     """The Sun so many seconds after the start."""
+    if isinstance(params, series.Solar):
+        return Sun(*series.sun_at(time, params))
     c, s = cosine_sine(params.anomaly + _ANOMALY[1] / (360.0 * DAY) * time)
     ahead = 1.915 * s + 0.040 * (s * c)
     x, along = cosine_sine(params.longitude + _LONGITUDE[1] / (360.0 * DAY) * time + (1.0 / 360.0) * ahead)

@@ -59,7 +59,7 @@ def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> st
     rows: list[tuple[str, ...]] = []
     for key in type(table).model_fields:
         value, given = getattr(table, key), ""
-        if value is None and f"{name}.{key}" in shared:
+        if value is None and shared.get(f"{name}.{key}") not in (None, 0, math.inf):
             value, given = shared[f"{name}.{key}"], ", by default"
         if isinstance(value, BaseModel):
             texts = written.get(key, {})

@@ -1,7 +1,10 @@
-"""Mean elements in files, two lines (TLE) or an orbit mean-elements message (OMM), give an orbit's start by SGP4.
+"""Orbits in files give an orbit's start: mean elements, two lines (TLE) or an orbit mean-elements message (OMM), by SGP4; an
+orbit ephemeris message (OEM) by interpolation.
 
 SGP4 (Hoots and Roehrich 1980; Vallado et al. 2006), of the package `sgp4`, gives position and velocity in axes of the true
 equator and the mean equinox (TEME), which are turned to the mean equator and equinox of date.
+
+What flies from there is the scenario's own motion: `say_distance` says how far it comes to lie from the file's.
 """
 
 from __future__ import annotations
@@ -10,21 +13,34 @@ import json
 import re
 import warnings
 from collections.abc import Mapping
+from functools import reduce
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.vector import Vector
+from starhold.algebra.vector import Vector, add
 from starhold.errors import InputError
+from starhold.export.aem import SECOND, instant_of
+from starhold.export.oem import Oem, parse_oem
 from starhold.files import read_text
-from starhold.parts.epoch import Date, date_of, date_text, days_of, true_to_mean
-from starhold.parts.orbit import carried
+from starhold.parts.catalogue import fit
+from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, date_text, days_of, iso_text, precession, true_to_mean
 from starhold.scenario.checking import show
 
-KINDS = ("tle", "omm")
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+KINDS = ("tle", "omm", "oem")
+BESIDE = ("epoch", "ephemeris")
+"""Keys of [orbit] that may stand beside a file."""
+FRAMES = (OF_J2000, "ICRF", "GCRF", OF_DATE, "TEME")
+"""Reference frames of an ephemeris that are read. ICRF and GCRF are taken for EME2000, which is 0.02" off."""
+NEAREST = 6
+"""States of an ephemeris between which it is interpolated."""
 OLD = 14.0
 """Days from the elements' epoch beyond which their error, some km a day, is worth a warning."""
 SHOWN = 64
@@ -32,6 +48,7 @@ SHOWN = 64
 ALLOWED = {
     "tle": "a text file of one satellite's two lines of 69 characters, with or without a name above",
     "omm": "an orbit mean-elements message of one satellite, as .xml, .csv, .json, or keyword = value",
+    "oem": "an orbit ephemeris message of one segment about the Earth, UTC, as keyword = value",
 }
 
 
@@ -41,6 +58,7 @@ class ElementSet(NamedTuple):
     file: str
     lines: tuple[str, ...] = ()
     fields: tuple[tuple[str, str], ...] = ()
+    motion = "SGP4's orbit"
 
     def satellite(self) -> Any:
         """The satellite as `sgp4` has it. ValueError or KeyError for elements that it cannot read."""
@@ -67,27 +85,74 @@ class ElementSet(NamedTuple):
         x, y = (to_body(turn, tuple(1e3 * part for part in vector)) for vector in (position, velocity))  # pyright: ignore
         return x, y
 
+    @property
+    def last(self) -> float:
+        """How long after its epoch it has states (s)."""
+        return np.inf
+
+
+class Ephemeris(NamedTuple):
+    """The states of a file: its name, the reference frame, the epoch of the first state, and of each the time since (s),
+    position (m) and velocity (m/s)."""
+
+    file: str
+    frame: str
+    first: str
+    rows: tuple[tuple[float, ...], ...]
+    motion = "the ephemeris"
+
+    @property
+    def epoch(self) -> Date:
+        """The epoch of the first state, UTC."""
+        return date_of(self.first)
+
+    @property
+    def last(self) -> float:
+        """How long after its epoch it has states (s)."""
+        return self.rows[-1][0]
+
+    def state(self, epoch: Date, later: float = 0.0) -> tuple[Vector, Vector]:
+        """Position (m) and velocity (m/s) so many seconds after an epoch (UTC), in the mean equator and equinox of that
+        epoch: the polynomial through the nearest positions and velocities. ValueError where there are no states."""
+        from scipy.interpolate import KroghInterpolator
+
+        time = (instant_of(iso_text(epoch)) - instant_of(self.first)) / SECOND + later
+        # Days are floats, and know an instant to a microsecond.
+        if not -1e-5 <= time <= self.last + 1e-5:
+            side = "before the first" if time < 0.0 else "after the last"
+            raise ValueError(f"{date_text(epoch)} is {side} state of {self.file}")
+        times = np.array([row[0] for row in self.rows])
+        begin = int(np.clip(np.searchsorted(times, time) - NEAREST // 2, 0, max(len(times) - NEAREST, 0)))
+        rows = np.array(self.rows[begin : begin + NEAREST])
+        # Each time twice: with the position, and with its derivative.
+        nodes, values = np.repeat(rows[:, 0] - time, 2), rows[:, 1:].reshape(-1, 3)
+        interpolated = KroghInterpolator(nodes, values).derivatives(0.0, der=2)
+        days = days_of(epoch)
+        turns = {OF_DATE: (1.0, 0.0, 0.0, 0.0), "TEME": true_to_mean(days)}
+        x, y = (to_body(turns.get(self.frame) or precession(days), tuple(vector)) for vector in interpolated.tolist())  # pyright: ignore
+        return x, y
+
 
 def with_orbit(data: Mapping[str, Any], folder: Path, where: str) -> Mapping[str, Any]:
-    """Raw tables of a scenario with the state that SGP4 gives beside the file that [orbit] names. InputError for a file that
-    holds no such elements."""
+    """Raw tables of a scenario with the state that the file has which [orbit] names. InputError for a file that holds no
+    orbit of its kind."""
     table = data.get("orbit")
     kind = next((kind for kind in KINDS if isinstance(table, dict) and kind in table), None)
     if kind is None or not isinstance(table, dict):
         return data
     key = f"orbit.{kind}"
-    other = next((name for name in table if name not in (kind, "epoch")), None)
+    other = next((name for name in table if name not in (kind, *BESIDE)), None)
     if other is not None:
-        raise InputError(where, f"orbit.{other}", f"a key beside {kind}", f"{kind} alone, or with epoch")
+        raise InputError(where, f"orbit.{other}", f"a key beside {kind}", f"{kind} alone, or with {' and '.join(BESIDE)}")
     if not isinstance(table[kind], str):
         raise InputError(where, key, show(table[kind]), f"the name of {ALLOWED[kind]}")
     try:
-        import_module("sgp4.api")
+        import_module("json" if kind == "oem" else "sgp4.api")
     except ImportError:
         raise InputError(where, key, "no package sgp4", "pip install 'starhold[orbits]'") from None
     path = folder / table[kind]
     try:
-        elements = (_two_lines if kind == "tle" else _message)(path)
+        elements = READERS[kind](path)
         begin = elements.epoch
     except OSError as error:
         raise InputError(where, key, f"{path}: {error.strerror}", ALLOWED[kind]) from None
@@ -98,20 +163,59 @@ def with_orbit(data: Mapping[str, Any], folder: Path, where: str) -> Mapping[str
         epoch = date_of(table["epoch"]) if "epoch" in table else begin
         position, velocity = elements.state(epoch)
     except ValueError as error:
-        raise InputError(where, "orbit.epoch", str(error), f"a date near that of the elements, {date_text(begin)}") from None
+        allowed = f"a date near that of the elements, {date_text(begin)}"
+        if isinstance(elements, Ephemeris):
+            allowed = f"a date of the ephemeris: from {date_text(begin)}, for {elements.last:.10g} s"
+        raise InputError(where, "orbit.epoch", str(error), allowed) from None
     away = abs(days_of(epoch) - days_of(begin))
-    if away > OLD:
+    if away > OLD and isinstance(elements, ElementSet):
         warnings.warn(f"{key}: the elements are of {date_text(begin)}, {away:.0f} days from the epoch", stacklevel=2)
     state = {"position": list(position), "velocity": list(velocity), "epoch": list(epoch)}
-    return {**data, "orbit": {kind: elements, **state}}
+    return {**data, "orbit": {**table, kind: elements, **state}}
 
 
-def apart(elements: ElementSet, epoch: Date, gravity: float, duration: float) -> float:
-    """The largest distance (m) between the two-body orbit from SGP4's state and SGP4's own orbit during a flight."""
-    position, velocity = elements.state(epoch)
-    times = np.linspace(0.0, duration, SHOWN)
-    followed = np.array([elements.state(epoch, float(t))[0] for t in times])
-    return float(np.linalg.norm(carried(position, velocity, gravity, times) - followed, axis=1).max())
+def say_distance(scenario: Scenario) -> None:
+    """Warn how far the motion that flies comes to lie from that of the file that [orbit] names, where it names one."""
+    orbit = getattr(scenario.table, "orbit", None)
+    kind = next((kind for kind in KINDS if getattr(orbit, kind, None) is not None), None)
+    if orbit is None or kind is None:
+        return
+    source: ElementSet | Ephemeris = getattr(orbit, kind)
+    begun = days_of(orbit.epoch) - days_of(source.epoch)
+    duration = scenario.table.simulation.duration
+    covered = min(duration, source.last - 86400.0 * begun)
+    if covered <= 0.0:
+        return
+    pushing = [f for f in scenario.parts if f.part.hook("acceleration") or f.part.hook("push")]
+    pushing = [f for f in pushing if getattr(f.params, "moves_orbit", 1)]
+    # The others need more than a position.
+    movers = [fit("environment", "two-body"), *(f for f in pushing if f.part.hook("perturbation"))]
+    left = [f.called for f in pushing if f not in movers]
+    times = np.linspace(0.0, covered, SHOWN)
+    followed = np.array([source.state(orbit.epoch, float(t))[0] for t in times])
+    far = 1e-3 * float(np.linalg.norm(_flown(scenario, movers, times) - followed, axis=1).max())
+    more = f" with {' and '.join(f.called for f in movers[1:])}" if movers[1:] else ""
+    said = f"orbit.{kind}: two-body motion{more} from its state comes to lie {far:.3g} km from {source.motion}"
+    said += f" in {covered:.6g} s"
+    said += ", where it ends" if covered < duration else ""
+    said += f", without {' and '.join(left)}" if left else ""
+    said += "; a part such as oblateness brings it nearer" if not more else ""
+    warnings.warn(said, stacklevel=2)
+
+
+def _flown(scenario: Scenario, movers: list[Any], times: Any) -> Any:
+    """The positions (n, 3; m) at times (n,) (s) of the motion by forces that depend on the position alone."""
+    from scipy.integrate import solve_ivp
+
+    craft, forces = scenario.made.craft, [(f.part.module.acceleration, f.prepared(1.0)) for f in movers]
+
+    def slope(_: float, y: Any) -> Any:
+        x, y, z, *velocity = y.tolist()
+        state = SimpleNamespace(position=(x, y, z))
+        return [*velocity, *reduce(add, (force(state, numbers, craft, ()) for force, numbers in forces))]
+
+    begun = [x for vector in scenario.table.orbit.start for x in vector]
+    return solve_ivp(slope, (0.0, times[-1]), begun, "DOP853", times, rtol=1e-10, atol=1e-3).y[:3].T
 
 
 def _two_lines(path: Path) -> ElementSet:
@@ -150,3 +254,20 @@ def _message(path: Path) -> ElementSet:
     if fields.get("MEAN_ELEMENT_THEORY", "SGP4") not in ("SGP4", "SGP/SGP4"):
         raise ValueError(f"MEAN_ELEMENT_THEORY {fields['MEAN_ELEMENT_THEORY']}, not SGP4")
     return ElementSet(path.name, fields=tuple(fields.items()))
+
+
+def _ephemeris(path: Path) -> Ephemeris:
+    """The states of a message. ValueError for another file, and for one that is not about the Earth in UTC."""
+    oem: Oem = parse_oem(path)
+    for key, given, allowed in (
+        ("CENTER_NAME", oem.center.upper(), ("EARTH",)),
+        ("REF_FRAME", oem.frame, FRAMES),
+        ("TIME_SYSTEM", oem.time_system, ("UTC",)),
+    ):
+        if given not in allowed:
+            raise ValueError(f"{key} = {given}, of which {', '.join(allowed)} are read")
+    rows = np.column_stack([oem.times, oem.states]).tolist()
+    return Ephemeris(path.name, oem.frame, oem.epoch, tuple(map(tuple, rows)))
+
+
+READERS = {"tle": _two_lines, "omm": _message, "oem": _ephemeris}

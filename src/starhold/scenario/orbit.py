@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Any, cast
 
 from pydantic import BeforeValidator, WithJsonSchema, model_validator
@@ -12,9 +13,10 @@ from pydantic import BeforeValidator, WithJsonSchema, model_validator
 from starhold.algebra.vector import Vector, cross, norm
 from starhold.laws.interface import Gain
 from starhold.parts.craft import EARTH
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, date_of
 from starhold.parts.orbit import BODIES, NEWTON, Elements, body_of, from_elements, lowest, meets_at
-from starhold.scenario.element_sets import ElementSet, apart
+from starhold.scenario.element_sets import ElementSet, Ephemeris
 from starhold.scenario.quantity import ask_for_unit, quantity, reader
 from starhold.scenario.tables import Table, at_key, refuse
 
@@ -74,14 +76,14 @@ EPOCH_KEY = (
 )
 
 
-def _file(what: str) -> tuple[Any, ...]:
-    text = f"a file of {what}: SGP4 gives the state at the epoch, by default that of the elements"
+def _file(what: str, gives: str = "SGP4 gives the state at the epoch, by default that of the elements") -> tuple[Any, ...]:
+    text = f"a file of {what}: {gives}"
     return BeforeValidator(_read_elements), WithJsonSchema({"type": "string", "description": text})
 
 
 def _read_elements(given: Any) -> Any:
     """Elements are read with the file; what stands here without has no folder."""
-    if given is not None and not isinstance(given, ElementSet):
+    if given is not None and not isinstance(given, ElementSet | Ephemeris):
         raise refuse("a key of [orbit] of a scenario, which has a folder")
     return given
 
@@ -110,8 +112,18 @@ class Orbit(Table):
     ] = None
 
     epoch: Annotated[Any, *EPOCH_KEY] = None
+    ephemeris: Annotated[
+        int | None,
+        *quantity(replace(EPHEMERIS, text="how Sun and Moon move, for all parts that use them; almanac if absent")),
+    ] = None
     tle: Annotated[Any, *_file("two lines (TLE)")] = None
     omm: Annotated[Any, *_file("an orbit mean-elements message (OMM)")] = None
+    oem: Annotated[
+        Any,
+        *_file(
+            "an orbit ephemeris message (OEM)", "it has the state at the epoch, by default its first; the orbit flies on"
+        ),
+    ] = None
 
     @property
     def surface(self) -> float | None:
@@ -189,15 +201,8 @@ class Orbit(Table):
         return self
 
     def check_flight(self, duration: float) -> None:
-        """An error where the spacecraft comes down to the body's surface during a run; a warning where it would later, and
-        where the orbit of SGP4 is another."""
+        """An error where the spacecraft comes down to the body's surface during a run; a warning where it would later."""
         position, velocity = self.start
-        kind = "tle" if self.omm is None else "omm"
-        elements: ElementSet | None = getattr(self, kind)
-        if elements is not None:
-            far = 1e-3 * apart(elements, self.epoch, self.gravitational_parameter, duration)
-            said = f"two-body motion from SGP4's state comes to lie {far:.3g} km from SGP4's orbit in {duration:.6g} s"
-            warnings.warn(f"orbit.{kind}: {said}; a part such as oblateness brings it nearer", stacklevel=2)
         gravity, surface = self.gravitational_parameter, self.surface
         escape = math.sqrt(2.0 * gravity / norm(position))
         if body_of(gravity) is not None and norm(velocity) > FASTEST * escape:

@@ -333,7 +333,7 @@ class _Watched:
     def _wrong(self, part: Part, name: str, result: Any, given: Any) -> str:
         """Describe the result that the equation should return, where it does not."""
         if name in VECTORS.get(part.role, ()):
-            return "" if _alike(result, ZERO) else "three numbers"
+            return "" if _alike(result, ZERO) or (result is None and name in MOVING) else "three numbers"
         if (part.role, name) == ("effector", "inertia"):
             return "" if _alike(result, (ZERO, ZERO, ZERO)) else "three rows of three numbers"
         if (part.role, name) == ("target", "goal"):
@@ -358,10 +358,12 @@ class _Watched:
 
 VECTORS = {
     "environment": ("torque", "acceleration"),
-    "effector": ("reaction", "momentum", "applied"),
+    "effector": ("reaction", "push", "momentum", "applied"),
     "actuator": ("command", "rates"),
 }
 """Equations that return three numbers."""
+MOVING = ("acceleration", "push")
+"""Those of them that return None where the numbers of the part move nothing."""
 
 
 def _undeclared(kind: Any) -> str:

@@ -16,7 +16,7 @@ from starhold.scenario.bodies import body_of
 from starhold.scenario.bodies.interface import Body, Made
 from starhold.scenario.checking import LONGEST_TEXT, cut, free_name, numbered, read_toml, validate
 from starhold.scenario.checking import nearest as nearest
-from starhold.scenario.element_sets import with_orbit
+from starhold.scenario.element_sets import say_distance, with_orbit
 from starhold.scenario.making import changed, plain
 from starhold.scenario.modes import has_modes, read_gains, read_modes
 from starhold.scenario.parts import read_parts
@@ -106,7 +106,11 @@ class Scenario:
         """Return the scenario with other values at some keys: {"spacecraft.inertia": [2, 3, 4], "law.pd.k_rate": "0.1 N m
         s"}; a law's or a part's table is found by its name, or by its index as "law[1]"; None removes a key. InputError as
         for a file."""
-        return changed(self, changes)
+        other = changed(self, changes)
+        flown, before = ((getattr(s.table, "orbit", None), s.parts, s.table.simulation.duration) for s in (other, self))
+        if flown != before:
+            say_distance(other)
+        return other
 
     def _of(self, tables: Mapping[str, Any]) -> Scenario:
         """Return the scenario of other raw tables, read like this one."""
@@ -168,7 +172,9 @@ def _read_text(source: str | Path) -> tuple[str, str, Path]:
 
 def parse(text: str, where: str, folder: Path = Path(), allow_unstable: bool = False) -> Scenario:
     """Read the scenario of a TOML text; `where` names it in errors."""
-    return read_tables(read_toml(text, where), text, where, folder, allow_unstable)
+    scenario = read_tables(read_toml(text, where), text, where, folder, allow_unstable)
+    say_distance(scenario)
+    return scenario
 
 
 @shortly
@@ -178,7 +184,9 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
     Rotation as the quaternion of an attitude, and None as absent. File names in it are relative to `folder`. InputError as
     for a file. The scenario's `with_` makes variants, and its `text` is the file."""
     written = plain(tables, WHERE, "")
-    return read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
+    scenario = read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
+    say_distance(scenario)
+    return scenario
 
 
 def read_tables(data: Mapping[str, Any], text: str, where: str, folder: Path, allow_unstable: bool) -> Scenario:

@@ -213,7 +213,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
         kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
-        tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, [])]
+        tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
         kinds = [SHARE in like]
     for noisy in kinds:
         own = pushes(loop.loop, loop.known.envelope(noisy))

@@ -3,21 +3,25 @@ Schmitt trigger."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+import math
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 from starhold.algebra.quantity import Quantity
+from starhold.algebra.quaternion import to_reference
 from starhold.algebra.scalar import Scalar, absolute, less, maximum, minimum, sign, where
-from starhold.algebra.several import each
-from starhold.algebra.vector import ZERO, Vector, scale, times
+from starhold.algebra.several import each, weighted
+from starhold.algebra.vector import ZERO, Vector, add, cross, norm, scale, subtract, times
 from starhold.parts import as_built
 from starhold.parts.contract import Card, Parameter
+from starhold.parts.pushes import MASS, MOVES, inverse_mass
 
 CARD = Card(
     title="On-off thrusters",
     summary="full torque for t = |command| / torque of the control period, once |command| > on and until |command| < off",
     sources=("Spacecraft Dynamics and Control (1997): reaction pulses, Schmitt trigger, pulse-width modulation",),
     assumptions=(
-        "torques in pairs about the body axes but for the mounting error, without force, at once on and at once off",
+        "torques in pairs about the body axes but for the mounting error, at once on and at once off",
+        'the torque alone, unless moves_orbit = "yes": then what the forces of the layout leave pushes the orbit',
         "a pulse begins with the control period; of a substep in which it ends the torque is the mean",
         "the propellant that is spent leaves mass and inertia as they are",
     ),
@@ -28,10 +32,13 @@ KNOWN = ("torque",)
 """The width of a pulse is computed with it."""
 GRAVITY = 9.80665
 """Standard gravity (m/s2), by which a specific impulse is given in seconds."""
+Row: TypeAlias = tuple[float, float, float, float, float, float, float, float]
+OFF = 1e-6
+"""Share of its torque by which a layout may differ from `torque`."""
 
 
 class Params(NamedTuple):
-    """The torque of a pair, when it fires, and its propellant."""
+    """The torque of a pair, when it fires, its propellant, and where its thrusters are."""
 
     torque: Annotated[Vector, Parameter("N m", above=0.0, shape=(3,), text="of a pair about each body axis that fires")]
     minimum: Annotated[float, Parameter("s", at_least=0.0, text="shortest time that a pair is on")] = 0.0
@@ -48,11 +55,23 @@ class Params(NamedTuple):
     lever: Annotated[float, Parameter("m", above=0.0, text="arm of a thruster about its axis")] = 1.0
     specific_impulse: Annotated[float, Parameter("s", above=0.0, text="of the propellant")] = 220.0
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    layout: Annotated[
+        tuple[Row, ...],
+        Parameter(
+            "1, 1, m, m, m, N, N, N",
+            columns=("axis", "sense", "x", "y", "z", "force_x", "force_y", "force_z"),
+            text="thrusters that fire for a torque about an axis (1, 2 or 3) in a sense (1 or -1): place from the centre of "
+            "mass and force on the spacecraft, body axes; together they give `torque`",
+        ),
+    ] = ()
+    moves_orbit: Annotated[int, MOVES] = 0
+    mass: Annotated[float, MASS] = math.inf
 
 
 class Numbers(NamedTuple):
-    """The parameters, the control period (s), the propellant for an impulse of torque (kg/(N m s)), and the turn of their
-    mounting, () for none."""
+    """The parameters, the control period (s), the propellant for an impulse of torque (kg/(N m s)), the turn of their
+    mounting, () for none, and by how much each axis pushes the body in the positive and in the negative sense (m/s2, along
+    the mounting), () where the orbit is not moved."""
 
     torque: Vector
     minimum: Scalar
@@ -62,6 +81,7 @@ class Numbers(NamedTuple):
     period: Scalar
     propellant: Scalar
     mounted: as_built.Turn = ()
+    pushes: tuple[tuple[Vector, ...], ...] = ()
 
 
 class State(NamedTuple):
@@ -82,13 +102,37 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control period (s). ValueError where thresholds or the shortest pulse do not fit."""
+    """The numbers of a control period (s). ValueError where thresholds, the shortest pulse or the layout do not fit, and for
+    a force without a mass."""
     if any(off > on for off, on in zip(params.off, params.on, strict=True)):
         raise ValueError("a pair cannot stop firing at a command above that at which it starts: off must be at most on")
     if params.minimum > period:
         raise ValueError(f"the shortest pulse must be at most the control period of {period:g} s, not {params.minimum:g} s")
     spent = 1.0 / (params.lever * params.specific_impulse * GRAVITY)
-    return Numbers(*params[:5], period, spent, as_built.turn_of(params.mounting_error))
+    inverse, forces, pushes = inverse_mass(params.moves_orbit, params.mass), _forces(params.layout, params.torque), ()
+    if inverse is not None:
+        if not forces:
+            raise ValueError("thrusters that move the orbit need a layout: where each is, and its force")
+        pushes = tuple(tuple(scale(inverse, force) for force in sense) for sense in forces)
+    return Numbers(*params[:5], period, spent, as_built.turn_of(params.mounting_error), pushes)
+
+
+def _forces(layout: tuple[Row, ...], torque: Vector) -> tuple[tuple[Vector, ...], ...]:
+    """The net force (N) of the thrusters for each axis in the positive and in the negative sense, () without a layout."""
+    forces, torques = ([[ZERO] * 3, [ZERO] * 3] for _ in range(2))
+    for axis, sense, *numbers in layout:
+        if axis not in (1.0, 2.0, 3.0) or sense not in (1.0, -1.0):
+            raise ValueError(f"a thruster of the layout is for axis 1, 2 or 3 and sense 1 or -1, not {axis:g} and {sense:g}")
+        k, i = int(sense < 0.0), int(axis) - 1
+        place, force = (numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4], numbers[5])
+        forces[k][i], torques[k][i] = add(forces[k][i], force), add(torques[k][i], cross(place, force))
+    for k, sign_of in enumerate((1.0, -1.0) if layout else ()):
+        for i, given in enumerate(torques[k]):
+            wanted = tuple(sign_of * torque[i] if j == i else 0.0 for j in range(3))
+            if not norm(subtract(given, wanted)) <= OFF * torque[i]:  # pyright: ignore[reportArgumentType]
+                shown = f"[{', '.join(f'{x:.6g}' for x in given)}] N m, not [{', '.join(f'{x:.6g}' for x in wanted)}]"
+                raise ValueError(f"the layout's thrusters for axis {i + 1} and sense {sign_of:g} give {shown}")
+    return tuple(map(tuple, forces)) if layout else ()
 
 
 def remember(params: Numbers) -> State:
@@ -129,6 +173,15 @@ def reaction(state: State, command: Vector, body: Any, params: Numbers) -> Vecto
     return as_built.in_body(params.mounted, times(params.torque, command))
 
 
+def push(state: State, command: Vector, body: Any, params: Numbers) -> Vector | None:
+    """Acceleration of the centre of mass (inertial, m/s2), None where the orbit is not moved."""
+    if not params.pushes:
+        return None
+    shares = (*each(maximum, (command, ZERO)), *(maximum(-share, 0.0) for share in command))
+    given = weighted(shares, (*params.pushes[0], *params.pushes[1]))
+    return to_reference(body.attitude, as_built.in_body(params.mounted, given))
+
+
 def rates(state: State, command: Vector, body: Any, acceleration: Vector, params: Numbers) -> Any:
     """d(state)/dt: the time runs, the impulse grows."""
     share: Any = each(absolute, (command,))
@@ -153,8 +206,15 @@ def record(state: State, command: Vector, body: Any, params: Numbers) -> Sample:
 
 
 def examples() -> list[Params]:
-    """A pair of 20 mN m with a trigger, and one, askew, that fires for whole control periods."""
+    """A pair of 20 mN m with a trigger, one, askew, that fires for whole control periods, and single thrusters."""
+    single = (
+        (1.0, (0.0, 0.2, 0.0), (0.0, 0.0, 0.1)),
+        (2.0, (0.0, 0.0, 0.2), (0.1, 0.0, 0.0)),
+        (3.0, (0.2, 0.0, 0.0), (0.0, 0.1, 0.0)),
+    )
+    rows: Any = [(axis, s, *place, *(s * x for x in force)) for axis, place, force in single for s in (1.0, -1.0)]
     return [
         Params((0.02, 0.02, 0.02), 0.02, (5e-3, 5e-3, 5e-3), (2e-3, 2e-3, 2e-3), lever=0.5),
         Params((0.05, 0.04, 0.03), 0.0, (0.01, 0.01, 0.01), (4e-3, 4e-3, 4e-3), 1, mounting_error=(0.0, 0.01, 0.02)),
+        Params((0.02, 0.02, 0.02), 0.02, layout=tuple(rows), moves_orbit=1, mass=12.0),
     ]

@@ -1,10 +1,13 @@
-"""The torque of sunlight on a spacecraft of flat plates, which the Earth's shadow ends."""
+"""The torque of sunlight on a spacecraft of flat plates, which the Earth's shadow ends, and its force where that is to move
+the orbit."""
 
 from __future__ import annotations
 
+import math
+from operator import mul
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
-from starhold.algebra.quaternion import to_body
+from starhold.algebra.quaternion import to_body, to_reference
 from starhold.algebra.scalar import Scalar, maximum
 from starhold.algebra.several import weighted
 from starhold.algebra.vector import Vector, add, cross, dot, scale
@@ -12,8 +15,10 @@ from starhold.algebra.words import number_of
 from starhold.parts import sun
 from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
+from starhold.parts.pushes import MASS, MOVES, inverse_mass
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -25,7 +30,7 @@ CARD = Card(
         sun.SHADOW,
         "plates do not shade one another",
         "the light is held for a control period",
-        "the torque alone: the orbit is not pushed by it",
+        'the torque alone, unless moves_orbit = "yes": then the orbit is pushed by it',
         "no light from the Earth",
         "unknown to all laws",
     ),
@@ -48,11 +53,17 @@ class Params(NamedTuple):
         ),
     ]
     epoch: Annotated[Date, EPOCH] = START
+    moves_orbit: Annotated[int, MOVES] = 0
+    mass: Annotated[float, MASS] = math.inf
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
     """For each plate its normal, and the arms (m3) of absorbed, mirrored and scattered light: area and share times the
-    centre, or times centre x normal; the Sun, and the control period (s)."""
+    centre, or times centre x normal; the Sun, and the control period (s).
+
+    push: where the orbit is moved, for each plate its area over the mass (m2/kg) times the share of absorbed light, and
+    along its normal twice that times the share of mirrored, and 2/3 of it times that of scattered light; else ()."""
 
     normals: tuple[Vector, ...]
     taken: tuple[Vector, ...]
@@ -60,6 +71,7 @@ class Numbers(NamedTuple):
     scattered: tuple[Vector, ...]
     sun: sun.Numbers
     period: Scalar
+    push: tuple[Any, ...] = ()
 
 
 class Memory(NamedTuple):
@@ -70,20 +82,27 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an impossible plate or a bad epoch."""
+    """The numbers of a flight. ValueError for an impossible plate, a bad epoch, and a force without a mass."""
     shares = [row[7:] for row in params.plates]
     for number, (specular, diffuse) in enumerate(shares, 1):
         if not (specular >= 0.0 and diffuse >= 0.0 and specular + diffuse <= 1.0):
             raise ValueError(f"plate {number} needs shares of reflected light from 0 to 1 in all")
     areas, normals, centres = plates_of(params.plates)
     across = [scale(area, cross(*pair)) for area, *pair in zip(areas, centres, normals, strict=True)]
+    inverse, push = inverse_mass(params.moves_orbit, params.mass), ()
+    if inverse is not None:
+        light = [(area * inverse, normal, *share) for area, normal, share in zip(areas, normals, shares, strict=True)]
+        taken = tuple(area * (1.0 - s) for area, _, s, _ in light)
+        mirrored = tuple(scale(2.0 * s * area, normal) for area, normal, s, _ in light)
+        push = taken, mirrored, tuple(scale(2.0 / 3.0 * d * area, normal) for area, normal, _, d in light)
     return Numbers(
         normals,
         tuple(scale(area * (1.0 - s), centre) for area, centre, (s, _) in zip(areas, centres, shares, strict=True)),
         tuple(scale(2.0 * s, arm) for arm, (s, _) in zip(across, shares, strict=True)),
         tuple(scale(2.0 / 3.0 * d, arm) for arm, (_, d) in zip(across, shares, strict=True)),
-        sun.prepared(params.epoch),
+        sun.prepared(params.epoch, params.ephemeris),
         period,
+        push,
     )
 
 
@@ -98,11 +117,27 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
     return Memory(seen.direction, sun.pressure(seen) * sun.in_view(state.position, seen))
 
 
-def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
-    """Torque on the body (N m, body axes)."""
+def _seen(state: Any, params: Numbers, memory: Memory) -> tuple[Vector, tuple[Scalar, ...], tuple[Scalar, ...]]:
+    """The direction to the Sun (body axes), the cosines of the plates to it, 0 for those that look away, and their
+    squares."""
     toward = to_body(state.attitude, memory.direction)
     cosines = tuple(maximum(dot(normal, toward), 0.0) for normal in params.normals)
-    squares = tuple(cosine * cosine for cosine in cosines)
+    return toward, cosines, tuple(cosine * cosine for cosine in cosines)
+
+
+def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector | None:
+    """Acceleration of the centre of mass (inertial, m/s2), None where the orbit is not moved."""
+    if not params.push:
+        return None
+    toward, cosines, squares = _seen(state, params, memory)
+    taken, mirrored, scattered = params.push
+    push = add(scale(sum(map(mul, taken, cosines)), toward), weighted((*squares, *cosines), (*mirrored, *scattered)))
+    return to_reference(state.attitude, scale(-memory.pressure, push))
+
+
+def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
+    """Torque on the body (N m, body axes)."""
+    toward, cosines, squares = _seen(state, params, memory)
     along = weighted((*squares, *cosines), (*params.mirrored, *params.scattered))
     return scale(-memory.pressure, add(cross(weighted(cosines, params.taken), toward), along))
 
@@ -114,6 +149,7 @@ def bound(params: Params, envelope: Envelope) -> Push:
 
 
 def examples() -> list[Params]:
-    """The six sides of a 6U CubeSat, and one mirror at another time."""
+    """The six sides of a 6U CubeSat, and one mirror at another time that light pushes along."""
     sides = tuple((*row, 0.1, 0.3) for row in BOX)
-    return [Params(sides), Params(((0.5, 0.0, 0.6, 0.8, 0.1, -0.2, 0.3, 0.9, 0.05),), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0))]
+    mirror, epoch = ((0.5, 0.0, 0.6, 0.8, 0.1, -0.2, 0.3, 0.9, 0.05),), (2027.0, 6.0, 21.0, 12.0, 30.0, 15.0)
+    return [Params(sides), Params(mirror, epoch, moves_orbit=1, mass=12.0, ephemeris=1)]

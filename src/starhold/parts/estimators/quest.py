@@ -16,6 +16,7 @@ from starhold.parts import magnetic_field, sun
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.directions import APART, Estimate, Memory, attitude_at_start, measured_or_carried
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 
 CARD = Card(
@@ -56,6 +57,7 @@ class Params(NamedTuple):
     )
     nadir: Annotated[float, Parameter("rad", above=0.0, text="assumed deviation of the nadir")] = math.radians(0.5)
     apart: Annotated[float, APART] = math.radians(5.0)
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -72,7 +74,8 @@ def prepare(params: Params, period: float) -> Numbers:
     # Of one in all they would be as good; so the largest is 1.
     least = min(params.sun, params.field, params.nadir)
     weights = ((least / params.sun) ** 2, (least / params.field) ** 2, (least / params.nadir) ** 2)
-    return Numbers(sun.prepared(params.epoch), magnetic_field.prepared(params.epoch), weights, math.sin(params.apart) ** 2)
+    light, field = sun.prepared(params.epoch, params.ephemeris), magnetic_field.prepared(params.epoch)
+    return Numbers(light, field, weights, math.sin(params.apart) ** 2)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:

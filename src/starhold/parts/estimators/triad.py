@@ -16,6 +16,7 @@ from starhold.parts import magnetic_field, sun
 from starhold.parts.contract import Card
 from starhold.parts.craft import Craft
 from starhold.parts.directions import APART, Estimate, Memory, attitude_at_start, measured_or_carried
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 
 CARD = Card(
@@ -45,6 +46,7 @@ class Params(NamedTuple):
 
     epoch: Annotated[Date, EPOCH] = START
     apart: Annotated[float, APART] = math.radians(5.0)
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -57,7 +59,8 @@ class Numbers(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known."""
-    return Numbers(sun.prepared(params.epoch), magnetic_field.prepared(params.epoch), math.sin(params.apart) ** 2)
+    light = sun.prepared(params.epoch, params.ephemeris)
+    return Numbers(light, magnetic_field.prepared(params.epoch), math.sin(params.apart) ** 2)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:

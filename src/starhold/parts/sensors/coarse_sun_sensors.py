@@ -26,6 +26,7 @@ from starhold.algebra.vector import (
 from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
 from starhold.parts.contract import Card, Parameter
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import RANGE, Dice
@@ -73,6 +74,7 @@ class Params(NamedTuple):
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -105,7 +107,7 @@ def prepare(params: Params, period: float) -> Numbers:
     normals = tuple(scale(1.0 / math.hypot(*face), face) for face in params.faces)
     outage, axes = in_steps(params.outage, period), as_built.axes_of(params.mounting_error, ZERO)
     shares = params.noise, params.albedo, params.threshold
-    return Numbers(normals, *shares, sun.prepared(params.epoch), period, outage, axes)
+    return Numbers(normals, *shares, sun.prepared(params.epoch, params.ephemeris), period, outage, axes)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:

@@ -14,6 +14,7 @@ from starhold.parts import as_built, blinding
 from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.craft import Craft
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
@@ -57,6 +58,7 @@ class Params(NamedTuple):
     epoch: Annotated[Date, EPOCH] = START
     jitter: Annotated[float, as_built.JITTER] = 0.0
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -108,7 +110,9 @@ def prepare(params: Params, period: float) -> Numbers:
         float(max(1, round(params.interval / period))),
         late,
         in_steps(params.outage, period),
-        blinding.prepared(looks, params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, period),
+        blinding.prepared(
+            looks, params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, params.ephemeris, period
+        ),
         (params.rate_limit * params.rate_limit,) if params.rate_limit < math.inf else (),
         mounted,
         as_built.step_of(params.jitter),
@@ -170,5 +174,5 @@ def examples() -> list[Params]:
     return [
         Params(6.0 * arcsec, 40.0 * arcsec, (0.0, 0.6, 0.8), 0.25, 0.2),
         Params(0.0, 0.0, mounting_error=(1e-3, -2e-3, 5e-4)),
-        blinded,
+        blinded._replace(ephemeris=1),
     ]

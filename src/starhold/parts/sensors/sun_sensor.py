@@ -13,6 +13,7 @@ from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
 from starhold.parts.boresight import field_cosine, unit_boresight
 from starhold.parts.contract import Card, Parameter
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
@@ -51,6 +52,7 @@ class Params(NamedTuple):
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
     jitter: Annotated[float, as_built.JITTER] = 0.0
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -81,7 +83,14 @@ def prepare(params: Params, period: float) -> Numbers:
     axes = as_built.axes_of(params.mounting_error, ZERO)
     boresight = unit_boresight(params.boresight)
     return Numbers(
-        params.noise, boresight, cosine, sun.prepared(params.epoch), period, outage, axes, as_built.step_of(params.jitter)
+        params.noise,
+        boresight,
+        cosine,
+        sun.prepared(params.epoch, params.ephemeris),
+        period,
+        outage,
+        axes,
+        as_built.step_of(params.jitter),
     )
 
 

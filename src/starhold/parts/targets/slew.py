@@ -13,6 +13,7 @@ from starhold.algebra.words import number_of
 from starhold.parts import sun
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.roles import Goal
 from starhold.parts.stated_attitude import unit_quaternion
@@ -50,6 +51,7 @@ class Params(NamedTuple):
         float, Parameter("rad", at_least=0.0, at_most=math.pi, text="angle to the Sun that it keeps; none if 0")
     ] = 0.0
     epoch: Annotated[Date, EPOCH] = START
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -91,7 +93,7 @@ def _nearest(params: Params, start: Quaternion, axis: Vector, angle: float) -> t
     """The least angle (rad) of the body axis to the Sun on the way, and the angle that is turned by then."""
     if not norm(params.axis) > 0.0:
         raise ValueError("the axis needs a direction")
-    seen = sun.sun(params.begin, sun.prepared(params.epoch)).direction
+    seen = sun.sun(params.begin, sun.prepared(params.epoch, params.ephemeris)).direction
     begun, about = to_reference(start, scale(1.0 / norm(params.axis), params.axis)), to_reference(start, axis)
     # The cosine of the angle to the Sun, along + c cos x + s sin x, after a turn by x.
     along = dot(begun, about) * dot(about, seen)

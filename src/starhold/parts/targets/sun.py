@@ -10,6 +10,7 @@ from starhold.algebra.vector import ZERO, Matrix, Vector, norm
 from starhold.algebra.words import number_of
 from starhold.parts import sun
 from starhold.parts.contract import Card, Parameter
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.roles import Goal
 from starhold.parts.targets.alignment import AXIS, OTHER, Moving, aligned, body_axes, towards_sun
@@ -35,6 +36,7 @@ class Params(NamedTuple):
         Parameter("1", shape=(3,), spread=False, text="the second direction, inertial axes; the Earth's pole if absent"),
     ] = (0.0, 0.0, 1.0)
     epoch: Annotated[Date, EPOCH] = START
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -50,7 +52,8 @@ def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for axes that leave the attitude open, and for an epoch that is no date."""
     if not norm(params.reference) > 0.0:
         raise ValueError("the reference needs a direction")
-    return Numbers(body_axes(params.axis, params.other), params.reference, sun.prepared(params.epoch), period)
+    light = sun.prepared(params.epoch, params.ephemeris)
+    return Numbers(body_axes(params.axis, params.other), params.reference, light, period)
 
 
 def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:

@@ -11,6 +11,7 @@ from starhold.algebra.words import number_of
 from starhold.parts import sun
 from starhold.parts.contract import Card
 from starhold.parts.craft import EARTH
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.roles import Goal
 from starhold.parts.targets.alignment import AXIS, GRAVITY, OTHER, aligned, body_axes, opposite_of, orbiting, towards_sun
@@ -38,6 +39,7 @@ class Params(NamedTuple):
     other: Annotated[Vector, OTHER] = (1.0, 0.0, 0.0)
     epoch: Annotated[Date, EPOCH] = START
     gravity: Annotated[float, GRAVITY] = EARTH
+    ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
@@ -51,7 +53,8 @@ class Numbers(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for axes that leave the attitude open, and for an epoch that is no date."""
-    return Numbers(body_axes(params.axis, params.other), sun.prepared(params.epoch), params.gravity, period)
+    light = sun.prepared(params.epoch, params.ephemeris)
+    return Numbers(body_axes(params.axis, params.other), light, params.gravity, period)
 
 
 def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:

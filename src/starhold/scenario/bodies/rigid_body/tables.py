@@ -90,6 +90,7 @@ class Spacecraft(Table):
     """The body and its actuators."""
 
     inertia: Annotated[Any, *INERTIA]
+    mass: Annotated[float | None, *quantity(Gain("kg", above=0.0, text="for forces that move the orbit"))] = None
     torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, plain=(1e3, "mN m"), text="largest torque"))] = math.inf
     limit: Annotated[
         Literal["axis", "norm", "none"], Field(description="whether the limit holds for each axis, the norm, or not at all")
@@ -331,7 +332,7 @@ class RigidBodyTable(ScenarioTable):
     wheels: WheelsTable | None = None
     wheel: list[WheelTable] = Field(default_factory=list[WheelTable])
     fault: list[FaultTable] = Field(default_factory=list[FaultTable])
-    SHARED = MappingProxyType({"orbit.epoch": START})
+    SHARED = MappingProxyType({"orbit.epoch": START, "orbit.ephemeris": 0, "spacecraft.mass": math.inf})
 
     @model_validator(mode="after")
     def _wheels_have_axes(self) -> RigidBodyTable:

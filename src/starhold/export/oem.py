@@ -1,0 +1,115 @@
+"""Orbits over time as CCSDS orbit ephemeris messages (OEM), written and read in their keyword = value form.
+
+Versions 1.0 to 3.0 (CCSDS 502.0-B-1 to -B-3). Positions and velocities of a message are in km and km/s; here they are in SI.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.algebra.quaternion import to_reference
+from starhold.errors import InputError, shortly
+from starhold.export.aem import SECOND, UNDATED, Lines, open_run, read_message, stamp_of, stamps_of, write_message
+from starhold.files import read_text
+from starhold.parts.epoch import OF_DATE, OF_J2000, date_of, days_of, precession
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+VERSIONS = ("1.0", "2.0", "3.0")
+NEEDED = ("OBJECT_NAME", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
+
+
+class Oem(NamedTuple):
+    """The orbit of a message: times (n,) in s since the first of them, whose epoch it is, positions and velocities (n, 6; m,
+    m/s), and the names of the object, the centre, the frame and the time system."""
+
+    times: NDArray[np.float64]
+    states: NDArray[np.float64]
+    epoch: str
+    object_name: str
+    center: str
+    frame: str
+    time_system: str
+
+
+@shortly
+def export_oem(
+    run: xr.Dataset | str | Path,
+    file: str | Path,
+    *,
+    epoch: str | None = None,
+    object_name: str = "SPACECRAFT",
+    object_id: str = "0000-000A",
+    frame: str = OF_J2000,
+    center: str = "EARTH",
+) -> Path:
+    """Write the orbit of a run as a CCSDS orbit ephemeris message, and return its path.
+
+    run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run, by default that of the
+    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", into which an orbit in axes of date (MOD_EARTH) is
+    turned; any other name is what the inertial axes are called. center: the body that is orbited. Numbers have all their
+    digits. InputError for a run without an orbit, a word that does not fit, and a file that cannot be written."""
+    flown: Any = open_run(run) if isinstance(run, str | Path) else run
+    if "attitude" not in flown or not np.linalg.norm(flown["position"].to_numpy(), axis=1).all():
+        raise InputError("export oem", "", "a run without an orbit", "one of a scenario with [orbit]")
+    states = np.concatenate([flown["position"].to_numpy(), flown["velocity"].to_numpy()], axis=1)
+    if flown.attrs.get("frame") == OF_DATE and frame == OF_J2000:
+        turn = precession(days_of(date_of(flown.attrs["epoch"])))
+        halves: list[Any] = [to_reference(turn, tuple(half.T)) for half in (states[:, :3], states[:, 3:])]
+        states = np.concatenate(halves).T
+    begun = flown.attrs.get("epoch", UNDATED) if epoch is None else epoch
+    about = {"OBJECT_NAME": object_name, "OBJECT_ID": object_id, "CENTER_NAME": center, "REF_FRAME": frame}
+    try:
+        stamps = stamps_of(flown["time"].to_numpy(), begun, about.values())
+    except ValueError as error:
+        raise InputError("export oem", "", str(error), "a word that a CCSDS message may hold") from None
+    span = {"TIME_SYSTEM": "UTC", "START_TIME": stamps[0], "STOP_TIME": stamps[-1]}
+    rows = [" ".join([stamp, *map(repr, row)]) for stamp, row in zip(stamps, (states / 1e3).tolist(), strict=True)]
+    write_message(Path(file), "CCSDS_OEM_VERS = 2.0", [f"{key} = {value}" for key, value in (about | span).items()], rows)
+    return Path(file)
+
+
+@shortly
+def read_oem(file: str | Path) -> Oem:
+    """Read a CCSDS orbit ephemeris message of one segment: `times` (s, since the first), `states` (positions and velocities,
+    m and m/s), and what it is about. Accelerations and covariances are skipped. InputError where it is none."""
+    return read_message(file, parse_oem, "a CCSDS orbit ephemeris message")
+
+
+def parse_oem(path: Path) -> Oem:
+    """Read the orbit of a message of one segment. OSError, or ValueError that names the line and its error."""
+    lines = Lines(read_text(path))
+    version = lines.value("CCSDS_OEM_VERS")
+    if version not in VERSIONS:
+        raise ValueError(f"line {lines.number}: CCSDS_OEM_VERS = {version}, of which {', '.join(VERSIONS)} are read")
+    list(lines.before("META_START"))
+    metadata = dict(lines.pair(line) for line in lines.before("META_STOP"))
+    for key in NEEDED:
+        if key not in metadata:
+            raise ValueError(f"no {key}")
+    instants, rows = list[int](), list[list[float]]()
+    while (line := lines.following()) is not None:
+        if line == "META_START":
+            raise ValueError(f"line {lines.number}: a second segment; only messages of one segment are read")
+        if line == "COVARIANCE_START":
+            list(lines.before("COVARIANCE_STOP"))
+            continue
+        instant, numbers = lines.row(line, (6, 9))
+        if not all(map(isfinite, numbers)):
+            raise ValueError(f"line {lines.number}: a number that is not finite")
+        instants.append(instant)
+        rows.append(numbers[:6])
+    if len(rows) < 2:
+        raise ValueError(f"{len(rows)} states")
+    for earlier, later in pairwise(instants):
+        if later <= earlier:
+            raise ValueError(f"the epoch {stamp_of(later)} after {stamp_of(earlier)}")
+    times = np.array([(instant - instants[0]) / SECOND for instant in instants])
+    return Oem(times, 1e3 * np.array(rows), stamp_of(instants[0]), *(metadata[key] for key in NEEDED))
