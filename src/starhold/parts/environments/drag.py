@@ -7,14 +7,13 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 
 from starhold.algebra.elementary import exp
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.scalar import Scalar, maximum, sqrt
-from starhold.algebra.several import weighted
+from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import Vector, cross, dot, scale, subtract, unit
 from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import DAY, SIDEREAL
 from starhold.parts.orbit import BODIES
-from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, constant, cosines, largest_torque, plates_of, total
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -80,7 +79,7 @@ def prepare(params: Params, period: float) -> Numbers:
     areas, normals, centres = plates_of(params.plates)
     return Numbers(
         normals,
-        tuple(map(scale, areas, centres)),
+        tuple(constant(scale(*pair)) for pair in zip(areas, centres, strict=True)),
         params.coefficient,
         0.5 * params.density,
         reference,
@@ -110,8 +109,8 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     """Torque on the body (N m, body axes)."""
     course = to_body(state.attitude, memory.course)
     # All forces are against the course.
-    shown = tuple(maximum(dot(normal, course), 0.0) for normal in params.normals)
-    return scale(params.coefficient * memory.pressure, cross(course, weighted(shown, params.arms)))
+    shown = cosines(params.normals, course)
+    return scale(params.coefficient * memory.pressure, cross(course, total(shown, params.arms)))
 
 
 def bound(params: Params, envelope: Envelope) -> Push:

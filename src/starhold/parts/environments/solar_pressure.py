@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.scalar import Scalar, maximum
-from starhold.algebra.several import weighted
-from starhold.algebra.vector import Vector, add, cross, dot, scale
+from starhold.algebra.scalar import Scalar, less
+from starhold.algebra.structured import when
+from starhold.algebra.vector import ZERO, Vector, add, cross, scale
 from starhold.algebra.words import number_of
 from starhold.parts import sun
 from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, constant, cosines, largest_torque, plates_of, total
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -79,9 +79,9 @@ def prepare(params: Params, period: float) -> Numbers:
     across = [scale(area, cross(*pair)) for area, *pair in zip(areas, centres, normals, strict=True)]
     return Numbers(
         normals,
-        tuple(scale(area * (1.0 - s), centre) for area, centre, (s, _) in zip(areas, centres, shares, strict=True)),
-        tuple(scale(2.0 * s, arm) for arm, (s, _) in zip(across, shares, strict=True)),
-        tuple(scale(2.0 / 3.0 * d, arm) for arm, (_, d) in zip(across, shares, strict=True)),
+        tuple(constant(scale(area * (1.0 - s), c)) for area, c, (s, _) in zip(areas, centres, shares, strict=True)),
+        tuple(constant(scale(2.0 * s, arm)) for arm, (s, _) in zip(across, shares, strict=True)),
+        tuple(constant(scale(2.0 / 3.0 * d, arm)) for arm, (_, d) in zip(across, shares, strict=True)),
         sun.prepared(params.epoch),
         period,
     )
@@ -100,11 +100,17 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     """Torque on the body (N m, body axes)."""
-    toward = to_body(state.attitude, memory.direction)
-    cosines = tuple(maximum(dot(normal, toward), 0.0) for normal in params.normals)
-    squares = tuple(cosine * cosine for cosine in cosines)
-    along = weighted((*squares, *cosines), (*params.mirrored, *params.scattered))
-    return scale(-memory.pressure, add(cross(weighted(cosines, params.taken), toward), along))
+
+    def pushed(_: Vector) -> tuple[Vector]:
+        toward = to_body(state.attitude, memory.direction)
+        seen = cosines(params.normals, toward)
+        squares = tuple(cosine * cosine for cosine in seen)
+        along = total((*squares, *seen), (*params.mirrored, *params.scattered))
+        return (scale(-memory.pressure, add(cross(total(seen, params.taken), toward), along)),)
+
+    # The Earth's shadow takes a third of many orbits.
+    (torque,) = when(less(0.0, memory.pressure), pushed, ZERO)
+    return torque
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
