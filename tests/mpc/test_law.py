@@ -14,6 +14,17 @@ from starhold.parts.craft import make_craft, tensor
 from tests.mpc.setting import CRAFTS, POSITION, WEIGHTS, fresh, seen_at
 
 
+def test_equal_problems_are_solved_once():
+    gains = mpc.Gains((0.2, 0.4, 0.1), (0.3, 0.2, 0.5), (50.0, 80.0, 20.0))
+    crafts = [make_craft(moments, torque_limit=limit) for moments in ([2, 3, 4], [2, 3, 4.5]) for limit in (0.1, 0.2)]
+    mpc.terminal_weight.cache_clear()
+    first, again, *_ = (mpc.remember(gains, craft, 0.5).numbers for craft in crafts)
+    assert mpc.terminal_weight.cache_info().misses == 2
+    # Each memory is a trajectory's own.
+    assert first is not again
+    assert first.cells == again.cells
+
+
 @pytest.mark.parametrize("horizon", [1, 5, 20])
 @pytest.mark.parametrize("craft", CRAFTS.values(), ids=CRAFTS)
 def test_riccati_terminal_gives_the_endless_horizon(craft: Any, horizon: int):

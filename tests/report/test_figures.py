@@ -1,6 +1,9 @@
 """The figures exist, show something, and survive odd names, lost runs and runs at rest."""
 
+import pickle
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +15,7 @@ from PIL import Image
 from starhold.algebra.cosines import to_angles
 from starhold.analysis.rigid_body import METRICS
 from starhold.report.attitude_plots import KNOWN, collect, early, roll_pitch_yaw, until
+from starhold.report.body import report_of
 from starhold.report.figures import WORD_ROWS, word_rows
 from starhold.report.plots import COLOURS, Mark, colour, recorded_plots, thin, thin_times
 from starhold.report.text import number_text
@@ -45,6 +49,16 @@ def test_every_figure_is_drawn_with_every_law(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_figures_of_an_attitude_are_drawn_without_what_flies_reads_and_proves(tmp_path: Path) -> None:
+    picture = report_of("rigid-body").picture(flown.flights(), flown.scenario())
+    sent = tmp_path / "picture"
+    sent.write_bytes(pickle.dumps(picture))
+    code = f"import pickle, sys; pickle.load(open({str(sent)!r}, 'rb')); print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "starhold.report.figures" in loaded
+    assert not {"pydantic", "flint", "llvmlite", "scipy", "starhold.loop.step", "starhold.certification"} & {*loaded}
+
+
 def test_equal_flights_give_equal_files(tmp_path: Path) -> None:
     folders = [tmp_path / "a", tmp_path / "b"]
     for folder in folders:

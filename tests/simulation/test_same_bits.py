@@ -8,6 +8,7 @@ import pytest
 from starhold.algebra.structure import flatten, places
 from starhold.conformance.bench import random_quaternions, sample_loop
 from starhold.laws.catalogue import catalogue
+from starhold.loop import kernels
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
 from starhold.simulation.lane import fly, simulate
@@ -81,6 +82,22 @@ def test_chunks_and_recording_change_nothing():
     assert np.array_equal(whole, chunked)
     assert flatten(end.state) == flatten(other.state) == flatten(third.state)
     assert np.array_equal(whole[:, ::7], sparse)
+
+
+def test_a_long_flight_is_optimised_and_gives_the_same_numbers(monkeypatch):
+    loop, load, asked = flown(), kernels.load, []
+
+    def noted(program, width, passes=None):
+        asked.append(passes)
+        return load(program, width, passes)
+
+    monkeypatch.setattr(kernels, "_KERNELS", {})
+    monkeypatch.setattr(kernels, "load", noted)
+    short, _ = fly(loop, 200)
+    monkeypatch.setattr("starhold.simulation.lane.LONG", 200)
+    long, _ = fly(loop, 200)
+    assert asked == [None, True]
+    assert np.array_equal(short, long)
 
 
 def test_seed_changes_noise_and_nothing_else():

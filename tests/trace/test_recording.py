@@ -67,6 +67,27 @@ def test_a_loop_shares_what_stands_before_it_but_not_what_stands_in_another() ->
     assert operations(record(equation)) == ["product", "product", "plus", "product", "plus"]
 
 
+def test_equal_loops_that_write_nothing_are_recorded_once() -> None:
+    def equation(cells, table, count, _):
+        x = table[0]
+
+        def turn(k, y, z):
+            (y,) = when(less(z, table[k]), lambda y: (y * x,), y)
+            return y, z + y
+
+        def other(k, y, z):
+            return y * x, z + table[k]
+
+        first, again, apart = (repeat(count, body, x, 0.0) for body in (turn, turn, other))
+        cells[0], cells[1], cells[2] = first[0], again[1], apart[1]
+        later, last = (repeat(count, lambda k, y: (y + cells[k],), x) for _ in range(2))
+        cells[3], cells[4] = later[0], last[0]
+
+    recorded = found(record(equation), Loop)
+    # The first with one within it, the other, and two that read what may have been written between them.
+    assert [loop.most for loop in recorded] == ["count", 1, "count", "count", "count"]
+
+
 def test_numbers_of_other_signs_or_kinds_are_not_taken_for_equal() -> None:
     def equation(cells, table, *_):
         x = table[0]

@@ -38,7 +38,7 @@ def compile_calls(loop: ClosedLoop) -> tuple[Kernel, ClosedLoop]:
     # The noise of the simulation is no part of one, but for that of readings which the call is given.
     needed = loop.used("estimator") or getattr(loop.law.module, "WATCHES", False)
     loop = loop.without("random-torque") if needed else loop.without("random-torque", "sensor")
-    return make_kernel(replay, loop.composition(), 1, loop.carry(), Numbers.of(loop.phases(1)[0])), loop
+    return make_kernel(replay, loop.composition(), 1, loop.carry(), Numbers.of(loop.phases(1)[0]), passes=True), loop
 
 
 def recorded_states(loop: ClosedLoop, recording: Recording) -> NDArray[np.float64]:

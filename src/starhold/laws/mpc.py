@@ -4,6 +4,7 @@ first."""
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from importlib import import_module
 from typing import Annotated, Any, NamedTuple, cast
 
@@ -12,7 +13,7 @@ import numpy as np
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import less, maximum, where
 from starhold.algebra.structured import Buffer, when
-from starhold.algebra.vector import Vector, add, clip_axes, clip_norm, scale
+from starhold.algebra.vector import Matrix, Vector, add, clip_axes, clip_norm, scale
 from starhold.laws.interface import Card, Gain, Measurement, tracking_torque
 from starhold.laws.predictive.motion import linearise, sample
 from starhold.laws.predictive.problem import COUNTERS, Problem, Store, carve, put_limits, size
@@ -66,7 +67,7 @@ def remember(gains: Gains, craft: Craft, period: float) -> Memory:
     """Return the memory of one trajectory, for control instants `period` apart (s).
 
     Raises ValueError where the Riccati equation of the terminal weight has no solution in double precision."""
-    terminal, tail = terminal_weight(gains, craft, period)
+    terminal, tail = terminal_weight(gains, craft.inertia, period)
     memory = Memory(Buffer([0.0] * size(gains.horizon)))
     store = carve(program(gains, memory))
     diagonals = [*gains.q_attitude, *gains.q_rate, *gains.r, *(1.0 / weight for weight in gains.r)]
@@ -85,14 +86,15 @@ def counters(memory: Memory) -> tuple[int, ...]:
     return tuple(int(memory.numbers[place]) for place in range(COUNTERS))
 
 
+@lru_cache(maxsize=64)
 @np.errstate(all="ignore")
-def terminal_weight(gains: Gains, craft: Craft, period: float) -> tuple[Any, Any]:
+def terminal_weight(gains: Gains, moments: Matrix | Vector, period: float) -> tuple[Any, Any]:
     """Return the weight P (6, 6) of the state after the last move, and the feedback (3, 6) that is optimal for that move: u
     = -feedback x. For "riccati" they are those of the infinite horizon at w = 0 without gravity.
 
     Raises ValueError where the Riccati equation has no solution in double precision."""
     # In periods and in a typical torque, so that the weights of any craft are of comparable size.
-    inertia = tensor(craft.inertia)
+    inertia = tensor(moments)
     typical = np.trace(inertia) / 3.0
     push = typical * np.linalg.inv(inertia)
     a = np.block([[np.eye(3), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])

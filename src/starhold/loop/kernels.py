@@ -160,9 +160,10 @@ def state_of(numbers: Any, like: Any) -> Any:
 class Kernel:
     """A compiled program. Called with its memories by name, then counts and words in the order the program states."""
 
-    def __init__(self, program: Program, width: int) -> None:
+    def __init__(self, program: Program, width: int, passes: bool | None = None) -> None:
+        """passes: see `load`."""
         self.program = program
-        self._call = load(program, width)
+        self._call = load(program, width, passes)
 
     def __call__(self, memories: dict[str, Array], *counts: int) -> None:
         self.on(memories)(*map(word, counts))
@@ -184,9 +185,11 @@ def make_program(kind: Callable[..., Program], parts: Composition, *arguments: A
     return _PROGRAMS[key]
 
 
-def make_kernel(kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any) -> Kernel:
-    """The kernel of a program kind(step, *arguments); one serves all arguments of the same form."""
-    key = (kind, parts, width, form(arguments))
+def make_kernel(
+    kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any, passes: bool | None = None
+) -> Kernel:
+    """The kernel of a program kind(step, *arguments); one serves all arguments of the same form. passes: see `load`."""
+    key = (kind, parts, width, passes, form(arguments))
     if key not in _KERNELS:
-        _KERNELS[key] = Kernel(make_program(kind, parts, *arguments), width)
+        _KERNELS[key] = Kernel(make_program(kind, parts, *arguments), width, passes)
     return _KERNELS[key]

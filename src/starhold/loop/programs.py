@@ -34,8 +34,8 @@ def _state(like: Any, cells: Cells, base: Any, known: dict[int, Any] | None = No
         if isinstance(value, Buffer):
             start += value.size
             return Buffer(cells, base + start - value.size, value.size)
-        place += 1
-        return known[place - 1] if known and place - 1 in known else cells[base + place - 1]
+        here, place = place, place + 1
+        return known[here] if known and here in known else cells[base + here]
 
     return mapped(like, leaf)
 

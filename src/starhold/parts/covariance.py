@@ -3,7 +3,7 @@ assume of a gyro."""
 
 from __future__ import annotations
 
-from starhold.algebra.scalar import sqrt
+from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import Matrix, Vector, combine, multiply, transpose
 from starhold.parts.contract import Parameter
 
@@ -21,6 +21,15 @@ def carried(turn: Matrix, mixed: Matrix, walk: Matrix, axes: Matrix, drift: Matr
         multiply(after, transpose(drift)),
     )
     return spread, after
+
+
+def along_diagonal(a: Matrix, number: Scalar) -> Matrix:
+    """Return a + number times the identity."""
+    return (
+        (a[0][0] + number, a[0][1], a[0][2]),
+        (a[1][0], a[1][1] + number, a[1][2]),
+        (a[2][0], a[2][1], a[2][2] + number),
+    )
 
 
 def summed(a: Matrix, b: Matrix) -> Matrix:

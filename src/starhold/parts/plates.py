@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import reduce
 from itertools import combinations
 from math import hypot
 from typing import Any, NamedTuple
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.scalar import Scalar
+from starhold.algebra.scalar import Scalar, maximum, plus
 from starhold.algebra.vector import Vector, scale
 
 COLUMNS = ("area", "normal_x", "normal_y", "normal_z", "x", "y", "z")
@@ -30,7 +31,7 @@ BOX = (
 
 
 class Plates(NamedTuple):
-    """Areas (m2), unit normals and centres (m)."""
+    """Areas (m2), unit normals, in which 0, 1 and -1 are constants, and centres (m)."""
 
     areas: tuple[Scalar, ...]
     normals: tuple[Vector, ...]
@@ -46,8 +47,41 @@ def plates_of(rows: Any) -> Plates:
         size = hypot(x, y, z)
         if not (area >= 0.0 and size > 0.0):
             raise ValueError(f"plate {number} needs an area of at least 0 and a normal with a direction")
-        normals.append(scale(1.0 / size, (x, y, z)))
+        normals.append(constant(scale(1.0 / size, (x, y, z))))
     return Plates(tuple(row[0] for row in rows), tuple(normals), tuple((row[4], row[5], row[6]) for row in rows))
+
+
+def constant(vector: Vector) -> Vector:
+    """Return a vector with its components of 0, 1 and -1 as whole numbers, which are constants of a kernel: many are, for
+    most plates lie along the axes, and `cosines` and `total` compute nothing with them."""
+    x, y, z = (int(number) if number in (-1.0, 0.0, 1.0) else number for number in vector)
+    return (x, y, z)
+
+
+def cosines(normals: Sequence[Vector], direction: Vector) -> tuple[Scalar, ...]:
+    """Return the cosines of the angles between normals and a direction, 0 for plates that it does not see."""
+    return tuple(maximum(_sum(normal, direction), 0.0) for normal in normals)
+
+
+def total(weights: Sequence[Scalar], arms: Sequence[Vector]) -> Vector:
+    """Return the sum of weights[i] * arms[i], from the first to the last."""
+    x, y, z = (_sum(column, weights) for column in zip(*arms, strict=True))
+    return (x, y, z)
+
+
+def _sum(factors: Sequence[Scalar], numbers: Sequence[Scalar]) -> Scalar:
+    terms = [_product(*pair) for pair in zip(factors, numbers, strict=True) if not _is_zero(pair[0])]
+    return reduce(plus, terms) if terms else 0.0
+
+
+def _is_zero(factor: Scalar) -> bool:
+    return isinstance(factor, int) and factor == 0
+
+
+def _product(factor: Scalar, number: Scalar) -> Scalar:
+    if isinstance(factor, int):
+        return number if factor > 0 else -number
+    return factor * number
 
 
 def largest_torque(

@@ -10,7 +10,6 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
@@ -103,8 +102,6 @@ def main() -> None:
     gc.disable()
     from starhold.report.figures import paint, warm_up
 
-    # The figures of every body load the parts of pages.
-    import_module("starhold.report.page_parts")
     warm_up()
     what, folder = pickle.load(sys.stdin.buffer)
     # Everything is loaded, so a second process draws the other half without start-up cost.

@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.certification.assumptions import HAS
-from starhold.certification.wording import enumerated, listed
-
 if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
@@ -54,6 +51,10 @@ def left_text(flight: Flight, certificate: int, kind: str) -> str:
 
 def _how(departures: Sequence[str]) -> str:
     """List departures in order of time, naming the parts of the loop together."""
+    # Loaded here, for what draws needs no certificates.
+    from starhold.certification.assumptions import HAS
+    from starhold.certification.wording import enumerated, listed
+
     parts = [text.removeprefix(HAS) for text in departures if text.startswith(HAS)]
     others = [text for text in departures if not text.startswith(HAS)]
     return listed([*([HAS.removesuffix("the ") + enumerated(parts)] if parts else []), *others])

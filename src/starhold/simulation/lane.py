@@ -20,6 +20,7 @@ from starhold.laws.program import law_digest
 from starhold.loop.closed_loop import Carry, ClosedLoop, is_recorded
 from starhold.loop.kernels import Arguments, Kernel, Numbers, make_kernel, make_step, numbers_of, state_of
 from starhold.loop.programs import one
+from starhold.trace.machine import LONG
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,7 +120,7 @@ def fly(
     width = len(flatten(make_step(loop.composition()).sample(like, 0, loop.setup())))
     samples = _room(steps, record_every, width)
     carry, done, chunk = np.array(numbers_of(like)), 0, steps if progress is None else 1
-    flight = _Flight(loop, like, record_every, loop.run if run is None else run, samples)
+    flight = _Flight(loop, like, record_every, loop.run if run is None else run, samples, steps >= LONG or None)
     while done < steps:
         begun = time.perf_counter()
         now = next(phase for phase in phases if done < phase.last)
@@ -146,15 +147,18 @@ def fly(
 class _Flight:
     """A kernel with the memories of one flight."""
 
-    def __init__(self, loop: Any, like: Any, every: int, run: int, samples: NDArray[np.float64]) -> None:
-        self.loop, self.like, self.every, self.run, self.samples = loop, like, every, run, samples
+    def __init__(
+        self, loop: Any, like: Any, every: int, run: int, samples: NDArray[np.float64], passes: bool | None
+    ) -> None:
+        self.loop, self.like, self.every, self.run, self.samples, self.passes = loop, like, every, run, samples, passes
         self._ready: dict[int, tuple[Arguments, Kernel]] = {}
 
     def _prepared(self, phase: Any) -> tuple[Arguments, Kernel]:
         """Return arguments and kernel of a phase, made once for all its chunks."""
         if phase.first not in self._ready:
             numbers = Numbers.of(phase)
-            kernel = make_kernel(one, self.loop.composition(), 1, self.like, numbers, self.loop.substeps)
+            parts, more = self.loop.composition(), (self.like, numbers, self.loop.substeps)
+            kernel = make_kernel(one, parts, 1, *more, passes=self.passes)
             self._ready[phase.first] = Arguments(*numbers), kernel
         return self._ready[phase.first]
 

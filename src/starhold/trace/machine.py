@@ -32,6 +32,8 @@ def _machine() -> Any:
     return target.create_target_machine(opt=3, cpu=llvm.get_host_cpu_name(), features=features)
 
 
+LONG = 2_000_000
+"""Control steps of one lane for which it pays that LLVM optimises their kernel."""
 FEW = 16
 """Numbers carried from step to step for which 16 registers are still enough for two vectors of each."""
 
@@ -55,10 +57,11 @@ def load(program: Program, width: int, passes: bool | None = None) -> Callable[.
     of lanes holds `width` numbers for each index, aligned to their size), then counts and words. It releases the GIL.
 
     passes: whether LLVM optimises the printed text before it makes code of it; None: where that has been measured to
-    pay, on one lane, and on many where registers are plenty and nothing is called."""
+    pay, on many lanes where registers are plenty and nothing is called. On one lane it takes longer than the code itself
+    for some thousandths of the time of a step, or a fifth where matrices are solved: it pays from `LONG` steps on."""
     calls = any(isinstance(s, Call) for s in statements(program.main.body))
     if passes is None:
-        passes = width == 1 or (_is_wide() and not calls)
+        passes = width > 1 and _is_wide() and not calls
     llvm, machine = _llvm(), _machine()
     module = llvm.parse_assembly(str(Llvm(program, width)))
     module.verify()

@@ -255,8 +255,42 @@ class Recorder:
             )
         pairs = zip(names, self._refs(state), self._refs(after), strict=True)
         slots = tuple(Slot(name, kind, before, then) for (name, kind), before, then in pairs)
-        self._open[-1].append(Loop(counter, _ref(most), slots, head, None if done is None else _ref(stop), block))
-        return self._handles(state, [(name + "_", kind) for name, kind in names])
+        loop = Loop(counter, _ref(most), slots, head, None if done is None else _ref(stop), block)
+        # What writes nothing is recorded once; a state with buffers may be written elsewhere.
+        key = self._likeness((loop,), {}) if len(names) == len([*leaves(state)]) else None
+        known: list[Any] = [seen[key] for seen in self._seen if key and key in seen]
+        if not known:
+            self._open[-1].append(loop)
+            known = [self._handles(state, [(slot.end, slot.kind) for slot in slots])]
+            self._seen[-1] |= {key: known[0]} if key else {}
+        return known[0]
+
+    def _likeness(self, block: tuple[Any, ...], names: dict[Value, int]) -> Any:
+        """Return a key that is equal for blocks that compute the same, whatever names they give to it, which `names` gets;
+        None for one that calls, writes or reads what is written."""
+        keys: list[Any] = []
+
+        def of(value: Value) -> Any:
+            return names.get(value, value) if isinstance(value, str) else (type(value), repr(value))
+
+        for s in block:
+            if isinstance(s, Op):
+                keys.append((s.operation.name, *map(of, s.args)))
+                names[s.ref] = len(names)
+            elif isinstance(s, Load) and not next(m for m in self.memories if m.name == s.memory).writable:
+                keys.append((s.memory, of(s.index)))
+                names[s.ref] = len(names)
+            elif isinstance(s, Loop):
+                begun = (of(s.most), *(of(slot.before) for slot in s.slots))
+                names |= {name: len(names) + k for k, name in enumerate((s.counter, *(slot.name for slot in s.slots)))}
+                inner = self._likeness(s.head, names), of(s.done), self._likeness(s.body, names)
+                if None in inner:
+                    return None
+                keys.append((begun, inner, tuple(of(slot.after) for slot in s.slots)))
+                names |= {slot.end: len(names) + k for k, slot in enumerate(s.slots)}
+            else:
+                return None
+        return tuple(keys)
 
     def _check_done(self, head: tuple[Any, ...], stop: Any) -> None:
         if kind_of(stop) != TRUTH:

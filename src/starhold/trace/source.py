@@ -63,6 +63,12 @@ def operator_of(text: str) -> str:
     return "?" if text == "{0} ? {1} : {2}" else _OTHER
 
 
+@cache
+def _times(text: str, place: int) -> int:
+    """Return how often a text names an operand or parts of it."""
+    return len(re.findall(rf"\{{{place}[hl]?\}}", text))
+
+
 def _stands(inner: str, outer: str, place: int) -> bool:
     """Return whether an operand needs no parentheses; they are written too where only a compiler's warning requires them."""
     if outer == _CALL:
@@ -254,7 +260,7 @@ class Source(ABC):
         if isinstance(s, Op):
             texts = self._texts(s)
             for place, value in enumerate(s.args):
-                yield value, sum(len(re.findall(rf"\{{{place}[hl]?\}}", text)) for text in texts)
+                yield value, sum(_times(text, place) for text in texts)
         elif isinstance(s, Call):
             yield from ((value, self._halves(kind)) for value, (_, kind) in zip(s.args, s.function.params, strict=True))
         elif isinstance(s, Loop):

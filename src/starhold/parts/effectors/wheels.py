@@ -11,15 +11,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import reduce
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quantity import Quantity
-from starhold.algebra.scalar import Scalar, absolute, both, clip, either, less, less_equal, plus, where
+from starhold.algebra.scalar import Scalar, Truth, absolute, both, clip, either, less, less_equal, plus, where
 from starhold.algebra.several import each, weighted
-from starhold.algebra.structured import Buffer, repeat
+from starhold.algebra.structured import Buffer, repeat, when
 from starhold.algebra.vector import Vector, add, cross, dot, scale
 from starhold.parts.contract import Card, Envelope, Push
 from starhold.parts.craft import vector
@@ -125,14 +126,15 @@ def command(applied: Vector, params: Wheels) -> Numbers:
 def reaction(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
     """The torque of the wheels on the body (N m)."""
     h, rate = state.momentum, body.rate
-    torque = on_body(motor(command, h, rate, params), h, rate, params)
+    torque = on_body(motor(command, h, rate, params, _rubs(params)), h, rate, params)
     return add(torque, shaken(state.angle, h, rate, params)) if params.unbalanced else torque
 
 
 def rates(state: State, command: Numbers, body: Any, acceleration: Vector, params: Wheels) -> State:
     """d(momentum)/dt of each rotor (N m), and its speed (turns/s) where it is out of balance."""
     turning = speeds(state.momentum, body.rate, params) if params.unbalanced else ()
-    return State(motor(command, state.momentum, body.rate, params), tuple(x * (0.5 / math.pi) for x in turning))
+    given = motor(command, state.momentum, body.rate, params, _rubs(params))
+    return State(given, tuple(x * (0.5 / math.pi) for x in turning))
 
 
 def momentum(state: State, params: Wheels) -> Vector:
@@ -213,46 +215,44 @@ def allocate_peak(torque: Vector, wheels: Wheels) -> Numbers:
     return repeat(facets.size // width - 1, better, *piece(0))[2:]
 
 
-def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
+def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels, rubs: Truth = True) -> Numbers:
     """d(momentum)/dt of each wheel (N m) under the commanded motor torques (N m), at axial momenta (N m s) and body
     rate (rad/s): the command within the torque limit, faded out where it would carry the momentum beyond its limit (see
-    BAND), and friction against the speed relative to the body (see CREEP). Limits may be infinite."""
-    columns = (
-        command,
-        momentum,
-        wheels.axes,
-        wheels.inertia,
-        limited(command, momentum, rate, wheels).torque_limit,
-        wheels.momentum_limit,
-        wheels.viscous,
-        wheels.coulomb,
-    )
-    given = each(_motor, columns, rate)
+    BAND), and friction against the speed relative to the body (see CREEP). Limits may be infinite. rubs: False leaves out
+    friction that is zero, which may change the sign of a zero, and no motion."""
+    limit = limited(command, momentum, rate, wheels).torque_limit
+    given = each(_driven, (command, momentum, limit, wheels.momentum_limit))
+    # Reciprocals of constants, which a compiler takes out of the loop over the lanes.
+    inverse = tuple(1.0 / inertia for inertia in wheels.inertia)
+
+    def braked(*given: Scalar) -> Numbers:
+        columns = (given, momentum, inverse, wheels.axes, wheels.viscous, wheels.coulomb)
+        return each(_braked, columns, rate)
+
+    given = when(rubs, braked, *given)
     return tuple(map(plus, given, sticking(momentum, rate, wheels))) if wheels.sticking else given
 
 
-def _motor(
-    command: Scalar,
-    momentum: Scalar,
-    axis: Vector,
-    inertia: Scalar,
-    torque_limit: Scalar,
-    momentum_limit: Scalar,
-    viscous: Scalar,
-    coulomb: Scalar,
-    rate: Vector,
+def _rubs(wheels: Wheels) -> Truth:
+    """Whether there is friction that `motor` may not leave out: many bearings are taken for ideal."""
+    return less(0.0, reduce(plus, (*wheels.viscous, *wheels.coulomb)))
+
+
+def _driven(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum_limit: Scalar) -> Scalar:
+    return _room(command, momentum, momentum_limit) * clip(command, torque_limit)
+
+
+def _braked(
+    given: Scalar, momentum: Scalar, inverse: Scalar, axis: Vector, viscous: Scalar, coulomb: Scalar, rate: Vector
 ) -> Scalar:
-    # Reciprocals of constants, which a compiler takes out of the loop over the lanes.
-    speed = momentum * (1.0 / inertia) - dot(axis, rate)
-    given = _room(command, momentum, momentum_limit) * clip(command, torque_limit)
+    speed = momentum * inverse - dot(axis, rate)
     return given - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
 
 
 def _room(command: Scalar, momentum: Scalar, limit: Scalar) -> Scalar:
     """The share of its torque that the momentum leaves a motor, in the direction of the command."""
     filled = momentum * (1.0 / limit)
-    above, below = _fraction((1.0 - filled) * (1.0 / BAND)), _fraction((1.0 + filled) * (1.0 / BAND))
-    return where(less(0.0, command), above, below)
+    return _fraction((1.0 - where(less(0.0, command), filled, -filled)) * (1.0 / BAND))
 
 
 def available(command: Numbers, momentum: Numbers, wheels: Wheels) -> Numbers:

@@ -12,14 +12,13 @@ import numpy as np
 from starhold.algebra.elementary import exp
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, maximum, sqrt
-from starhold.algebra.several import weighted
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import Vector, cross, dot, scale, subtract, unit
 from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import DAY, SIDEREAL
 from starhold.parts.orbit import BODIES, highest, lowest
-from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, constant, cosines, largest_torque, plates_of, total
 from starhold.parts.pushes import MASS, MOVES, inverse_mass
 from starhold.parts.random import Dice
 
@@ -109,7 +108,7 @@ def prepare(params: Params, period: float) -> Numbers:
     inverse = inverse_mass(params.moves_orbit, params.mass)
     return Numbers(
         normals,
-        tuple(map(scale, areas, centres)),
+        tuple(constant(scale(*pair)) for pair in zip(areas, centres, strict=True)),
         params.coefficient,
         0.5 * density,
         RADIUS + height,
@@ -176,16 +175,11 @@ def update(memory: Memory, state: Any, params: Numbers, dice: Dice, step: int) -
     return Memory(unit(through), params.density * thinned * dot(through, through))
 
 
-def _shown(course: Vector, params: Numbers) -> tuple[Scalar, ...]:
-    """The cosines of the plates to the course (body axes), 0 of those that look back."""
-    return tuple(maximum(dot(normal, course), 0.0) for normal in params.normals)
-
-
 def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector | None:
     """Acceleration of the centre of mass (inertial, m/s2), None where the orbit is not moved."""
     if not params.areas:
         return None
-    shown = _shown(to_body(state.attitude, memory.course), params)
+    shown = cosines(params.normals, to_body(state.attitude, memory.course))
     area = sum(map(mul, params.areas, shown))
     return scale(-params.coefficient * memory.pressure * area, memory.course)
 
@@ -194,8 +188,8 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     """Torque on the body (N m, body axes)."""
     course = to_body(state.attitude, memory.course)
     # All forces are against the course.
-    shown = _shown(course, params)
-    return scale(params.coefficient * memory.pressure, cross(course, weighted(shown, params.arms)))
+    shown = cosines(params.normals, course)
+    return scale(params.coefficient * memory.pressure, cross(course, total(shown, params.arms)))
 
 
 def bound(params: Params, envelope: Envelope) -> Push:

@@ -8,16 +8,16 @@ from operator import mul
 from typing import Annotated, Any, NamedTuple, TypeAlias
 
 from starhold.algebra.quaternion import to_body, to_reference
-from starhold.algebra.scalar import Scalar, maximum
-from starhold.algebra.several import weighted
-from starhold.algebra.vector import Vector, add, cross, dot, scale
+from starhold.algebra.scalar import Scalar, less
+from starhold.algebra.structured import when
+from starhold.algebra.vector import ZERO, Vector, add, cross, scale
 from starhold.algebra.words import number_of
 from starhold.parts import sun
 from starhold.parts.contract import Card, Envelope, Parameter, Push
 from starhold.parts.craft import Craft
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.plates import BOX, COLUMNS, TEXT, largest_torque, plates_of
+from starhold.parts.plates import BOX, COLUMNS, TEXT, constant, cosines, largest_torque, plates_of, total
 from starhold.parts.pushes import MASS, MOVES, inverse_mass
 from starhold.parts.random import Dice
 
@@ -97,9 +97,9 @@ def prepare(params: Params, period: float) -> Numbers:
         push = taken, mirrored, tuple(scale(2.0 / 3.0 * d * area, normal) for area, normal, _, d in light)
     return Numbers(
         normals,
-        tuple(scale(area * (1.0 - s), centre) for area, centre, (s, _) in zip(areas, centres, shares, strict=True)),
-        tuple(scale(2.0 * s, arm) for arm, (s, _) in zip(across, shares, strict=True)),
-        tuple(scale(2.0 / 3.0 * d, arm) for arm, (_, d) in zip(across, shares, strict=True)),
+        tuple(constant(scale(area * (1.0 - s), c)) for area, c, (s, _) in zip(areas, centres, shares, strict=True)),
+        tuple(constant(scale(2.0 * s, arm)) for arm, (s, _) in zip(across, shares, strict=True)),
+        tuple(constant(scale(2.0 / 3.0 * d, arm)) for arm, (_, d) in zip(across, shares, strict=True)),
         sun.prepared(params.epoch, params.ephemeris),
         period,
         push,
@@ -121,25 +121,31 @@ def _seen(state: Any, params: Numbers, memory: Memory) -> tuple[Vector, tuple[Sc
     """The direction to the Sun (body axes), the cosines of the plates to it, 0 for those that look away, and their
     squares."""
     toward = to_body(state.attitude, memory.direction)
-    cosines = tuple(maximum(dot(normal, toward), 0.0) for normal in params.normals)
-    return toward, cosines, tuple(cosine * cosine for cosine in cosines)
+    seen = cosines(params.normals, toward)
+    return toward, seen, tuple(cosine * cosine for cosine in seen)
 
 
 def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector | None:
     """Acceleration of the centre of mass (inertial, m/s2), None where the orbit is not moved."""
     if not params.push:
         return None
-    toward, cosines, squares = _seen(state, params, memory)
+    toward, seen, squares = _seen(state, params, memory)
     taken, mirrored, scattered = params.push
-    push = add(scale(sum(map(mul, taken, cosines)), toward), weighted((*squares, *cosines), (*mirrored, *scattered)))
+    push = add(scale(sum(map(mul, taken, seen)), toward), total((*squares, *seen), (*mirrored, *scattered)))
     return to_reference(state.attitude, scale(-memory.pressure, push))
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
     """Torque on the body (N m, body axes)."""
-    toward, cosines, squares = _seen(state, params, memory)
-    along = weighted((*squares, *cosines), (*params.mirrored, *params.scattered))
-    return scale(-memory.pressure, add(cross(weighted(cosines, params.taken), toward), along))
+
+    def pushed(_: Vector) -> tuple[Vector]:
+        toward, seen, squares = _seen(state, params, memory)
+        along = total((*squares, *seen), (*params.mirrored, *params.scattered))
+        return (scale(-memory.pressure, add(cross(total(seen, params.taken), toward), along)),)
+
+    # The Earth's shadow takes a third of many orbits.
+    (torque,) = when(less(0.0, memory.pressure), pushed, ZERO)
+    return torque
 
 
 def bound(params: Params, envelope: Envelope) -> Push:

@@ -36,7 +36,16 @@ from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
 from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import Card, Noise, Parameter, Recursion
-from starhold.parts.covariance import GYRO_BIAS, GYRO_NOISE, GYRO_WALK, carried, deviations, summed, symmetric
+from starhold.parts.covariance import (
+    GYRO_BIAS,
+    GYRO_NOISE,
+    GYRO_WALK,
+    along_diagonal,
+    carried,
+    deviations,
+    summed,
+    symmetric,
+)
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
@@ -240,13 +249,13 @@ def latest(readings: Any, params: Numbers) -> tuple[Quaternion, Truth, Numbers]:
 
 def arrived(before: Memory, params: Numbers) -> Instant:
     """The estimate at a control step before it is corrected."""
-    ahead = combine(1.0, before.turn, 3.0 * params.reading, IDENTITY)
+    ahead = along_diagonal(before.turn, 3.0 * params.reading)
     return Instant(before.attitude, before.turn, ZERO, before._replace(turn=ahead))
 
 
 def taken(now: Instant, measured: Quaternion, params: Numbers) -> Instant:
     """The first attitude, taken as it is: its error has nothing to do with the bias, nor with the noise of the gyro."""
-    ahead = combine(1.0, params.tracker, params.reading, IDENTITY)
+    ahead = along_diagonal(params.tracker, params.reading)
     memory = now.memory._replace(attitude=measured, turn=ahead, mixed=(ZERO, ZERO, ZERO))
     return Instant(measured, params.tracker, ZERO, memory)
 
@@ -280,7 +289,7 @@ def gains(now: Instant, params: Numbers) -> Gains:
 
 def twice_read(now: Instant, params: Numbers) -> Matrix:
     """The covariance of the attitude that is kept with the present one: it has the noise of the reading twice."""
-    return combine(1.0, now.turn, params.reading, IDENTITY)
+    return along_diagonal(now.turn, params.reading)
 
 
 def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) -> Memory:
@@ -290,9 +299,9 @@ def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) ->
     spread, mixed = carried(memory.turn, memory.mixed, memory.walk, axes, drift)
     return memory._replace(
         attitude=renormalise(multiply(memory.attitude, turn)),
-        turn=symmetric(combine(1.0, spread, params.reading + params.turned, IDENTITY)),
-        mixed=combine(1.0, mixed, params.mixed, IDENTITY),
-        walk=combine(1.0, memory.walk, params.walked, IDENTITY),
+        turn=symmetric(along_diagonal(spread, params.reading + params.turned)),
+        mixed=along_diagonal(mixed, params.mixed),
+        walk=along_diagonal(memory.walk, params.walked),
     )
 
 

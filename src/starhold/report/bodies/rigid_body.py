@@ -15,6 +15,7 @@ from starhold.algebra.quaternion import conjugate, multiply, to_body
 from starhold.analysis.rigid_body import DECADES
 from starhold.parts.craft import EARTH, total_inertia
 from starhold.report import transients
+from starhold.report.accuracy import draw_accuracy
 from starhold.report.attitude_plots import (
     ACCURACIES,
     AttitudePlots,
@@ -26,11 +27,11 @@ from starhold.report.attitude_plots import (
     until,
 )
 from starhold.report.body import PageParts, Sampling
-from starhold.report.figures import POINTS, Picture, blank, over_time, width_of, without_runs
+from starhold.report.figures import POINTS, Picture, over_time, without_runs
 from starhold.report.page_parts import POINTS as PAGE_POINTS
 from starhold.report.page_parts import over_time as over_time_data
 from starhold.report.page_parts import panel_data, rounded, views
-from starhold.report.plots import Panel, Plot, colour, thinning
+from starhold.report.plots import Panel, Plot, thinning
 from starhold.report.tables import swatch
 from starhold.scenario.bodies.rigid_body.faults import fault_times
 from starhold.studies.flight import Begun, Flight
@@ -69,7 +70,8 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
         for plot in (first.angle, first.torque):
             cut = replace(plot, title=f"{plot.title}, transient")
             figures[f"{plot.name}-transient"] = partial(over_time, cut, first.times, first.marks, shown, name, first.shaded)
-    return figures | {"accuracy": partial(_accuracy_figure, shown, name)}
+    steps = {label: [steps_within(flight, kind) for flight in flights] for kind, label in ACCURACIES}
+    return figures | {"accuracy": partial(draw_accuracy, steps, list(DECADES), shown, name)}
 
 
 def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
@@ -107,23 +109,6 @@ def _limits(flights: Sequence[Flight], scenario: Scenario) -> str:
     closest = [(number, *closest_limit(flight, scenario)) for number, flight in enumerate(flights)]
     said = "".join(f"<span>{swatch(number)}{name} {100.0 * share:.3g} %</span>" for number, share, name in closest if name)
     return f'<p class="best-at of-file"><strong>Of torque and wheels, closest to a limit</strong>{said}</p>' if said else ""
-
-
-def _accuracy_figure(flights: Sequence[Flight], name: str) -> Any:
-    figure, axes = blank(1, 2, 3.9, "control steps needed to stay within 10⁻ᵏ", flights, name, "")
-    for axis, (kind, label) in zip(axes, ACCURACIES, strict=True):
-        for number, flight in enumerate(flights):
-            steps = np.array([np.nan if s is None else s for s in steps_within(flight, kind)])
-            width = width_of(number, len(flights))
-            axis.plot(
-                list(DECADES), steps, color=colour(number), linewidth=width, marker="os^Dv<>"[number % 7], markersize=5
-            )
-        axis.set_xlim(DECADES[0] - 0.4, DECADES[-1] + 0.4)
-        axis.set_ylim(0.0, max(axis.get_ylim()[1], 1.0))
-        axis.set_xlabel("k")
-        axis.set_title(label, fontsize=9)
-    axes[0].set_ylabel("control steps")
-    return figure
 
 
 def _simplification(scene: Mapping[str, Any]) -> str:
