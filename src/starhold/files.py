@@ -80,6 +80,12 @@ def atomic_write(path: Path) -> Generator[Path]:
             shutil.rmtree(hidden, ignore_errors=True)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8, with the same line ends on every system; whole, as `atomic_write`."""
+    with atomic_write(path) as hidden:
+        hidden.write_text(text, encoding="utf-8", newline="\n")
+
+
 def passing_folder(purpose: str) -> str:
     """Make a folder that goes when this process ends."""
     folder = tempfile.mkdtemp(prefix=f"starhold-{purpose}-")

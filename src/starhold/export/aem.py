@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import conjugate, multiply
 from starhold.errors import InputError
-from starhold.files import atomic_write, read_text
+from starhold.files import read_text, write_text
 from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, days_of, precession
 
 Version = Literal["1.0", "2.0"]
@@ -126,8 +126,7 @@ def write_aem(
     ]
     for stamp, (q0, q1, q2, q3) in zip(stamps, np.asarray(attitudes, dtype=float).tolist(), strict=True):
         lines.append(f"{stamp} {q1!r} {q2!r} {q3!r} {q0!r}")
-    with atomic_write(path) as hidden:
-        hidden.write_text("\n".join([*lines, "DATA_STOP", ""]), encoding="ascii", newline="\n")
+    write_text(path, "\n".join([*lines, "DATA_STOP", ""]))
 
 
 def read_aem(path: Path) -> Aem:
