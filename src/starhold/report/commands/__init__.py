@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from starhold.report.document import Section
-    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.scenario.reading import Scenario
 
 
 class Column(NamedTuple):
@@ -120,14 +120,15 @@ def number_or_text(value: str | float) -> str | float:
         return value
 
 
+def as_given(text: str) -> str:
+    """Return a text unchanged: what reads an option that is no key and names no file."""
+    return text
+
+
 def later(path: str) -> Callable[..., Any]:
     """Return the function at a path below starhold; its module is loaded at the first call."""
     module, _, name = path.rpartition(".")
     return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given)
-
-
-def _named(scenario: Scenario, law: str | None) -> LawEntry:
-    return scenario.pick(law)
 
 
 class Command(NamedTuple):
@@ -146,7 +147,7 @@ class Command(NamedTuple):
     suffix: str
     study: Callable[..., Any]
     present: Callable[..., Result]
-    pick: Callable[[Scenario, str | None], Any] = _named
+    pick: Callable[[Scenario, str | None], Any] = lambda scenario, law: scenario.pick(law)
     law: str = "which law of the file; the first if not given"
     doing: str | None = "{}"
     options: Mapping[str, Option] = {}
