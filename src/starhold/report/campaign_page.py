@@ -142,7 +142,8 @@ def _envelope(name: str, by_law: dict[int, Envelope], words: Wording) -> dict[st
     if len(known) and math.log10(float(known.max()) / float(known.min())) > DECADES:
         high = math.log10(float(known.max()))
         low = max(math.log10(float(known.min())), high - DEEPEST)
-        span, ticks = [round(low - 0.05 * (high - low), 4), round(high + 0.05 * (high - low), 4)], _ticks(high - low)
+        margin, ticks = 0.05 * (high - low), max(1, math.ceil((high - low) / 6.0))
+        span = [round(low - margin, 4), round(high + margin, 4)]
     return {
         "name": name,
         "title": measure.heading,
@@ -154,10 +155,6 @@ def _envelope(name: str, by_law: dict[int, Envelope], words: Wording) -> dict[st
         "ticks": ticks,
         "curves": curves,
     }
-
-
-def _ticks(decades: float) -> int:
-    return max(1, math.ceil(decades / 6.0))
 
 
 def _lines(envelope: Envelope) -> dict[str, NDArray[np.float64]]:

@@ -125,10 +125,10 @@ def as_given(text: str) -> str:
     return text
 
 
-def later(path: str) -> Callable[..., Any]:
-    """Return the function at a path below starhold; its module is loaded at the first call."""
+def later(path: str, **more: Any) -> Callable[..., Any]:
+    """Return the function at a path below starhold, with these arguments; its module is loaded at the first call."""
     module, _, name = path.rpartition(".")
-    return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given)
+    return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given, **more)
 
 
 class Command(NamedTuple):

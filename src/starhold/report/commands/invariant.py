@@ -41,16 +41,10 @@ def present(problem: InvariantProblem, certificate: SetCertificate) -> Result:
     drawn = [item for item in shown if item.V is not None]
     assumptions = texts(a for claim in certificate.claims for a in claim.assumptions)
     blocks = ["", Heading(certificate.name), _table(certificate, shown), f"  assuming: {'; '.join(assumptions)}", ""]
-    figure = partial(_draw, drawn, problem.name) if drawn else None
+    figure = partial(later("report.invariant_picture.draw"), drawn, problem.name) if drawn else None
     outcome = {"proved": "met", "refuted": "missed"}.get(certificate.outcome, "undecided")
     written: Any = partial(sets.write, certificate)
     return Result(problem.name, blocks, figure=figure, certificate=written, outcome=outcome)  # type: ignore[arg-type]
-
-
-def _draw(drawn: list[Portrait], title: str) -> Any:
-    from starhold.report.invariant_picture import draw
-
-    return draw(drawn, title)
 
 
 def _table(certificate: Certificate, portraits: list[Portrait]) -> Table:
