@@ -163,11 +163,8 @@ def _fly(
             from starhold.cli.show_certificates import print_proved
 
             print_proved(flights)
-        page = write_results(scenario, flights, folder, pictures is not Drawn.NONE)
-        unpainted = painter.finish()
-    print_results(page)
-    if unpainted is not None:
-        raise unpainted
+        print_results(write_results(scenario, flights, folder, pictures is not Drawn.NONE))
+        painter.finish()
     return flights
 
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 import gc
 import os
 import signal
-import sys
 import traceback
 from collections.abc import Sequence
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
-from threading import active_count
 from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.files import clear_unfinished
 from starhold.report.body import report_of
+from starhold.studies.timing import can_fork
 
 if TYPE_CHECKING:
     from starhold.report.figures import Picture
@@ -35,9 +34,8 @@ class Painter:
         if not draw:
             for name in picture:
                 (folder / f"{name}.png").unlink(missing_ok=True)
-        # Copies of this process have everything loaded; with several threads, locks that are never released, too.
-        can_fork = sys.platform.startswith("linux") and active_count() == 1
-        context: Any = get_context("fork" if can_fork else "spawn")
+        # A copy of this process has nearly everything loaded.
+        context: Any = get_context("fork" if can_fork() else "spawn")
         self._folder, (self._failures, self._told) = folder, context.Pipe(duplex=False)
         given = [(picture, folder.absolute(), slice(first, None, AT_ONCE), self._told) for first in range(AT_ONCE)]
         self._processes = [context.Process(target=_draw, args=args) for args in given if draw]
@@ -55,16 +53,15 @@ class Painter:
         if late:
             clear_unfinished(self._folder)
 
-    def finish(self) -> InputError | None:
-        """Wait for the files. Return why they cannot be written, if so; RuntimeError for any other failure."""
+    def finish(self) -> None:
+        """Wait for the files. InputError where they cannot be written; RuntimeError for any other failure."""
         for process in self._processes:
             process.join()
         failure = self._failures.recv() if self._failures.poll() else ""
         if isinstance(failure, InputError):
-            return failure
+            raise failure
         if failure or any(process.exitcode for process in self._processes):
             raise RuntimeError(f"the figures could not be drawn: {failure}")
-        return None
 
 
 def _draw(picture: Picture, folder: Path, part: slice, failures: Connection) -> None:

@@ -24,14 +24,19 @@ if TYPE_CHECKING:
     from starhold.studies.flight import Flight
 
 
+def can_fork() -> bool:
+    """Return whether this process can be copied: a copy of one with several threads may wait for locks that are never
+    released."""
+    return sys.platform.startswith("linux") and active_count() == 1
+
+
 class Stopwatch:
     """A copy of this process, on systems that can fork, that compiles the calls of these loops' laws at once and times them
     on request. Leaving the context ends it."""
 
     def __init__(self, scenario: Scenario, loops: Sequence[Any]) -> None:
         self._scenario, self._loops, self._child = scenario, loops, None
-        # A copy of a process with several threads may wait for locks that are never released.
-        if sys.platform.startswith("linux") and active_count() == 1:
+        if can_fork():
             fork = get_context("fork")
             self._ours, theirs = fork.Pipe()
             self._child = fork.Process(target=_serve, args=(scenario, loops, theirs, self._ours))
