@@ -17,6 +17,21 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 
+OUTCOMES = {
+    **dict.fromkeys(("met", "proved", "settled", "kept", "agrees", "holds", "passed"), "green"),
+    **dict.fromkeys(("missed", "refuted", "diverged", "exceeded", "differs", "fails", "failed"), "red"),
+    **dict.fromkeys(("not decided", "undecided", "not settled", "close", "depends", "not checked"), "yellow"),
+    **dict.fromkeys(("not claimed", "does not apply"), "dim"),
+}
+"""The colour of each outcome: good, bad, open or of no account."""
+
+
+def coloured(outcome: str, text: str = "") -> str:
+    """Return an outcome, or a text in its place, with the style marks of its colour; a text alone where it has none."""
+    colour = OUTCOMES.get(outcome)
+    return f"[{colour}]{text or outcome}[/{colour}]" if colour else text
+
+
 class Column(NamedTuple):
     """A column of a table: its heading, the unit below it, the format of its numbers (without one it holds words), and what
     it means."""

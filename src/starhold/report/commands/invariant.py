@@ -6,15 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from starhold.report.commands import Block, Column, Command, Heading, Result, Table, later
+from starhold.report.commands import Block, Column, Command, Heading, Result, Table, coloured, later
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
     from starhold.certification.invariant.problem import SetCertificate
     from starhold.studies.phase_portraits import Portrait
-
-COLOURS = {"proved": "green", "refuted": "red", "undecided": "yellow"}
 
 
 def listed() -> list[Block]:
@@ -55,9 +53,8 @@ def _table(certificate: Certificate, portraits: list[Portrait]) -> Table:
     rows: list[list[str]] = []
     for claim, portrait in zip(certificate.claims, portraits, strict=True):
         heading, name = HEADINGS[claim.numbers["theorem"]], escape(claim.witness["name"])
-        colour = COLOURS[claim.outcome]
         title = f"{name}\n[dim]{heading}[/dim]" if name else heading
-        rows.append([title, f"[{colour}]{claim.outcome}[/{colour}]", escape(sentence(claim))])
+        rows.append([title, coloured(claim.outcome), escape(sentence(claim))])
         lines = [f"[dim]{line}[/dim]" for line in (size(claim.numbers, portrait.orbit_area), limit(claim.numbers)) if line]
         lines += [
             f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {escape(evidence(o))}"
