@@ -64,7 +64,7 @@ def history(
 def histories(
     desk: Desk, runs: Sequence[tuple[str, str]], until: float, clock: str = "s", levels: Sequence[float] = (), **what: Any
 ) -> Figure:
-    """What `history` draws of several flights, held from sample to sample: a panel each, with these levels."""
+    """Draw a panel as `history` does for each of several flights, values held from sample to sample, with these levels."""
     figures = {law: history(desk, file, law, until=until, **what) for file, law in runs}
     panels: list[Panel] = []
     for law, figure in figures.items():

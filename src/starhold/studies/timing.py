@@ -65,7 +65,7 @@ class Stopwatch:
         return timed(self._scenario, self._loops[place], flight)
 
 
-def _serve(scenario: Scenario, loops: Sequence[Any], asked: Connection, other: Connection) -> None:
+def _serve(scenario: Scenario, loops: Sequence[Any], requests: Connection, other: Connection) -> None:
     """Time calls on request until this process or the original one, which has the other end, is ended."""
     # Ctrl-C and the like end the original process, and that ends this one.
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -77,8 +77,8 @@ def _serve(scenario: Scenario, loops: Sequence[Any], asked: Connection, other: C
         for loop in loops:
             study.compile_calls(loop)
         while True:
-            place, recording = asked.recv()
-            asked.send(study.call_costs(loops[place], recording))
+            place, recording = requests.recv()
+            requests.send(study.call_costs(loops[place], recording))
     finally:
         # The cause of a failure is raised by the original process, which does the same itself.
         os._exit(1)

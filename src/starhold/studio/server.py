@@ -207,10 +207,10 @@ class Studio:
             return _malformed()
         return self._begun(RERUN, f"{law}, run {run}", "", str(job.folder), self.folder, (law, run))
 
-    def _begun(self, *asked: Any) -> Response:
+    def _begun(self, *job: Any) -> Response:
         """Begin a job, unless as many as may are at work."""
         try:
-            return JSONResponse(self.jobs.start(*asked).status(), 201)
+            return JSONResponse(self.jobs.start(*job).status(), 201)
         except ValueError as error:
             return JSONResponse({"error": str(error)}, 409)
 
