@@ -10,7 +10,7 @@ CARD = Card(
     title="Leak",
     summary="M' = -M / time",
     sources=("a leak proportional to the mass that is left",),
-    assumptions=("no law knows of it",),
+    assumptions=("unknown to all laws",),
 )
 ROLE = "environment"
 

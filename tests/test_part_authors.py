@@ -57,6 +57,7 @@ def test_its_parts_fly_together(folder):
     assert (torque == 0.0).any()
 
 
+@pytest.mark.slow
 def test_claims_say_of_its_parts_what_it_tells(folder):
     (certificate,) = sh.certify("own.toml")
     for claim in certificate.claims:

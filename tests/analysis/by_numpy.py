@@ -45,7 +45,19 @@ def of_rigid_body(run, attitude_tolerance, rate_tolerance):
         "chatter": float(np.linalg.norm(np.diff(u[tail], axis=0), axis=1).mean()) if len(u[tail]) > 1 else 0.0,
         "final_attitude_error": None if lost is not None else float(angle[tail].max()),
         "final_rate_error": None if lost is not None else float(speed[tail].max()),
+        **_validity(run),
     }
+
+
+def _validity(run):
+    """The share of samples without a valid estimate, and the longest time from such a sample to the end of its row."""
+    there = [values for name, values in run.arrays.items() if name.endswith("is_valid")]
+    if not there:
+        return {}
+    bad, rows = there[-1] < 0.5, [0]
+    for one in bad[:-1]:
+        rows.append(rows[-1] + 1 if one else 0)
+    return {"invalid_share": float(bad.mean()), "longest_invalid": max(rows) * float(run["time"][1])}
 
 
 def _overshoot(q):

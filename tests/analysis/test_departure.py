@@ -87,6 +87,7 @@ def test_the_first_time_on_the_limit_ends_a_claim_about_unlimited_torque():
     assert json.loads(json.dumps(told)) == told
 
 
+@pytest.mark.slow
 def test_a_law_that_keeps_within_its_limit_assumes_no_unlimited_torque(tmp_path):
     """It flies on the limit, and what is proved of it is proved of that flight too."""
     text = BASE.replace("gravity_gradient = true", "gravity_gradient = false").replace("[0.04, 0.03", "[0.4, 0.03")
@@ -176,6 +177,7 @@ def kept_loop():
     return loop, certify(loop, "lyapunov")
 
 
+@pytest.mark.slow
 def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
     text = quiet(BASE, **{"control_period = 0.1": "control_period = 5.0", 'limit = "axis"': 'limit = "none"'})
     _, certificate, _, left = flown(text + '[[law]]\ntype = "modal"\nform = "equal"\na = -0.428\n')
@@ -247,6 +249,7 @@ WHEELED = builtin_text("wheels-orbital").replace('duration = "10 min"', "duratio
 LOST_WHEEL = '\n[[fault]]\ntime = {}\nwheel = 2\nlost = true\naction = "{}"\n'
 
 
+@pytest.mark.slow
 def test_a_fault_ends_the_claims_of_the_first_certificate():
     flight = proved_flight(WHEELED + LOST_WHEEL.format(10, "both"))
     assert len(flight.certificates) == 2
@@ -259,6 +262,7 @@ def test_a_fault_ends_the_claims_of_the_first_certificate():
     assert all((0.0, CHANGES) in departed for departed in left.values())
 
 
+@pytest.mark.slow
 def test_a_fault_ends_the_claims_of_the_mode_that_flies_and_of_all_that_follow():
     wheels = '[wheels]\nlayout = "pyramid"\ninertia = 2.2e-5\ntorque_limit = 0.002\nmomentum_limit = 0.015\n'
     text = MISSION.replace("torque_limit = 0.002\n", "").replace("[initial]", f"{wheels}[initial]") + DETUMBLE

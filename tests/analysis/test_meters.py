@@ -24,6 +24,8 @@ from starhold.simulation.lanes import ThreadPool, carry_columns
 from starhold.studies.body import study_of
 from starhold.studies.compare import name_samples
 from tests.analysis.by_numpy import of_any_body, of_libration_point, of_rigid_body
+from tests.parts.trackers import FILTER, FIRST, GYRO, SECOND, TWO
+from tests.parts.trackers import scenario as tracked
 
 SHORT = {
     "three-laws": ("lyapunov", {"simulation.duration": 700.0}),
@@ -60,6 +62,15 @@ def starts(loop, lanes):
 def test_metrics_are_those_of_recordings(name):
     law, changes = SHORT[name]
     compare_metrics(load(name).with_({"simulation.record_every": 1, **changes}), law)
+
+
+def test_validity_of_an_estimate_is_that_of_recordings():
+    """Not valid before the first fix, nor long after the last of a tracker that is lost between."""
+    lost = FIRST | {"outage": [8.0, 30.0]}
+    late = SECOND | {"outage": [0.0, 25.0]}
+    within = {"valid_within": "100 arcsec"}
+    for parts in ((lost, FILTER | within), (lost | {"outage": [0.0, 30.0]}, late, TWO | within)):
+        compare_metrics(tracked(GYRO, *parts, record_every=1), None)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 3, 4])

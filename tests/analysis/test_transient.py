@@ -149,6 +149,7 @@ def test_what_no_root_achieves_is_told():
     assert unmet(pair, 1.0, [-0.54, -0.02], Limits(0.5, 0.222)).what == "both"
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None)
 @given(
     st.tuples(st.floats(-2.0, -0.5), st.floats(-4.0, -0.5), st.floats(-1.5, -0.2)),

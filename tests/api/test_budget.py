@@ -104,6 +104,7 @@ def test_independent_sources_of_a_linear_loop_add_up_as_squares(linear):
         assert linear.level(TOGETHER, index) == pytest.approx(linear.level(COMBINED, index), rel=0.08)
 
 
+@pytest.mark.slow
 def test_errors_together_are_those_of_recorded_runs(full):
     """Every run of the budget is the run of that number, whose error and estimate SciPy turns into rotation vectors."""
     scenario, errors, knowledge = sh.scenario(FULL), [], []

@@ -152,6 +152,7 @@ def test_the_scale_of_an_inertia_needs_a_torque_that_is_known():
     assert list(fit.learnt().table.campaign.over) == [", ".join(f"{BIAS}[{k}]" for k in (1, 2, 3))]
 
 
+@pytest.mark.slow
 def test_scale_factors_that_no_reading_shows_are_named():
     """At a constant rate a gyro's scale factor is one with the rate, but for what turning its noise leaves possible; the
     noise itself shows in no prediction."""
@@ -273,6 +274,7 @@ def test_telemetry_that_does_not_fit_is_refused_in_a_line(cubesat, tmp_path):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_numbers_of_a_basilisk_flight():
     """Other code flies the truth: a tumbling hub under a known torque, its recorded states with noise of our own."""
     from tests.oracles.basilisk import need, simulation

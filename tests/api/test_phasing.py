@@ -71,6 +71,7 @@ def test_planted_mistakes_are_found_by_name(first, last):
     assert alone >= 0.98 * (last - first)
 
 
+@pytest.mark.slow
 def test_what_no_row_tells_apart_is_named_together():
     sheet = sheet_of("cubesat-nadir")
     reversed_ = next(stage for stage in sheet.stages if stage.kind == "share" and stage.part == "wheels")

@@ -59,6 +59,7 @@ def proved_of(scenario):
     return prove_pointing(scenario, loop_of(scenario))
 
 
+@pytest.mark.slow
 def test_no_flight_of_the_budget_exceeds_what_is_proved(held):
     """All instants of all runs, for the confidence is 1; they begin in the set of the claim, and late enough."""
     assert held.proof.starts_inside
@@ -68,6 +69,7 @@ def test_no_flight_of_the_budget_exceeds_what_is_proved(held):
     assert held.proof.share == pytest.approx(0.9973)
 
 
+@pytest.mark.slow
 def test_shares_are_what_the_bound_without_each_source_lacks(held):
     assert set(held.proof.shares) == {"gravity gradient", "attitude noise", "rate noise"}
     assert all(share > 0.0 for share in held.proof.shares.values())
@@ -77,6 +79,7 @@ def test_shares_are_what_the_bound_without_each_source_lacks(held):
         assert held.proof.angle - held.proof.shares[name] == pytest.approx(other.angle, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_source_that_the_claim_leaves_out_has_no_share():
     """Of a random torque no bound is known."""
     scenario = sh.scenario(HELD | {"environment": {"torque_noise": 1e-7}, "part": [PUSH]})

@@ -45,6 +45,7 @@ def test_flights_and_margins_have_units(short):
     assert sh.to_pandas(margins).attrs["units"] == margins[0].units
 
 
+@pytest.mark.slow
 def test_a_campaign_tells_in_words_that_a_user_knows():
     """No list of numbers where a law's results are shown, and columns called after parts."""
     brief = load("cubesat-nadir").with_({"simulation.duration": 10.0, "simulation.record_every": 1, "fault": None})

@@ -37,6 +37,7 @@ class Reader(HTMLParser):
         self.texts.append(data)
 
 
+@pytest.mark.slow
 def test_a_review_tells_all_that_is_known_and_computes_each_once(monkeypatch, tmp_path):
     used = []
 
@@ -78,6 +79,7 @@ def test_a_review_tells_all_that_is_known_and_computes_each_once(monkeypatch, tm
     assert sum("the sensor gaussian" in line for line in lines) >= 1
 
 
+@pytest.mark.slow
 def test_what_a_scenario_lacks_is_open(tmp_path):
     (tmp_path / "bare.toml").write_text(turn(campaign=None, budget=None).text, encoding="utf-8")
     done = starhold("review", "bare.toml", "-o", "pack", cwd=tmp_path, code=4)

@@ -23,6 +23,7 @@ def result(tmp_path_factory):
     return fly(tmp_path_factory.mktemp("small") / "c", metrics=["overshoot", "iterations"])
 
 
+@pytest.mark.slow
 def test_rows_are_the_flights_of_each_runs_own_scenario(result):
     frame = result.frame()
     assert list(frame.law.unique()) == ["lyapunov", "pd"]
@@ -114,6 +115,7 @@ def test_who_flies_and_how_runs_are_cut_change_nothing(result, tmp_path, options
     assert CHUNK > 90
 
 
+@pytest.mark.slow
 def test_faults_words_and_kernels_of_their_own(tmp_path):
     scenario = small(
         wheels={"layout": "pyramid", "inertia": 1e-3, "torque_limit": 0.2, "momentum_limit": 4.0},
@@ -178,6 +180,7 @@ def test_goes_on_after_a_crash_with_more_runs_and_not_after_a_change(result, tmp
     assert Store.open(folder).missing("pd") == []
 
 
+@pytest.mark.slow
 def test_the_worst_is_flown_again_by_its_file(tmp_path, brief):
     clean = {"sensor": None, "spacecraft.actuator_lag": None}
     scenario = sh.load("cubesat-slew").with_({"simulation.record_every": 1, "simulation.duration": 60, **clean})

@@ -69,6 +69,7 @@ def kill_worker_once(trail):
     return killed, progress
 
 
+@pytest.mark.slow
 def test_blocks_of_a_killed_worker_are_flown_by_others(store, trail, expected, capfd):
     killed, progress = kill_worker_once(trail)
     assert fly(store, Workers(2), Toy(0.2, trail), progress) == expected
@@ -94,6 +95,7 @@ def test_without_any_worker_left_the_campaign_ends_and_can_be_resumed(tmp_path, 
     assert resumed(store) == expected
 
 
+@pytest.mark.slow
 def test_a_killed_scheduler_ends_the_campaign_which_can_be_resumed(tmp_path, store, expected, capfd):
     with cluster(tmp_path) as (address, scheduler, _):
         started = []
@@ -151,6 +153,7 @@ def test_an_interrupt_while_workers_start_ends_all_of_them_quietly(tmp_path):
     wait_for_end(driver)
 
 
+@pytest.mark.slow
 def test_another_process_that_writes_there_is_refused(tmp_path):
     folder = tmp_path / "campaign"
     driver = start("tests.campaign.toy", str(folder), "threads", "100", "16", "5", stdout=subprocess.PIPE)

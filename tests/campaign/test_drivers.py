@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import optimize, special, stats
 
 from starhold.campaign.drivers import find_drivers, independent_causes
+from tests.tiers import leading
 
 N = 2000
 
@@ -183,7 +184,7 @@ def test_too_few_failures_for_pairs(rng):
 
 
 # Too few for pairs, and enough; between and beyond is slow.
-@pytest.mark.parametrize("failures", [6, 50, *(pytest.param(count, marks=pytest.mark.slow) for count in (24, 300))])
+@pytest.mark.parametrize("failures", leading([6, 50, 24, 300]))
 def test_chance_is_called_a_driver_as_rarely_as_said(failures):
     """Of all that was tested, anything is called significant in one campaign of twenty at most."""
     campaigns, wrong = 150, 0

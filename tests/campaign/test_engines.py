@@ -32,6 +32,7 @@ def reference(tmp_path):
     return fly(Store.create(tmp_path / "reference", manifest()))
 
 
+@pytest.mark.slow
 def test_an_existing_cluster_finds_the_same_results(tmp_path, store, running):
     assert fly(store, Scheduler(running)) == reference(tmp_path)
 
@@ -147,6 +148,7 @@ def test_workers_of_a_script_without_its_guard_leave_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_few_blocks_are_under_way_however_many_there_are(tmp_path, running):
     trail = tmp_path / "trail"
     trail.mkdir()
@@ -176,6 +178,7 @@ def test_threads_have_the_next_block_at_hand_and_no_more(store):
     assert len(stored) == 14
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_is_there_and_does_not_wait_for_blocks_under_way(tmp_path, store):
     def interrupt():
         while not list((tmp_path / "campaign").rglob("*.parquet")):
@@ -197,6 +200,7 @@ def test_an_interrupt_keeps_what_is_there_and_does_not_wait_for_blocks_under_way
     assert fly(Store.open(store.folder).resume(manifest())) == reference(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_cluster_out_of_reach_is_told(store):
     with pytest.raises(InputError, match=r"^tcp://127.0.0.1:9: no Dask scheduler answers: "):
         fly(store, Scheduler("tcp://127.0.0.1:9", patience=0.5))

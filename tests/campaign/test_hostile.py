@@ -101,6 +101,7 @@ def test_a_part_of_ones_own_is_flown_and_its_change_refused(tmp_path):
     assert campaign(tmp_path / "c", scenario, over=over, resume=True).flown == 0
 
 
+@pytest.mark.slow
 def test_a_table_that_a_scenario_names_is_part_of_it(tmp_path):
     (tmp_path / "att.csv").write_text("time,q0,q1,q2,q3\n0,1,0,0,0\n10,0.8,0.6,0,0\n")
     scenario = short(folder=tmp_path, target={"mode": "history", "file": "att.csv"})

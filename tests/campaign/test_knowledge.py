@@ -15,6 +15,7 @@ from starhold.scenario.building import build
 from starhold.studies.body import study_of
 from starhold.studies.compare import compare, record
 from tests.campaign.flown import SMALL, fly, normal, short, uniform
+from tests.tiers import leading
 
 INERTIA = normal("4 %", relative=True)
 LIMIT = uniform(0.05, 0.2)
@@ -109,7 +110,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", leading(CASES))
 def test_the_runs_are_those_of_their_own_scenarios_however_they_are_made(case, monkeypatch):
     laws, tables, over = CASES[case]
     scenario = turn(laws, **tables)
@@ -148,9 +149,12 @@ def test_the_verdict_says_what_the_law_knows():
     (law,) = fly(scenario=turn(), over=over, requirement=asked, runs=5).laws
     told = law.verdicts[0].sentence()
     assert told.endswith(
-        "The law assumes the file's own spacecraft.inertia, and is told each drawn spacecraft.torque_limit."
+        "The law assumes the file's value of spacecraft.inertia, and knows each drawn value of spacecraft.torque_limit."
     )
-    for action, told in (("none", "never learns"), ("reallocate", "learns at the diagnosis each drawn")):
+    for action, told in (
+        ("none", "never learns the drawn value of"),
+        ("reallocate", "learns at the diagnosis each drawn value of"),
+    ):
         scenario = turn(fault=[{"time": 1.0, "inertia": [2.2, 3.1, 4.4], "action": action}])
         (law,) = fly(scenario=scenario, over={"fault[1].inertia": INERTIA}, requirement=asked, runs=5).laws
         assert law.verdicts[0].sentence().endswith(f"The law {told} fault[1].inertia.")
@@ -194,6 +198,7 @@ def examples():
 """
 
 
+@pytest.mark.slow
 def test_what_every_command_is_computed_with_is_drawn_only_as_known(tmp_path):
     """Else a verdict would be that of a law that is told, and not say so."""
     (tmp_path / "leak.py").write_text(MODELLED, encoding="utf-8")
@@ -208,7 +213,7 @@ def test_what_every_command_is_computed_with_is_drawn_only_as_known(tmp_path):
             begin(with_campaign(scenario, {"over": {key: normal(1e-4)}, "runs": 3}), ["lyapunov"])
         over = {key: normal(1e-4, known_to_law=True)}
         (law,) = fly(scenario=scenario, over=over, requirement=asked, runs=5).laws
-        assert law.verdicts[0].sentence().endswith(f"The law is told each drawn {key}.")
+        assert law.verdicts[0].sentence().endswith(f"The law knows each drawn value of {key}.")
     over = {"part.thrusters.lever": normal(0.1)}
     (law,) = fly(scenario=scenario, over=over, requirement=asked, runs=5).laws
     assert "The law" not in law.verdicts[0].sentence()

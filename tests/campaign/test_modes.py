@@ -46,6 +46,7 @@ def own_flight(text, row, run):
     return record(own, built(own))
 
 
+@pytest.mark.slow
 def test_alarms_are_those_of_each_runs_own_flight(tmp_path):
     text = TEXT[: TEXT.index("[[requirement]]")] + TEXT[TEXT.index("[campaign]") :]
     frame = sh.campaign(parse(text, "m.toml"), tmp_path / "c").frame()

@@ -15,6 +15,7 @@ from starhold.scenario.reading import load, parse
 from starhold.scenario.values import _filled, accepted, locate, width_at
 from starhold.scenario.writing import template_text
 from tests.refusals import refused
+from tests.tiers import leading
 
 NOISE = load("three-laws-noise")
 WHEELS = load("wheels-orbital")
@@ -140,7 +141,7 @@ def test_a_number_that_the_key_refuses_is_told_in_one_line(key, raw, said):
         number_at(NOISE, key, raw, "low")
 
 
-@pytest.mark.parametrize("body", ["rigid-body", "libration-point"])
+@pytest.mark.parametrize("body", leading(["rigid-body", "libration-point"]))
 def test_the_commented_campaign_of_a_template_is_one(body):
     text = template_text(body)
     table = re.search(r"^# \[campaign\].*?\n\n", text, flags=re.DOTALL | re.MULTILINE)

@@ -66,6 +66,7 @@ def test_nothing_is_proved_of_what_effectors_make_of_a_command():
         assert worst.proved_of(job, *asked) == (None, "")
 
 
+@pytest.mark.slow
 def test_claims_about_motions_in_the_end_bound_no_flight():
     """Such a claim is proved of this loop, and some of its flights are far from their end."""
     tables = tomllib.loads(BASE + DETUMBLE + POINT)
@@ -123,6 +124,7 @@ def test_what_only_reading_refuses_is_left_out_too(brief):
     assert np.isnan(found["effort"]).tolist() == refused.tolist()
 
 
+@pytest.mark.slow
 def test_the_search_finds_worse_than_many_flights_at_random():
     """The worst of it and of twenty thousand random flights of the same box."""
     over = {"initial.attitude": {"distribution": "rotations"}, "initial.rate": {"distribution": "shell", "high": "4 deg/s"}}

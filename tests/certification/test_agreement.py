@@ -81,12 +81,7 @@ def test_a_law_may_cancel_a_part_of_the_modelled_torque(compensation, wheels, tm
 
 @pytest.mark.parametrize(
     ("law", "slew_angle"),
-    [
-        # Each angle for one of the laws; the other pairs are slow.
-        pytest.param(law, angle, marks=pytest.mark.slow if place % 2 == number else ())
-        for number, law in enumerate(("pd", "wheel"))
-        for place, angle in enumerate((1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0))
-    ],
+    leading([(law, angle) for angle in (1e-100, 1e-12, 1e-8, 1e-4, 0.02, 1.0) for law in ("pd", "wheel")], 2),
 )
 def test_the_set_of_a_turn_holds_it(law, slew_angle, tmp_path):
     gains = {"pd": pd.Gains(0.09, 0.009), "wheel": wheel.Gains(0.09, (0.0045,) * 3)}[law]

@@ -257,6 +257,7 @@ def test_published_example_with_the_function_as_it_is_printed():
     assert alone.outcome == "undecided"
 
 
+@pytest.mark.slow
 def test_a_python_function_is_a_system():
     saturated = System.of(("x", "v"), lambda x, v: (-x, -clip(2.0 * v, 1.0)))
     V = saturated.function(lambda x, v: maximum(v * v, x * x / 2.0))

@@ -75,7 +75,7 @@ SYSTEMS = {
 }
 
 
-FEW = {"circle", "spin", "parrilo"}
+FEW = {"circle", "parrilo"}
 """Of these `make test` makes the proofs, which take long."""
 
 

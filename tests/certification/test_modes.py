@@ -5,6 +5,7 @@ import math
 from fractions import Fraction
 
 import numpy as np
+import pytest
 
 from starhold.certification.certificate import write
 from starhold.checker import check_file, passed
@@ -66,6 +67,7 @@ def test_a_hand_over_that_says_more_is_refused_and_one_that_says_less_is_another
         assert less == [f"mission: detumble to point: the previous mode may end with a larger {name}"]
 
 
+@pytest.mark.slow
 def test_a_hand_over_to_a_law_that_converges_from_everywhere_needs_no_bounds():
     text = BASE.replace('quaternion_sign = "shortest"\n', "")
     after = DETUMBLE.replace('rate_below = "0.5 deg/s"', 'after = "10 s"') + POINT

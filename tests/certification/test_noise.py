@@ -52,6 +52,7 @@ def changed(loop, name, **params):
     return loop.with_parts(replace(fitted, params=fitted.params._replace(**params)))
 
 
+@pytest.mark.slow
 def test_a_claim_for_a_share_takes_in_the_parts_that_say_their_noise():
     assert left_out(nadir(), 0.9973) == set()
     assert left_out(nadir(), None) == SENSORS
@@ -162,6 +163,7 @@ def test_a_claim_is_about_the_noise_of_its_loop(name, params, told):
     assert differences(claim, nadir()) == ["the samples differs"]
 
 
+@pytest.mark.slow
 def test_a_share_is_told_and_a_flight_before_the_filter_settles_leaves_it():
     (claim,) = checked(flying("noisy"))
     assert claim.numbers["share"] == pytest.approx(0.9973)

@@ -58,6 +58,7 @@ def test_bounds_of_a_spline_hold_between_its_knots_and_are_close(seed, count, si
     assert found[1] <= number(acceleration) <= found[1] * 1.05 + 2e-3 * found[0] ** 2
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, -1.0, 1.0009, -0.9991]))
 def test_signs_and_lengths_of_quaternions_do_not_matter(seed, factor):
@@ -91,6 +92,7 @@ def followed(period):
     return loop, peaks(times, attitudes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", leading([2.0, 0.05]))
 def test_claims_do_not_depend_on_how_often_the_law_looks(period, tmp_path):
     loop, found = followed(period)
@@ -107,6 +109,7 @@ def test_claims_do_not_depend_on_how_often_the_law_looks(period, tmp_path):
     assert passed(checked(certificate, tmp_path))
 
 
+@pytest.mark.slow
 def test_rows_without_knots_are_knots_of_their_own(tmp_path):
     times, attitudes = history(5, 8, 0.1, spread=0.0)
     rows = tabulate(times, attitudes, times)

@@ -15,6 +15,7 @@ from starhold.parts.bodies.libration_point import POINTS, PRIMARIES
 from tests.certification.edits import changed, faults, outcomes, with_kinds
 from tests.kernel.stations import BEST, PLANT, REST, SOFT, loop_of
 from tests.making import point_loop
+from tests.tiers import leading
 
 PEAK = l2_circle.peak_demand(PLANT, BEST.rate)
 STEEP = 1.0 + 2.0 * PLANT.stiffness
@@ -31,6 +32,7 @@ def claims_of(*given, **changes):
 # --- round the point --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_the_law_does_not_undo_is_told():
     claim = claims_of(BEST, model="nonlinear")["circle"]
     assert claim.outcome == "undecided"
@@ -91,15 +93,18 @@ def made(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("gains", "limit", "kind"),
-    [
-        (BEST, 1.001 * PEAK, "norm"),
-        (BEST, 1.05 * 2.95, "axis"),
-        (SOFT._replace(boundary_layer=1e-3, k=0.05), 1.02 * PEAK, "norm"),
-        (SOFT._replace(boundary_layer=5.0), 1.3 * PEAK, "norm"),
-        (BEST._replace(rate=-2.0, radius=5.0), 26.1, "norm"),
-        (BEST._replace(radius=1e-4), 1.2e-4 * PEAK, "norm"),
-        (BEST._replace(radius=1e3, alpha=1e-6), 1.2e3 * PEAK, "norm"),
-    ],
+    leading(
+        [
+            (BEST, 1.001 * PEAK, "norm"),
+            (BEST, 1.05 * 2.95, "axis"),
+            (SOFT._replace(boundary_layer=1e-3, k=0.05), 1.02 * PEAK, "norm"),
+            (SOFT._replace(boundary_layer=5.0), 1.3 * PEAK, "norm"),
+            (BEST._replace(rate=-2.0, radius=5.0), 26.1, "norm"),
+            (BEST._replace(radius=1e-4), 1.2e-4 * PEAK, "norm"),
+            (BEST._replace(radius=1e3, alpha=1e-6), 1.2e3 * PEAK, "norm"),
+        ],
+        3,
+    ),
 )
 def test_limits_of_circles_of_any_size_are_checked(made, gains, limit, kind):
     content = made(gains, limit, kind)

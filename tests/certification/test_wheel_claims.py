@@ -148,6 +148,7 @@ def test_momentum_that_piles_up_is_not_passed_over():
     assert "known-outside-torque" not in found.assumptions
 
 
+@pytest.mark.slow
 def test_claims_that_are_not_built_say_so():
     loop = rotors("wheel", EVEN)
     found = certify(loop, "", Wanted(disturbance=1e3)).claim("pointing")
@@ -178,8 +179,7 @@ def test_a_loop_that_counts_on_a_lost_wheel_claims_nothing():
             ("pd", (10.0, 0.3), "wheel_momentum"),
             ("pd", (0.02, 10.0), "motors"),
             ("wheel", (10.0, 0.3), "wheel_momentum"),
-        ],
-        2,
+        ]
     ),
 )
 def test_limits_of_wheels_are_kept_and_nearly_used(law, limits, binding):
@@ -229,6 +229,7 @@ def test_flights_keep_within_the_wheels_and_catch_what_does_not():
         fly_claims(loop, Certificate("too strong", certificate.subject, (strong,)), flights=512)
 
 
+@pytest.mark.slow
 def test_a_torque_limit_of_the_wheel_law_without_wheels():
     """Where other actuators give the torque the limit is the craft's, and the claim a set of turns up to a half."""
     loop = loop_of("wheel", wheel.Gains(0.05, (0.01, 0.01, 0.01)), make_craft(tensor(FULL.inertia), torque_limit=0.04))
@@ -248,7 +249,7 @@ def struck(action):
     return parse(BUILTIN[:at] + STRUCK.format(action) + BUILTIN[at:], "here")
 
 
-@pytest.mark.parametrize(("action", "names"), [("both", ["wheel", "wheel from 70 s"]), ("none", ["wheel"])])
+@pytest.mark.parametrize(("action", "names"), leading([("both", ["wheel", "wheel from 70 s"]), ("none", ["wheel"])]))
 def test_the_certificate_is_issued_again_once_the_fault_is_known(action, names, tmp_path):
     scenario = struck(action)
     entry = scenario.laws[0]
@@ -283,6 +284,7 @@ def test_every_law_with_a_function_on_wheels_is_sound(tmp_path):
             fly_claims(loop, certificate, flights=128)
 
 
+@pytest.mark.slow
 def test_no_claim_is_about_less_momentum_than_is_had_on_target(tmp_path):
     """A body that follows the orbit at rest on target has momentum; one with none is told of by nobody."""
     loop = rotors("wheel", catalogue()["wheel"].examples()[0], target=ORBITAL)

@@ -1,5 +1,6 @@
 """A filter that gives no numbers is told of, whether a law uses what it gives or not."""
 
+import pytest
 from typer.testing import CliRunner
 
 from starhold.cli.main import app
@@ -56,6 +57,7 @@ k_attitude = 0.0008
 """
 
 
+@pytest.mark.slow
 def test_a_filter_without_numbers_is_told_where_no_mode_fails_by_it(tmp_path):
     """The magnetic law flies by the magnetometer, and what the filter gives is never below a level."""
     (tmp_path / "blank.py").write_text(BLANK)

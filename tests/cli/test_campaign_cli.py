@@ -143,6 +143,7 @@ def test_results_of_other_commands_are_not_removed_unasked(tmp_path):
     assert "worst-of-mine.toml" not in listed(tmp_path / "worst")
 
 
+@pytest.mark.slow
 def test_resume_flies_what_is_missing_and_no_more(place):
     out = place / "out"
     digest = json.loads((out / "campaign.json").read_text())["digest"]
@@ -199,6 +200,7 @@ def test_runs_are_asked_in_sql(flown):
     assert "the first 60 of 2304 rows" in ask("select a.run from runs a, runs b").stdout
 
 
+@pytest.mark.slow
 def test_a_run_is_flown_again_and_its_file_flies_the_same(flown, tmp_path):
     place, _ = flown
     done = starhold("rerun", str(place / "out"), "7", "--law", "lyapunov", "-o", "seven", cwd=tmp_path)
@@ -257,6 +259,7 @@ def test_bad_input_is_complains(tmp_path, case):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_complains(tmp_path, monkeypatch):
     monkeypatch.setattr(engines, "Scheduler", partial(engines.Scheduler, patience=1.0))
     with socket.socket() as nobody:

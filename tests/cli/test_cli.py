@@ -18,6 +18,7 @@ from tests.certification.invariants import file as invariant_file
 from tests.cli.short import SHORT
 from tests.refusals import complains
 from tests.running import starhold
+from tests.tiers import leading
 
 
 @pytest.fixture
@@ -240,7 +241,8 @@ def test_what_the_system_refuses_is_one_line(failure, said, monkeypatch, capsys)
     assert error.count("\n") == 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", leading([signal.SIGINT, signal.SIGTERM]))
 def test_what_ends_a_command_leaves_nothing_half_written(number, short):
     (short / "long.toml").write_text(SHORT.replace("duration = 20.0", "duration = 20000000.0\nrecord_every = 10000"))
     words = [sys.executable, "-m", "starhold", "run", "long.toml", "--law", "lyapunov", "-o", "out"]

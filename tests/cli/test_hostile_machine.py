@@ -37,6 +37,7 @@ def test_a_disk_that_is_full_is_told_in_one_line(folder, most):
     assert (folder / "out" / "run.nc").exists() == (most == 150_000)
 
 
+@pytest.mark.slow
 def test_results_are_whole_though_nobody_reads_the_output(folder):
     reading, writing = os.pipe()
     os.close(reading)
@@ -53,6 +54,7 @@ def test_output_that_cannot_be_written_is_told(folder):
     assert done.stderr == "starhold: standard output cannot be written: No space left on device\n"
 
 
+@pytest.mark.slow
 def test_poor_encoding_and_home_that_cannot_be_written(folder):
     (folder / "file").touch()  # a folder below a file cannot be made, even by root
     home = str(folder / "file" / "home")

@@ -35,6 +35,7 @@ def test_modal_roots_writes_a_table_and_a_picture_and_prints_a_law_to_paste(fold
     assert len((folder / "out" / "modal-roots.csv").read_text().splitlines()) == 4
 
 
+@pytest.mark.slow
 def test_a_run_shows_its_transient_against_the_limits(folder):
     done = starhold("run", "landing", "--law", "rounded", "--no-certify", "-o", "out", cwd=folder, code=0)
     assert "of 30 deg/s; peak acceleration 2.068, 16.34, 16.14 of 50 deg/s²: kept" in done.stdout

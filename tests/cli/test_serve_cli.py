@@ -89,6 +89,7 @@ def test_interrupted_tells_where_and_keeps_the_recording(tmp_path):
         assert run.attrs["law_process"] == "a peer"
 
 
+@pytest.mark.slow
 def test_a_law_leaves_and_flies_in_a_process(tmp_path):
     need("gcc")
     starhold("export", "c", "three-laws", "--shell", "process", "--no-certify", "-o", "c", cwd=tmp_path, code=0)

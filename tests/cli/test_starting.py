@@ -89,6 +89,7 @@ def test_the_table_waits_for_nothing_that_it_does_not_need(words, loops, recorde
     assert not {"matplotlib", "plotly", "sympy", "xarray", "pandas"} & packages(end["modules"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("asked", "drawn"), leading([("none", []), ("page", ["report.html"])]))
 def test_nothing_is_drawn_unasked(asked, drawn, tmp_path):
     (tmp_path / "short.toml").write_text(SHORT)

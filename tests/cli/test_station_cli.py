@@ -18,6 +18,7 @@ def short(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_compare_writes_everything_and_prints_the_table(short):
     done = starhold("compare", "short.toml", "-o", "out", cwd=short, code=0)
     out = short / "out"

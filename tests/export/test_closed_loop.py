@@ -65,7 +65,7 @@ LOOPS = ["sliding", "wheel", "l2", "mpc", "estimator", "hysteresis, axis", "targ
          "lyapunov", "modal", "pd", "estimator on [sensor]", "orbital target", "lqr, example 1, noise"]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", leading(LOOPS, 8))
+@pytest.mark.parametrize("name", leading(LOOPS, 3))
 def test_equals_the_simulation(name):
     steps = fewer(COSTLY if name == "mpc" else STEPS, 3)
     found, expected = flown_with(name, steps), fly(loop_of(name), steps)[1]

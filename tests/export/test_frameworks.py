@@ -201,6 +201,7 @@ def test_shells_of_other_laws_compile(name, tmp_path):
     build_in(tmp_path, "g++", "-std=c++14", *STRICT[1:], "-fsyntax-only", "-I.", f"Components/{title}/{title}.cpp")
 
 
+@pytest.mark.slow
 def test_the_command_writes_folders_and_clears_them(tmp_path):
     words = ("export", "c", "three-laws", "--law", "lyapunov", "-o", "out", "--no-certify")
     starhold(*words, "--shell", "cfs", "--shell", "fprime", cwd=tmp_path, code=0)

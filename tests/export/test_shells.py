@@ -66,6 +66,7 @@ def test_basilisk_refuses_what_no_message_tells_of():
         shell_files(code_of("lyapunov"), ["simulink"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", leading(["wheel", "lyapunov"]))
 def test_fmu_gives_the_same_bits(name, tmp_path):
     need("cmake", "cc")

@@ -60,7 +60,7 @@ def put(name: str, folder: Path) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize("name", leading(NAMES))
-@pytest.mark.parametrize("target", LINUX)
+@pytest.mark.parametrize("target", leading(LINUX))
 def test_linux(target, name, tmp_path):
     compiler, emulator = LINUX[target]
     need(compiler, emulator)

@@ -14,6 +14,7 @@ from starhold.kernel.check import check
 from starhold.laws.program import law_digest
 from starhold.scenario.building import build
 from tests.running import starhold
+from tests.tiers import leading
 
 WRITTEN = {
     "attitude": ("certify", "three-laws", "--law", "lyapunov"),
@@ -59,9 +60,9 @@ def test_kernel_has_the_same_bytes_each_time_and_check_names_them(made):
     assert re.search(r"sha256 ([0-9a-f]{64})", told)[1] == hashlib.sha256(data).hexdigest()
 
 
-@pytest.mark.parametrize(("scenario", "law", "other"), [
+@pytest.mark.parametrize(("scenario", "law", "other"), leading([
     ("three-laws", "lyapunov", "cubesat-slew"), ("l2-circle", "smooth", "l2-nonlinear"),
-])  # fmt: skip
+]))  # fmt: skip
 def test_one_digest_names_the_law_in_certificate_code_run_and_page(scenario, law, other, tmp_path):
     given = sh.load(scenario)
     loop = build(given, given.pick(law))

@@ -39,6 +39,7 @@ def test_every_claim_is_proved_by_the_kernel_alone(scenario, law, bundle, tmp_pa
     assert WORK - Account.left < WORK / 3
 
 
+@pytest.mark.slow
 def test_where_motions_of_laws_that_clip_or_jump_end_is_found():
     """As far as the certifier proved it that had no kernel."""
     ends, limited, *_ = contents("by hand", "clipped")["claims"]
@@ -51,6 +52,7 @@ def test_where_motions_of_laws_that_clip_or_jump_end_is_found():
     assert number(torque["numbers"]["level"]) > 0.98 * 0.41815
 
 
+@pytest.mark.slow
 def test_strict_functions_and_limits_of_the_norm_are_found():
     assert contents("by hand", "strict")["claims"][0]["theorem"] == "converges strictly"
     norm = [c for c in contents("by hand", "norm")["claims"] if c["theorem"] != "points"]

@@ -188,6 +188,7 @@ def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis):
     assert not all(oracle)
 
 
+@pytest.mark.slow
 def test_a_law_that_clips_falls_in_every_case():
     for beyond, failed in ((0.0, set()), (0.5, set()), (-2.0, {"V is non-increasing"})):
         claim, programs = case(clipped(beyond))

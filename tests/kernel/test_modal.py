@@ -51,6 +51,7 @@ def shown(loop):
     return copy.deepcopy(certificate(found.programs, [claim])), claim, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("a", "b", "sign_policy", "level"), leading(OF_BOXES))
 def test_sets_are_no_smaller_than_those_shown_by_boxes(a, b, sign_policy, level):
     content, claim, _ = shown(loop_of(a, b, sign_policy))
@@ -92,6 +93,7 @@ def test_what_is_asked_for_and_not_shown_is_told():
     assert (found.claim("inertia").outcome, found.claim("region").outcome) == ("undecided", "proved")
 
 
+@pytest.mark.slow
 def test_inertia_target_and_its_motion_do_not_matter():
     orbit = '[orbit]\nposition = ["7000 km", 0, 0]\nvelocity = [0, 7500, 0]\n[target]\nmode = "orbital"\n'
     full = CRAFT.replace("[2.0, 3.0, 4.0]", "[[12.0, 0.5, 0.1], [0.5, 14.0, 0.2], [0.1, 0.2, 9.0]]")

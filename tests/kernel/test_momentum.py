@@ -22,7 +22,7 @@ FLOWN = [
 ]
 
 
-@pytest.mark.parametrize(("scenario", "law", "share"), leading(FLOWN, 2))
+@pytest.mark.parametrize(("scenario", "law", "share"), leading(FLOWN))
 def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, law, share):
     Account.left = 10**12
     given = sh.load(scenario)

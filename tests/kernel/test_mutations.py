@@ -39,7 +39,7 @@ COUNT = 400 if WHOLE else 25
 SLOW = {name for name in SUITES if name.startswith(("evenly", "wheels", "points", "jumps", "whatever", "falls"))}
 
 
-@pytest.mark.parametrize("suite", leading(sorted(SUITES, key=lambda name: name in SLOW), 5))
+@pytest.mark.parametrize("suite", leading(sorted(SUITES, key=lambda name: name in SLOW), 2))
 def test_nothing_false_is_accepted(suite):
     original = contents(*SUITES[suite])
     assert check(text(original))

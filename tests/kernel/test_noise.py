@@ -25,6 +25,7 @@ from starhold.parts.estimators import mekf
 from starhold.scenario.building import build
 from tests.kernel.certificates import contents, failing, radii_of
 from tests.kernel.oracle import Oracle, number
+from tests.tiers import leading
 
 SIZES = np.repeat([1e-7, 1e-7, 1e-7, 1e-2, 1e-1, 1e-2], 3)
 """Small errors (rad, rad/s), and small noise as shares of its deviations."""
@@ -52,7 +53,8 @@ def test_the_bound_of_a_tail_is_not_below_it_and_near(k):
     assert stats.chi(3).sf(k) <= found <= stats.chi(3).sf(k) * (1.0 + 0.7 / k**2)
 
 
-@pytest.mark.parametrize("share", [0.3, 0.02])
+@pytest.mark.slow
+@pytest.mark.parametrize("share", leading([0.3, 0.02]))
 def test_errors_leave_their_radii_no_more_often_than_is_claimed(nadir, share, monkeypatch):
     """Nor the motion that they cause, in many spans of 4000 samples. A radius of the quantile itself is at most 1.35 times
     smaller, or 1.6 times for the motion, of which samples on end are like one another."""
@@ -190,7 +192,7 @@ FALSE = [
 ]
 
 
-@pytest.mark.parametrize(("hypothesis", "change"), FALSE)
+@pytest.mark.parametrize(("hypothesis", "change"), leading(FALSE, 2))
 def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis, change):
     content = contents("flying", "noisy")
     (claim,) = content["claims"]
@@ -205,6 +207,7 @@ def test_the_claim_that_was_changed_holds():
     assert Oracle(content, content["claims"][0]).holds()
 
 
+@pytest.mark.slow
 def test_errors_without_end_are_not_taken_in(nadir):
     """A gyro whose bias walks has no estimator; a filter that takes the bias for constant does not settle."""
     assert driven_errors(nadir.without("mekf")) is None

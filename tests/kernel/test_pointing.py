@@ -256,6 +256,7 @@ def test_no_flight_leaves_what_is_proved_and_some_come_near(name, reached):
     assert reached * n["end.angle"] <= worst <= n["end.angle"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", leading(["cubesat", "skew", "calm"]))
 def test_flights_from_the_set_stay_in_the_funnel_and_the_funnel_is_not_wide(name):
     (claim,) = checked(flying(name))

@@ -133,7 +133,7 @@ class Against(Oracle):
         return s(q, w), self.J @ (s(q + h * qd, w + h * wd) - s(q - h * qd, w - h * wd)) / (2.0 * h)
 
 
-@pytest.mark.parametrize("name", leading(CASES, len(CASES) - 1))
+@pytest.mark.parametrize("name", leading(CASES, 4))
 def test_what_is_false_is_refuted_and_the_refutation_holds_when_computed_otherwise(name, tmp_path):
     loop, wanted, _ = made(name)
     content = content_of(name)
@@ -213,6 +213,7 @@ def test_singular_stiffness_is_not_decided():
     assert certify(loop).claim("convergence").outcome == "undecided"
 
 
+@pytest.mark.slow
 def test_a_larger_box_of_inertias_than_the_largest_is_not_claimed():
     gains = lqr.design(PRINCIPAL, lqr.FormII((1e-3,) * 3 + (1.0, 30.0, 4.0), (1e3,) * 3))
     loop = loop_of("lqr", gains, PRINCIPAL)

@@ -58,6 +58,7 @@ def test_rocq_accepts_a_small_certificate_and_refuses_a_changed_one(small, tmp_p
     assert "lemmas.v" in accepted(other, tmp_path)
 
 
+@pytest.mark.slow
 def test_rocq_refuses_evidence_that_does_not_show_it(small, tmp_path):
     """The statement and the evidence are changed alike, to what is false."""
     _, lemmas = small
@@ -68,6 +69,7 @@ def test_rocq_refuses_evidence_that_does_not_show_it(small, tmp_path):
     assert "Cannot" in (told := accepted(other, tmp_path)) or "unify" in told or "type" in told
 
 
+@pytest.mark.slow
 def test_rocq_accepts_that_motions_persist(small, tmp_path):
     A, P = [[Fraction(3, 2), Fraction(1, 3)], [Fraction(0), Fraction(1, 2)]], [["1", "1/3"], ["1/3", "1/9"]]
     rule = Persists(A)

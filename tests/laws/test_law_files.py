@@ -99,6 +99,7 @@ def test_it_is_read_again_where_its_text_has_changed_and_only_then(folder):
     assert first.gains._field_defaults["p"] == 0.009
 
 
+@pytest.mark.slow
 def test_command_line_compares_it_and_checks_its_certificate(folder):
     starhold("compare", "own.toml", "--pictures", "page", "-o", "out", cwd=folder, code=0)
     told = json.loads((folder / "out" / "certificate.json").read_text())["certificates"]
@@ -116,6 +117,7 @@ def test_command_line_compares_it_and_checks_its_certificate(folder):
     assert "stiffness" in starhold("laws", "laws/my_law.py", cwd=folder).stdout
 
 
+@pytest.mark.slow
 def test_its_proofs_are_not_about_another_text_of_the_law(folder, tmp_path):
     from starhold.certification.certificate import write
     from starhold.studies.certificates import compare_programs

@@ -103,6 +103,7 @@ PLAIN = {"type": "pd", "k_rate": 6.0, "k_attitude": 0.1}
 WHOLE = PLAIN | {"type": "pid", "k_integral": 5e-4, "integral_limit": "1 mN m"}
 
 
+@pytest.mark.slow
 def test_gravity_gradient_in_the_orbital_frame_is_held_off():
     flights = {flight.law: flight.run for flight in sh.compare(scenario(PLAIN, WHOLE))}
     ends = {name: angles(run["attitude_error"].values)[-1] for name, run in flights.items()}

@@ -123,7 +123,7 @@ def test_flights_settle_when_asked_within_the_torque_and_not_much_sooner(law, st
         assert told["largest torque (N m)"] == pytest.approx(found["peak_torque_norm"], rel=0.03)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", leading(LAWS))
 def test_a_time_that_the_torque_does_not_allow_is_refused_with_one_that_it_does(law):
     with refused("law[1]: 30 s to settle is too short: 0.05 N m of torque allow about") as caught:
         sh.scenario(BODY | {"law": [asked(law, 30)]})
@@ -135,6 +135,7 @@ def test_a_time_that_the_torque_does_not_allow_is_refused_with_one_that_it_does(
         sh.scenario(BODY | {"law": [asked(law, 0.9 * least)]})
 
 
+@pytest.mark.slow
 def test_wheels_bound_torque_and_momentum():
     wheels = {"layout": "pyramid", "inertia": 1e-3, "torque_limit": 0.02, "momentum_limit": 0.2, "momentum": 0.002}
     tables = BODY | {"spacecraft": {"inertia": [2.0, 3.0, 4.0]}, "wheels": wheels, "law": [asked("lyapunov", 200)]}

@@ -17,7 +17,7 @@ LOOPS = ["lyapunov", "estimator", "sun", "yaw-steering", "wheel", "target from a
          "mission", "b_dot", "mpc"]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", leading(LOOPS, 8))
+@pytest.mark.parametrize("name", leading(LOOPS, 3))
 def test_exported_laws_fly_the_bits_of_the_simulation(name, tmp_path):
     steps = fewer(STEPS, 2) if name != "mpc" else 12
     samples, carry = fly_by_process(built(tmp_path, code_of(name), "-O2"), loop_of(name), steps)

@@ -16,7 +16,7 @@ from starhold.link.protocol import Fault, Kind, Message, binary
 from starhold.report.timing import write_timing
 from tests.export.flown import built, code_of
 from tests.link.clients import OVER, Client, Dealer, connected, mutated, served
-from tests.tiers import fewer
+from tests.tiers import fewer, leading
 
 STEPS = 60
 
@@ -61,7 +61,7 @@ def test_lockstep_has_the_bits_of_a_simulation(over, text):
     assert result.lines[0].startswith(f"Ended at step {STEPS} of {STEPS} (")
 
 
-@pytest.mark.parametrize("over", ["tcp", "serial"])
+@pytest.mark.parametrize("over", leading(["tcp", "serial"]))
 def test_exported_c_flies_an_orbit_with_the_bits_of_a_simulation(over, tmp_path):
     """With an estimator and modes: the law as a program whose standard input and output are the line."""
     scenario = short("cubesat-mission", fewer(11_400, 60))

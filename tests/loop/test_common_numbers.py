@@ -45,6 +45,7 @@ def test_the_field_is_computed_once():
     assert same - single < FIELD / 2 < FIELD < apart - single
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("epochs", leading([((ONE, OTHER),), ((ONE, ONE),), ((OTHER, ONE),), ((OTHER, OTHER),)]))
 def test_every_machine_flies_the_epochs_it_is_given(epochs):
     """In any order: kernels are kept, and none serves numbers that are equal otherwise."""

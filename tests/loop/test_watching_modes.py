@@ -100,6 +100,7 @@ def test_a_lost_tracker_leads_to_the_safe_mode_and_a_fix_out_of_it():
     assert run["trips"][-1] == 1.0
 
 
+@pytest.mark.slow
 def test_a_filter_counts_as_converged_by_its_own_covariance():
     text = cubesat(HEADS, FREE) + mode("wait", 'until = { attitude_deviation_below = "0.0115 deg", dwell = "3 s" }')
     run = flown(built(parse(text + mode("work"), "m.toml")), 100)

@@ -61,7 +61,7 @@ class Program:
         return np.tile(self.centre + self.bound, self.horizon)
 
 
-SEEDS = range(fewer(120, 3))
+SEEDS = range(fewer(120, 8))
 
 
 def by_piqp(program: Program) -> Any:

@@ -55,6 +55,7 @@ def test_without_terminal_weight_it_barely_moves(horizon: int):
     assert np.abs(record[COMMAND]).max() <= 0.01 + 1e-9
 
 
+@pytest.mark.slow
 def test_norm_limit_in_flight():
     craft, gains = make_craft([2.0, 3.0, 4.0], 0.005), mpc.examples()[1]
     loop = ClosedLoop(craft, catalogue()["mpc"], gains, PUBLISHED, 0.1, limit="norm")

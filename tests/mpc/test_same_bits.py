@@ -10,6 +10,7 @@ from starhold.laws.predictive.problem import Problem
 from starhold.laws.predictive.single import record_solver, work_out
 from starhold.laws.predictive.solver import PATIENCE
 from tests.mpc.programs import Program
+from tests.tiers import leading
 from tests.trace.machines import Job, column, on_lanes, same
 
 LANES, BUDGET = 8, 100
@@ -17,7 +18,7 @@ SMALL, LARGE, STUBBORN = 0, 3, 13
 """Seeds of programs with 1, 4 and 14 moves; of the last, some need the interior-point method."""
 
 
-@pytest.mark.parametrize("ball", [False, True])
+@pytest.mark.parametrize("ball", leading([False, True]))
 def test_solver(ball: bool):
     solver, sweeps = record_solver(ball=ball), []
     for first in (SMALL, LARGE, STUBBORN):

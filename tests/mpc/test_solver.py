@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from tests.mpc.programs import SEEDS, Program, by_clarabel, by_piqp
+from tests.tiers import leading
 
 
-@pytest.mark.parametrize("ball", [False, True])
+@pytest.mark.parametrize("ball", leading([False, True]))
 def test_against_library_solvers(ball: bool):
     pressing, by_library = [], by_clarabel if ball else by_piqp
     for seed in SEEDS:

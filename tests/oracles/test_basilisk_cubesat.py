@@ -142,6 +142,7 @@ def test_drag_differs_by_the_course_that_starhold_holds():
     assert found[1] / found[2] == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_noise_of_basilisk_s_own_sensors_moves_the_craft_as_much():
     """With gyro and star tracker of Basilisk, which draw numbers of their own, the craft shakes as it does in starhold: the
     deviation from the flight without noise lies among those of starhold's runs."""

@@ -1,6 +1,7 @@
 """Sensors as they are built: what law and filter do not know of them, against SciPy and IEEE 952."""
 
 import math
+from collections import namedtuple
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import starhold as sh
 from starhold.algebra.vector import ZERO
 from starhold.parts.effectors import magnetorquers, thrusters
-from starhold.parts.random import Silent
+from starhold.parts.random import Dice, Silent
 from starhold.parts.sensors import gyro, magnetometer, star_tracker, sun_sensor
 from tests.parts.fields import states
 from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, errors, scenario
@@ -54,6 +55,28 @@ def test_head_and_sun_sensor_are_turned_as_they_are_mounted():
         assert np.abs(ASKEW.inv().apply(plain) - askew).max() < 3.0 * SMALL
         seen += any(plain)
     assert seen > 5
+
+
+@pytest.mark.parametrize("sensor", [magnetometer, star_tracker, sun_sensor])
+def test_jitter_turns_what_is_shown_by_the_rate(sensor):
+    """By 0.01 s on average, about the axis of the rate alone: what lies along it stays."""
+    given = {star_tracker: {"cross": 0.0, "roll": 0.0}, sun_sensor: {"half_angle": math.pi}}.get(sensor, {})
+    seen = (one for one in states(20) if any(reading(sensor, sensor.Params(**given), one)[0]))
+    of_state = vars(next(seen)) | {"rate": (0.0, 0.0, 0.5)}
+    state = namedtuple("State", of_state)(**of_state)
+    exact, off = np.array(reading(sensor, sensor.Params(**given), state)[0]), []
+    numbers = sensor.prepare(sensor.Params(**given, jitter=0.01), 0.5)
+    for step in range(400):
+        memory = sensor.remember(numbers, state) if hasattr(sensor, "remember") else ()
+        shown = np.array(sensor.measure(state, memory, numbers, Dice((1, 2), step, 0), 0)[0][0])
+        if sensor is star_tracker:
+            ends = [Rotation.from_quat(q, scalar_first=True) for q in (exact, shown)]
+            off.append((ends[0].inv() * ends[1]).as_rotvec())
+        else:
+            angle = math.atan2(shown[1], shown[0]) - math.atan2(exact[1], exact[0])
+            off.append([0.0, shown[2] / exact[2] - 1.0, -math.remainder(angle, math.tau)])
+    assert np.abs(np.array(off)[:, :2]).max() < 1e-12
+    assert np.std(off, axis=0)[2] == pytest.approx(0.5 * 0.01, rel=0.15)
 
 
 def test_steps_and_limits():

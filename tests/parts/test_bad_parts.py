@@ -53,8 +53,8 @@ COMPOSED = {
     "two estimators": (GYRO + TRACKER + FILTER * 2, "a second estimator", "one estimator"),
     "two sensors of the rate": (GYRO * 2, "a second sensor of rate, beside gyro", "one of each"),
     "a sensor of the attitude that a filter is not told of": (
-        GYRO + TRACKER * 2 + MEKF,
-        "part mekf: found more_trackers of length 0 for star-tracker-2",
+        GYRO + TRACKER * 3 + MEKF + "more_trackers = [[1e-5, 1e-4, 0, 1, 0]]\n",
+        "part mekf: found more_trackers of length 1 for star-tracker-2, star-tracker-3",
         "a row for each sensor of attitude after the first",
     ),
     "a sensor that a filter is told of and that is not there": (
@@ -65,7 +65,7 @@ COMPOSED = {
     "a tracker without noise": (
         GYRO + TRACKER * 2 + MEKF + "more_trackers = [[0, 1e-4, 0, 1, 0]]\n",
         "part mekf",
-        "the deviations of more_trackers must be above 0",
+        "the deviations cross and roll of each star tracker must be above 0",
     ),
     "a sensor beside [sensor]": ("[sensor]\nrate_noise = 1e-4\n" + GYRO, "a second sensor of rate"),
     "a part that is about the Earth elsewhere": (
@@ -79,7 +79,7 @@ COMPOSED = {
     "what another table gives": (part('type = "wheels"\n'), '"wheels"', "the [wheels] table, which gives it"),
     "single brackets": ('[part]\ntype = "gyro"\n', "part: found", "[[part]] tables, with double brackets"),
     "another unit": (part('type = "gyro"\nnoise = "1 N m"\n'), 'part[1].noise: found "1 N m"', "rad"),
-    "below the bound": (part('type = "gyro"\nnoise = -1\n'), "part[1].noise: found -1", "at least 0"),
+    "below the bound": (part('type = "gyro"\nnoise = -0.01\n'), "part[1].noise: found -0.01", "at least 0"),
     "two numbers of three": (part('type = "gyro"\nbias = [0, 1]\n'), "part[1].bias", "3 numbers"),
     "a name twice": (GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n'), "part[2].name", "a name that"),
     "too late a tracker": (

@@ -81,6 +81,7 @@ def moving(row, angle):
     return row[7] * np.outer(s, s) + row[8] * np.outer(t, t) + row[9] * np.outer(g, g), g, s
 
 
+@pytest.mark.slow
 def test_a_slew_keeps_the_angular_momentum_of_the_whole():
     run = flown(made(UNEQUAL, substeps=40), 900)
     momentum = whole(UNEQUAL, run)
@@ -217,6 +218,7 @@ def test_rotors_turn_a_craft_whose_gimbals_are_caught_in_a_singularity():
     assert np.abs(idle["command"]).max() == pytest.approx(0.02)
 
 
+@pytest.mark.slow
 def test_nothing_goes_beyond_its_limit():
     slow, full = flown(about_x(2.8, motor=0.03, rate=0.3), 600), caught(0.003, limit=0.41)
     for run, name, limit in (

@@ -68,6 +68,7 @@ def test_magnetometer():
     assert np.abs(np.mean(errors, axis=0)).max() < 160e-9 + 1e-8
 
 
+@pytest.mark.slow
 def test_sun_sensor():
     params = sun_sensor.Params(1e-3, (0.0, 3.0, 4.0), math.radians(40.0), EPOCH, (10.0, 20.0))
     numbers = sun_sensor.prepare(params, PERIOD)

@@ -51,7 +51,7 @@ def own(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("role", [*PARTS, "law"])
+@pytest.mark.parametrize("role", leading([*PARTS, "law"], 3))
 def test_one_file_is_read_flown_recorded_and_checked(role, own, tmp_path):
     before = package()
     path, text = own(role), text_of(role, 'file = "mine.py"\n')

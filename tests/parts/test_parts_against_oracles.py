@@ -79,6 +79,7 @@ def test_the_noise_of_a_gyro_is_white_and_as_strong_as_it_says():
         assert abs(allan / (noise / math.sqrt(seconds)) - 1.0) < 4.0 * spread, seconds
 
 
+@pytest.mark.slow
 def test_the_bias_of_a_gyro_walks_with_the_square_root_of_time():
     hour, start, steps, runs = 1e-3, (1e-4, -2e-4, 3e-4), 100, 150
     loop = free(fit("sensor", "gyro", 0.0, start, hour), period=1.0, substeps=8)

@@ -63,6 +63,7 @@ def allan_deviation(rates, count):
     return math.sqrt(0.5 * np.mean(np.diff(means, axis=0) ** 2))
 
 
+@pytest.mark.slow
 def test_the_allan_deviation_of_the_gyro_is_that_of_its_data_sheet():
     """IEEE 952: angle random walk N and rate random walk K give N^2/t + K^2 t/3 as its square over an averaging time t. At
     3 s the one is all of it, at 300 s the other, and between them both."""

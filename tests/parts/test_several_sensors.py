@@ -15,6 +15,7 @@ from starhold.scenario.building import build
 from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, MEKF, SECOND, TWO, errors, row, scenario, tracker
 
 
+@pytest.mark.slow
 def test_errors_of_two_trackers_are_as_large_as_the_filter_says():
     random, found = np.random.default_rng(5), []
     for seed in range(60):
@@ -23,6 +24,21 @@ def test_errors_of_two_trackers_are_as_large_as_the_filter_says():
         found.append(errors(run)[-1] / run["mekf_attitude_deviation"].values[-1])
     low, high = stats.chi2(180).ppf([0.0005, 0.9995])
     assert low < np.square(found).sum() < high
+
+
+def test_a_filter_takes_the_trackers_own_numbers_where_it_states_none():
+    """A campaign may draw them only as known to it; what the filter states itself it keeps."""
+    assumed, stated = scenario(GYRO, FIRST, SECOND, MEKF), scenario(GYRO, FIRST, SECOND, TWO)
+    assert sh.simulate(assumed).identical(sh.simulate(stated).assign_attrs(scenario=assumed.text))
+    tuned = scenario(GYRO, FIRST, MEKF | {"cross": 1e-3})
+    assert build(tuned, tuned.laws[0]).find("mekf").params[3:5] == (1e-3, FIRST["roll"])
+    with pytest.raises(sh.InputError, match="part mekf: the deviations cross and roll of each star tracker must be above 0"):
+        sh.simulate(scenario(GYRO, tracker(0.0, 0.0), MEKF))
+    for given, key in ((assumed, "star-tracker.cross"), (assumed, "star-tracker-2.roll")):
+        over = {f"part.{key}": {"distribution": "normal", "sigma": "1 arcsec"}}
+        with pytest.raises(sh.InputError, match="known_to_law: found false; allowed: true"):
+            sh.campaign(given, runs=2, over=over, search=False)
+        assert len(sh.campaign(stated, runs=2, over=over, search=False).frame()) == 2
 
 
 def test_two_equal_trackers_are_one_of_half_the_variance():

@@ -23,6 +23,7 @@ from starhold.scenario.reading import parse
 from tests.algebra.readers import angles, close, directions, from_axis_angle, quaternions
 from tests.missions import cubesat
 from tests.parts.files import part
+from tests.tiers import leading
 
 erfa = pytest.importorskip("erfa", reason="the routines of the IAU come with the test extra")
 EPOCH = (2026.0, 3.0, 5.0, 6.0, 30.0, 0.0)
@@ -255,11 +256,13 @@ LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.02\nk_attitude = 0.004\n'
 
 @pytest.mark.parametrize(
     "keys",
-    [
-        'type = "sun"\n',
-        'type = "yaw-steering"\nother = [0, 1, 0]\n',
-        'type = "ground-station"\nlatitude = "60 deg"\nlongitude = "20 deg"\n',
-    ],
+    leading(
+        [
+            'type = "sun"\n',
+            'type = "yaw-steering"\nother = [0, 1, 0]\n',
+            'type = "ground-station"\nlatitude = "60 deg"\nlongitude = "20 deg"\n',
+        ]
+    ),
 )
 def test_a_law_holds_the_target_from_a_scenario(keys):
     start = {"angles": '[0, 0, 0]\nrelative_to = "target"', "rate": (0, 0, 0)}

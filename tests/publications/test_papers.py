@@ -18,6 +18,7 @@ from starhold.publications.writing import draw, index_page
 from starhold.scenario.reading import parse
 from tests.browser import Browser
 from tests.running import starhold
+from tests.tiers import leading
 
 ERRATA = 11
 
@@ -107,7 +108,7 @@ def test_bad_words_on_the_command_line(tmp_path):
     assert not (tmp_path / "r").exists()
 
 
-@pytest.mark.parametrize("width", [1400, 390])
+@pytest.mark.parametrize("width", leading([1400, 390]))
 def test_all_verdicts_of_the_index_can_be_seen(tmp_path, width):
     """Of a publication with a long title and every verdict."""
     text = HEAD | {"title": "A study of the stabilisation of spacecraft " * 3, "source": "printed somewhere, " * 6}

@@ -40,6 +40,7 @@ def test_each_body_is_found_by_its_name() -> None:
         assert len(set(map(id, found.values()))) == 3
 
 
+@pytest.mark.slow
 def test_every_recorded_quantity_is_drawn_and_told(balloon: Balloon, tmp_path: Path) -> None:
     flights = compare.compare(balloon)
     reader = Reader(render(balloon, flights))

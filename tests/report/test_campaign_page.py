@@ -271,6 +271,7 @@ def test_numbers_are_short(value: float, shown: str) -> None:
     assert figure(value) == shown
 
 
+@pytest.mark.slow
 def test_small_numbers_have_powers_of_ten_and_no_letter_beside_their_unit(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
     path.write_text(render(flown.scenario("detumbling"), whole()), encoding="utf-8")

@@ -53,12 +53,14 @@ def test_equal_flights_give_equal_files(tmp_path: Path) -> None:
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
 
 
+@pytest.mark.slow
 def test_odd_names_are_shown_as_they_stand(tmp_path: Path) -> None:
     first, second = flown.flights()
     odd = [flown.renamed(first, "_$\\frac{"), flown.renamed(second, "転 " + "long " * 30)]
     assert len(draw(odd, tmp_path, flown.scenario(flown.HOSTILE))) == len(NAMES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("extra", leading([flown.lost, flown.still]))
 def test_lost_and_resting_runs_are_drawn(tmp_path: Path, extra: object) -> None:
     assert callable(extra)
@@ -161,6 +163,7 @@ def stretched(flight: Flight, rate: float, count: int = 4001) -> Flight:
     return replace(flight, recording=Recording(arrays, flight.recording.attrs))
 
 
+@pytest.mark.slow
 def test_the_transient_of_a_long_run_is_drawn_by_itself(tmp_path: Path) -> None:
     first = flown.flights()[0]
     flights = [stretched(first, 0.2), stretched(first, 0.1)]

@@ -12,6 +12,7 @@ from starhold.scenario.reading import Scenario, load, parse
 from starhold.studies import compare as studies
 from tests.browser import Browser
 from tests.report import flown
+from tests.tiers import leading
 
 DESKTOP, PHONE = (1400, 900), (390, 844)
 REQUIRED = [
@@ -52,8 +53,8 @@ def boxes(browser: Browser, name: str) -> list[dict[str, Any]]:
     return browser.ask(f"({BOXES})({name!r})")
 
 
-@pytest.mark.parametrize(("name", "verdicts"), [("mission", 3), ("laws", 6), ("five", 20)])
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+@pytest.mark.parametrize(("name", "verdicts"), leading([("mission", 3), ("laws", 6), ("five", 20)]))
+@pytest.mark.parametrize("size", leading([(DESKTOP,), (PHONE,)]))
 def test_the_first_screen_answers(
     browser: Browser, pages: dict[str, Path], name: str, verdicts: int, size: tuple[int, int]
 ) -> None:

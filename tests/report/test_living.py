@@ -162,6 +162,7 @@ def test_claims_grey_out_and_stay_lit(browser: Browser, page: Path) -> None:
     assert grey()["lyapunov"] == ["Within the torque limit"]
 
 
+@pytest.mark.slow
 def test_the_address_holds_the_sliders(browser: Browser, page: Path) -> None:
     browser.open(page)
     see(browser)
@@ -261,7 +262,7 @@ LOOPS = {
 }
 
 
-@pytest.mark.parametrize("name", leading(LOOPS, 3))
+@pytest.mark.parametrize("name", leading(LOOPS))
 def test_what_flies_in_node_is_what_python_flies(name: str) -> None:
     need("node")
     scenario = shortened(*LOOPS[name])
@@ -300,6 +301,7 @@ def test_what_flies_in_node_is_what_python_flies(name: str) -> None:
                 assert value == near, (law["name"], metric)
 
 
+@pytest.mark.slow
 def test_a_move_takes_less_than_a_sixtieth_of_a_second() -> None:
     need("node")
     scenario = shortened("three-laws", "2000 s", "lyapunov", "sliding")

@@ -175,6 +175,7 @@ def test_a_long_run_has_a_switch_to_its_transient(reader: Reader) -> None:
     assert 0.4 < (times <= end).mean() < 0.6
 
 
+@pytest.mark.slow
 def test_names_from_files_are_no_markup() -> None:
     name = flown.HOSTILE.replace("'", "")
     first, second = flown.flights()

@@ -41,6 +41,7 @@ def outcomes(reader: Reader) -> list[str]:
     return [str(attrs["class"]).split()[1] for _, attrs in reader.tags if str(attrs.get("class")).startswith("outcome ")]
 
 
+@pytest.mark.slow
 def test_every_claim_is_told_with_its_obligations_and_assumptions() -> None:
     certificate = certificates()[0]
     assert {claim.kind for claim in certificate.claims} == {

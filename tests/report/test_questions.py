@@ -14,6 +14,7 @@ from starhold.studies.questions import UNASKED, Question, record_check
 from starhold.studies.reflight import Reflight, reflight
 from starhold.trace.handles import RecordingError
 from starhold.trace.machine import load
+from tests.tiers import leading
 
 HEAD = """
 name = "asked"
@@ -124,7 +125,7 @@ def stretched(made: Reflight, random: np.random.Generator) -> dict[str, Any]:
     return moves
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", leading(CASES))
 def test_a_page_refuses_what_the_program_refuses_in_its_words(case: str) -> None:
     made, random = reflight(parse(CASES[case], case)), np.random.default_rng(len(case))
     assert made.checks.fixed == {}

@@ -41,6 +41,7 @@ def test_map_line_and_optimum_are_drawn(tmp_path: Path, given: tuple[tuple[float
     assert budget[row - 6 : row + 7, column - 5 : column + 6].sum() > 60
 
 
+@pytest.mark.slow
 def test_equal_arguments_give_equal_files(tmp_path: Path) -> None:
     first, second, other = (
         save(draw_map(*given), tmp_path / f"{number}.png").read_bytes()

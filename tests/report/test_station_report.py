@@ -13,6 +13,7 @@ from starhold.report.plots import colour
 from tests.report.flown import draw, told
 from tests.report.flown import stations as flights
 from tests.report.reader import Reader
+from tests.tiers import leading
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def test_every_law_every_metric_and_every_picture_is_there(reader: Reader) -> No
     assert len(reader.scripts[0]) < 900_000
 
 
-@pytest.mark.parametrize("name", ["l2-circle", "l2-deficit", "l2-equilibrium"])
+@pytest.mark.parametrize("name", leading(["l2-circle", "l2-deficit", "l2-equilibrium"]))
 def test_every_figure_is_drawn_with_every_law(tmp_path: Path, name: str) -> None:
     paths = draw(flights(name), tmp_path, told(name))
     names = {"deviation.png", "control.png", "projections.png", "space.png"} | (
@@ -58,6 +59,7 @@ def test_every_figure_is_drawn_with_every_law(tmp_path: Path, name: str) -> None
             assert (np.abs(picture - wanted).max(axis=2) < 12).sum() > 20, (path.name, number)
 
 
+@pytest.mark.slow
 def test_one_law_and_a_lost_one_alone_are_drawn(tmp_path: Path) -> None:
     for number in (0, 3):
         assert draw(flights("l2-deficit")[number : number + 1], tmp_path, told("l2-deficit"))

@@ -151,10 +151,18 @@ def test_the_noise_of_a_magnetometer_is_a_deviation_or_a_density():
         read(noise_density=10.0)
 
 
-def test_a_plain_field_in_nanotesla_is_asked_for_its_unit():
-    noisy = {"type": "magnetometer", "noise": 50.0}
-    with pytest.raises(sh.InputError, match=r'noise: found 50.0; .*"50 nT" or "50 T"$'):
-        sh.load("cubesat-detumble").with_({"part": [noisy]})
+PARTS = rows("""
+magnetometer | noise | 50.0 | "50 nT" or "50 T"
+gyro | noise | 0.15 | "0.15 deg/sqrt(h)" or "0.15 rad/s"
+gyro | bias | [10.0, 0.0, 0.0] | "10 deg/s" or "10 rad/s"
+residual-dipole | dipole | [6000.0, 0.0, 0.0] | "6000 mA m^2" or "6000 A m^2"
+""")
+
+
+@pytest.mark.parametrize(("kind", "key", "value", "meant"), PARTS)
+def test_a_plain_number_of_a_part_is_asked_for_its_unit(kind, key, value, meant):
+    with pytest.raises(sh.InputError, match=rf"{key}: found .*{re.escape(meant)}$"):
+        sh.load("cubesat-detumble").with_({"part": [{"type": kind, key: json.loads(value)}]})
 
 
 LARGE = rows("""
@@ -162,6 +170,9 @@ spacecraft.inertia | [5e9, 5e9, 4e9] | 5e+09 | g cm^2 | kg m^2
 wheels.inertia | 20.0 | 20 | g cm^2 | kg m^2
 wheels.torque_limit | 20.0 | 20 | mN m | N m
 wheels.momentum_limit | 4000.0 | 4000 | mN m s | N m s
+spacecraft.torque_limit | 2000.0 | 2000 | mN m | N m
+environment.torque_noise | 20.0 | 20 | mN m | N m
+initial.rate | [10.0, 0.0, 0.0] | 10 | deg/s | rad/s
 """)
 
 

@@ -68,7 +68,11 @@ def test_the_mode_of_a_loss_needs_nothing_that_leads_to_it_or_away():
     ("parts", "condition", "told"),
     [
         ("", 'tracker_age_below = "2 s"', "a sensor that measures attitude_is_new, such as star-tracker"),
-        ("", 'attitude_deviation_below = "1 deg"', "an estimator that gives attitude_deviation, such as mekf"),
+        (
+            "",
+            'attitude_deviation_below = "1 deg"',
+            "an estimator that gives attitude_deviation, such as magnetometer-filter or mekf",
+        ),
         (None, "sunlight_above = 0.5", "orbit.epoch: found nothing; allowed: a date, which conditions of law[1] need"),
     ],
 )

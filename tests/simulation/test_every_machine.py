@@ -26,7 +26,8 @@ COSTLY = 30
 SLOW = pytest.mark.slow
 """Each compiler's other level, and what takes long to compile, is left to `make test-all`."""
 
-LOOPS = builtin() | choices()
+BUILTIN = builtin()
+LOOPS = BUILTIN | choices()
 
 
 def is_costly(name: str) -> bool:
@@ -98,9 +99,9 @@ def test_one_lane(name):
     same(numbers_of(fly(LOOPS[name], steps_of(name), run=RUN)[1]), numbers_of(legs(name)[-1].end))
 
 
-EIGHT = [pytest.param(*flown.values, 8, marks=flown.marks) for flown in FLOWN]
+EIGHT = [pytest.param(name, 8, marks=SLOW if name in SIBLINGS or name not in BUILTIN else ()) for name in LOOPS]
 LANES = [*EIGHT, *leading([(name, 16) for name in LOOPS if not is_costly(name)])]
-"""Every loop on eight lanes; on sixteen one, and by `make test-all` all."""
+"""Loops of built-in scenarios on eight lanes and one on sixteen; by `make test-all` every loop on both."""
 
 
 @pytest.mark.parametrize(("name", "width"), LANES)
@@ -147,6 +148,7 @@ def compare(siblings: bool, results: list[Any]) -> None:
 PRINTED = pytest.mark.parametrize("siblings", [False, pytest.param(True, marks=SLOW)])
 
 
+@pytest.mark.slow
 @PRINTED
 @pytest.mark.parametrize(
     ("compiler", "level"),

@@ -5,6 +5,7 @@ import sys
 import time
 
 import psutil
+import pytest
 
 STUDIO = """
 import time
@@ -23,6 +24,7 @@ time.sleep(600)
 """
 
 
+@pytest.mark.slow
 def test_a_job_ends_where_its_studio_is_killed():
     studio = subprocess.Popen([sys.executable, "-c", STUDIO], stdout=subprocess.PIPE, text=True)
     try:

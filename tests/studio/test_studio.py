@@ -94,6 +94,7 @@ def test_it_listens_on_this_machine_alone(served: Served) -> None:
             assert link.connect_ex((str(address), served.port)) != 0
 
 
+@pytest.mark.slow
 def test_a_campaign_of_a_broken_scenario_is_refused(served: Served) -> None:
     broken = flown.text().replace("k_rate = 0.09", "k_rat = 0.09")
     before = served.ask("GET", "/jobs")[1]
@@ -107,6 +108,7 @@ def test_a_campaign_of_a_broken_scenario_is_refused(served: Served) -> None:
         assert served.ask("POST", "/jobs", body)[0] == 422
 
 
+@pytest.mark.slow
 def test_a_scenario_that_a_job_cannot_be_asked_of(served: Served) -> None:
     status, job = served.ask("POST", "/jobs", {"kind": "failures", "text": flown.text()})
     assert status == 201
@@ -117,6 +119,7 @@ def test_a_scenario_that_a_job_cannot_be_asked_of(served: Served) -> None:
     assert "no [campaign] table" in served.ended(job["number"])["error"]
 
 
+@pytest.mark.slow
 def test_results_are_served_and_nothing_else(served: Served) -> None:
     text = flown.text().replace("duration = 20.0", "duration = 2.0")
     _, job = served.ask("POST", "/jobs", {"kind": "compare", "text": text})
@@ -184,6 +187,7 @@ def press(browser: Browser, value: str, name: str | None = None) -> None:
     browser.ask(f"""document.querySelector('#asking button[value="{value}"]').click()""")
 
 
+@pytest.mark.slow
 def test_save_loses_nothing_that_was_typed(served: Served) -> None:
     text = flown.text()
     served.path.write_text(text, encoding="utf-8")
@@ -302,6 +306,7 @@ def test_a_law_of_a_file_is_asked_about_once(served: Served) -> None:
     assert served.ask("POST", "/check", {"text": text})[1]["laws"] == ["own"]
 
 
+@pytest.mark.slow
 def test_a_check_that_does_not_end_or_ends_its_process_is_told(tmp_path: Path) -> None:
     head = flown.text().split("[[law]]")[0]
     for name, line in {"endless": "while True: time.sleep(0.1)", "ended": "import os; os._exit(3)"}.items():

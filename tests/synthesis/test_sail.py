@@ -130,6 +130,7 @@ def test_the_set_of_forces_is_convex(reflected):
     assert turns.min() > -1e-13
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(optics)
 @example((0.83, 0.05))

@@ -46,6 +46,7 @@ def changed(*pairs):
     return parse(text, "here")
 
 
+@pytest.mark.slow
 def test_a_pyramid_bears_every_single_loss_and_no_double_one(found):
     assert [failure.lost for failure in found] == [(), (1,), (2,), (3,), (4,), *combinations((1, 2, 3, 4), 2)]
     singles, doubles = found[1:5], found[5:]
@@ -64,6 +65,7 @@ def test_a_pyramid_bears_every_single_loss_and_no_double_one(found):
         assert np.linalg.norm(failure.lacking[0]) == pytest.approx(1.0, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_less_torque_gives_a_smaller_degree_of_stability_and_a_later_settling(found):
     for failure in found[1:5]:
         assert failure.eta_intact == found[0].eta
@@ -94,6 +96,7 @@ def test_three_orthogonal_wheels_name_the_axis_of_each_loss():
         assert np.array(failure.lacking).T @ np.array(failure.lacking) == pytest.approx(gone.T @ gone, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_five_wheels_bear_double_losses_and_a_law_with_given_gains_keeps_them():
     axes = ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 2, -1])
     wheels = "".join(f"\n[[wheel]]\naxis = {axis}\n" for axis in axes)
@@ -210,6 +213,7 @@ def test_names_among_the_gains_are_told_as_they_are_written(tmp_path, capsys):
     assert [row["limit (1)"] for row in rows] == ["norm", "norm"]
 
 
+@pytest.mark.slow
 def test_the_losses_that_a_mode_waits_for_are_no_gain(tmp_path, capsys):
     gains = 'type = "wheel"\nk_rate = 0.6\nk_attitude = 0.01\n'
     law = 'type = "modes"\nquaternion_sign = "shortest"\non_loss = "safe"\nwheels_lost = 2\n'

@@ -140,6 +140,7 @@ SHAKEN = {
 }
 
 
+@pytest.mark.slow
 def test_tables_in_data_sheet_units():
     given = scenario(**SHAKEN)
     loop = build(given, given.laws[0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 import linecache
 import sys
 from collections.abc import Callable
-from functools import wraps
+from functools import cache, wraps
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn, TypeAlias, TypeVar, cast
@@ -96,26 +96,31 @@ def whole(symbolic: _Form, *slopes: _Form) -> Callable[[_Function], _Function]:
 
 def _read(entry: Operation, values: tuple[Any, ...]) -> Any:
     """Apply the operation as the reader of the values does."""
-    readers = [reader for reader in map(_reader, values) if reader is not None]
-    if not readers:
-        return entry.plain(*values)
-    for value, reader in zip(values, map(_reader, values), strict=True):
+    readers = [_reader(value) for value in values]
+    for value, reader in zip(values, readers, strict=True):
         if reader == "record":
             return value.recorder.apply(entry, values)
         if reader == "itself":
             return value.read(entry, values)
-    if readers[0] not in entry.meanings:
-        raise TypeError(f"{entry.name} means nothing to the reader {readers[0]}")
-    return entry.meanings[readers[0]](*values)
+    reader = next((reader for reader in readers if reader is not None), None)
+    if reader is None:
+        return entry.plain(*values)
+    if reader not in entry.meanings:
+        raise TypeError(f"{entry.name} means nothing to the reader {reader}")
+    return entry.meanings[reader](*values)
 
 
 def _reader(value: Any) -> str | None:
     """Return the reader of a number; None for plain ones. InputError for what nothing gives."""
     if value is ABSENT:
         refuse_absent()
-    if isinstance(value, (float, int)) or type(value).__name__ == "bool_":
+    return _reader_of(cast(Any, type(value)))
+
+
+@cache
+def _reader_of(cls: Any) -> str | None:
+    if issubclass(cls, (float, int)) or cls.__name__ == "bool_":
         return None
-    cls = cast(Any, type(value))
     declared: str | None = getattr(cls, "reader", None)
     root = cls.__module__.partition(".")[0]
     if declared is None and root not in _LIBRARIES:

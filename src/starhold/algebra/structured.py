@@ -54,7 +54,7 @@ class Buffer:
         return Buffer(self.cells, self.base + start, size)
 
     def row(self, k: Index, width: int) -> tuple[Scalar, ...]:
-        """Return the k-th group of so many numbers."""
+        """Return the k-th group of `width` numbers."""
         return tuple(self[width * k + i] for i in range(width))
 
     def put(self, k: Index, values: Iterable[Scalar]) -> None:
@@ -78,7 +78,8 @@ def repeat(count: Index, body: Callable[..., Any], *state: Any, stop: Callable[.
 
 
 def until(done: Callable[..., Truth], body: Callable[..., Any], *state: Any, at_most: Index) -> State:
-    """Return the state once done(*state) holds, or after so many turns of body(*state). `done` must not write to buffers."""
+    """Return the state once done(*state) holds, or after `at_most` iterations of body(*state). `done` must not write to
+    buffers."""
     recorder = RECORDER.get()
     if recorder is not None:
         return recorder.loop(at_most, done, body, state, counted=False)
@@ -103,7 +104,7 @@ def when(truth: Truth, body: Callable[..., Any], *state: Any) -> State:
 
 
 def at(index: Index, place: Index, body: Callable[..., Any]) -> None:
-    """Run body() in the turn of a loop whose index is `place`; it gives nothing, but may write to buffers."""
+    """Run body() in the iteration of a loop whose index is `place`; it returns nothing, but may write to buffers."""
     recorder = RECORDER.get()
     if recorder is not None:
         recorder.branch(same_index(index, place), body)

@@ -22,6 +22,7 @@ from starhold.algebra.words import number_of
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step
 from starhold.loop.programs import over_samples
+from starhold.parts.stated_attitude import IS_VALID
 from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
 
@@ -253,13 +254,19 @@ def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
 
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
-    """Return the function that reads the recorded quantities of a control instant, of the body and of effectors, by name:
-    read(decided, step, setup)."""
+    """Return the function that reads the recorded quantities of a control instant, of the body and of effectors, by name,
+    and whether the estimate is valid: read(decided, step, setup)."""
 
     def read(decided: Any, step: Any, setup: Any) -> dict[str, Any]:
-        return {name: value for part in _recorded(parts, decided, step, setup) for name, value in part._asdict().items()}
+        read = {name: value for part in _recorded(parts, decided, step, setup) for name, value in part._asdict().items()}
+        return read | ({IS_VALID: decided.memories.estimate.is_valid} if says_valid(parts) else {})
 
     return read
+
+
+def says_valid(parts: Composition) -> bool:
+    """Whether an estimator says if it is valid."""
+    return parts.estimator is not None and IS_VALID in parts.estimator.module.Estimate._fields
 
 
 def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:

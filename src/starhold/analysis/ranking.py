@@ -15,12 +15,14 @@ LATE = " †"
 
 @dataclass(frozen=True)
 class Measure:
-    """The presentation of a metric: heading, unit, meaning, and the factor from SI to that unit; less is better."""
+    """The presentation of a metric: heading, unit, meaning, the factor from SI to that unit, and whether it is shown where
+    it is 0 for all laws; less is better."""
 
     heading: str
     unit: str
     meaning: str
     scale: float = 1.0
+    at_zero: bool = True
 
 
 class Metrics(dict[str, Any]):
@@ -49,7 +51,8 @@ class MetricSet:
 
     def columns(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """Return the metrics that some of the laws have, in order."""
-        return [metric for metric in self.measures if any(metric in row for row in results.values())]
+        shown = {name: one.at_zero for name, one in self.measures.items()}
+        return [name for name, zero in shown.items() if any(name in row and (zero or row[name]) for row in results.values())]
 
     def ranked(self, results: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """Return names from best to worst."""

@@ -15,7 +15,7 @@ from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
 from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
-from starhold.analysis import mode_notes
+from starhold.analysis import mode_notes, validity_notes
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.mode_notes import Modal, Wanted
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
@@ -43,6 +43,7 @@ MEASURES: dict[str, Measure] = {
     "peak_torque": Measure("peak torque", "N m", "largest torque component"),
     "effort": Measure("effort", "N m s", "integral of |u| over the run"),
     "limit_share": Measure("on limit", "%", "share of the time with the command, or a wheel's motor, on its limit", 100.0),
+    "invalid_share": Measure("not valid", "%", "share of the time without a valid estimate", 100.0, False),
     "chatter": Measure("chatter", "N m", "mean change of torque between samples, last quarter of the run"),
     "final_attitude_error": Measure("final angle", "mdeg", "largest angle to the target, last quarter", 180e3 / np.pi),
     "final_rate_error": Measure("final rate", "mdeg/s", "largest relative rate, last quarter", 180e3 / np.pi),
@@ -98,7 +99,7 @@ class Noted(NamedTuple):
     momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; there the
     first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what
     extras need; of a window the largest squares of half the angle's sine, of the rate error and of the torque; and notes on
-    modes."""
+    modes, and on whether the estimate is valid."""
 
     attitude_outside: float
     rate_outside: float
@@ -119,6 +120,7 @@ class Noted(NamedTuple):
     window_rate: float
     window_torque: float
     modal: Modal | tuple[()]
+    validity: Any
 
 
 def make_meter(
@@ -132,6 +134,7 @@ def make_meter(
     every: int = 1,
     still: bool = False,
     wheels: bool = False,
+    estimated: bool = False,
     begins: Mapping[str, int] = MappingProxyType({}),
     fault: tuple[float, ...] = (),
 ) -> Meter:
@@ -139,8 +142,8 @@ def make_meter(
 
     limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
     that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
-    rest; wheels: the body has some; begins: modes whose first begin is noted, counted from 1, by the names of their metrics;
-    fault: the instant of the first fault, as `Wanted` has it."""
+    rest; wheels: the body has some; estimated: an estimator says whether it is valid; begins: modes whose first begin is
+    noted, counted from 1, by the names of their metrics; fault: the instant of the first fault, as `Wanted` has it."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
@@ -161,6 +164,7 @@ def make_meter(
         0.0,
         0.0,
         modal,
+        validity_notes.begun(estimated),
     )
     first, tail = Noted(*begun), tail_start(steps)
     angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2
@@ -175,6 +179,7 @@ def make_meter(
     table = (
         _table(rows, period, every, wheels)
         | mode_notes.table(tuple(begins), rows.modal, wanted, period)
+        | validity_notes.table(rows.validity, period)
         | {name: Metric("rad", "apart", (row,)) for name, row in zip(cones, rows.cones, strict=True)}
     )
     for name, row, unit in zip(PEAKS, (rows.window_angle, rows.window_rate), ("rad", "rad/s"), strict=True):
@@ -219,11 +224,13 @@ def recorded_meter(
     rate_tolerance: float,
     cones: Mapping[str, Cone] | None = None,
     wheels: bool = False,
+    estimated: bool = False,
 ) -> Meter:
     """Return the meter of a recording of so many samples less one, at intervals of `every` control periods (s); with cones,
     even an empty mapping, the meter for requirements."""
     tolerances = attitude_tolerance, rate_tolerance
-    meter = make_meter(steps, period * every, limit, tolerances, EXTRAS, cones or {}, every=every, wheels=wheels)
+    there: Any = {"every": every, "wheels": wheels, "estimated": estimated}
+    meter = make_meter(steps, period * every, limit, tolerances, EXTRAS, cones or {}, **there)
     table = {name: metric for name, metric in meter.table.items() if cones is not None or name not in OF_CAMPAIGNS}
     # Notes of the last quarter are not read before it, so one kernel serves all samples.
     return replace(meter, table=table, notes=(meter.notes[1],) * 2)
@@ -237,7 +244,7 @@ def measure(
     for a run that did not diverge. cones: those of requirements, whose metrics are added; None: no requirement."""
     attrs = run.attrs
     given = attrs["control_period"], int(attrs["record_every"]), attrs["limit"]
-    more = cones, "wheel_momentum" in run.arrays
+    more = cones, "wheel_momentum" in run.arrays, validity_notes.column_of(run.arrays) is not None
     meter = recorded_meter(len(run["time"]) - 1, *given, attitude_tolerance, rate_tolerance, *more)
     return meter.of_recording(run, float(attrs["torque_limit"]))
 
@@ -287,6 +294,7 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             maximum(seen.window_rate, rate_square),
             maximum(seen.window_torque, torque_square),
             mode_notes.noted(seen.modal, quantities, now, bounds.modal),
+            validity_notes.noted(seen.validity, quantities, now, bounds.last),
         )
 
     return note
@@ -319,7 +327,8 @@ AGAINST_LIMITS = {
     **dict.fromkeys(("peak_acceleration", "peak_accelerations", "acceleration_limit"), "rad/s^2"),
 }
 """Further metrics of a transient, with their units."""
-UNITS = {"diverged_at": "s", **make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True).units, **AGAINST_LIMITS, **COSTS}
+_ALL = make_meter(0, 1.0, "none", (0.0, 0.0), EXTRAS, wheels=True, estimated=True)
+UNITS = {"diverged_at": "s", **_ALL.units, **AGAINST_LIMITS, **COSTS}
 """The metrics with their units, SI."""
 METRICS = MetricSet(MEASURES, ("settling_time", "final_attitude_error", "effort"), units=UNITS)
 """The order of ranking: settled before unsettled, then sooner, then more accurate, then with less effort."""

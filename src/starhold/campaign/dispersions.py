@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.scenario.assumed import is_assumed
 from starhold.scenario.checking import read_toml
 from starhold.scenario.distribution import Array, Distribution
 from starhold.scenario.key_reading import KeyReading, Numbers, components
@@ -166,7 +167,7 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
         key, path = reading.place.key, reading.place.path
         name = str(path[0])
         modelled = name in body.modelled or (name in body.designed and _designs(tables) and key not in scenario.table.shared)
-        computed = name == "part" and scenario.parts[int(path[1])].part.is_known(str(path[2]))
+        computed = name == "part" and _is_known(scenario, tables["part"], int(path[1]), str(path[2]))
         if computed and not table.known_to_law:
             raise reading.place.refuse("known_to_law", "false", "true, because laws compute their commands with this number")
         if name == "fault" and table.known_to_law:
@@ -183,6 +184,11 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
         if modelled and (name in given or not table.known_to_law):
             nominal[name] = given.get(name, tables.get(name, {}))
     return nominal
+
+
+def _is_known(scenario: Scenario, tables: Any, place: int, key: str) -> bool:
+    """Return whether laws, or an estimator, compute with a number of a part."""
+    return scenario.parts[place].part.is_known(key) or is_assumed(scenario.parts, tables, place, key)
 
 
 def _designs(tables: Mapping[str, Any]) -> bool:

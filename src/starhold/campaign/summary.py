@@ -123,8 +123,8 @@ def _verdict(store: Store, job: Job, law: str, requirement: Requirement, until_d
 
 def _knowledge(job: Job, law: str) -> str:
     """State which drawn values the law knows; empty where it never knows any number of its craft."""
-    clauses: dict[str, list[str]] = {"assumes the file's own": [], "is told each drawn": []}
-    clauses |= {"learns at the diagnosis each drawn": [], "never learns": []}
+    clauses: dict[str, list[str]] = {"assumes the file's value of": [], "knows each drawn value of": []}
+    clauses |= {"learns at the diagnosis each drawn value of": [], "never learns the drawn value of": []}
     supposed, known, learnt, missed = clauses.values()
     for one in job.dispersions:
         if one.distribution.known_to_law or not one.known:

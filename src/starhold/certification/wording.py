@@ -153,9 +153,7 @@ def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
         most["hysteresis"] = 2.0 * math.acos(-min(subject["hysteresis_width"], 1.0)) * (1.0 + 1e-15)
     if _even(subject) or turn >= most.get(subject["quaternion_sign"], 2.0 * math.pi):
         return "rest at every attitude"
-    return (
-        f"rest at every attitude told by the shorter of its quaternions, and by the longer up to {angle(turn, more)} of 360°"
-    )
+    return f"rest at every attitude by the shorter rotation, and by the longer one up to {angle(turn, more)} of 360°"
 
 
 def unclaimed(subject: Mapping[str, Any]) -> str:

@@ -12,11 +12,13 @@ import numpy as np
 from starhold.algebra.circular import nearest
 from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quaternion import Quaternion, normalise, to_reference
+from starhold.algebra.quaternion import multiply as turned
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.several import each
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, clip_axes, diagonal, multiply, scale
 from starhold.parts.contract import Parameter
+from starhold.parts.random import Dice
 
 Turn: TypeAlias = Quaternion | tuple[()]
 Axes: TypeAlias = Matrix | tuple[()]
@@ -34,6 +36,8 @@ AXES = Parameter(
     shape=(3, 3), text="errors of its axes: of their scales on the diagonal, beside it those of non-orthogonal ones"
 )
 """The declaration of errors of a sensor's axes, common to all sensors."""
+JITTER = Parameter("s", at_least=0.0, text="deviation of the instant at which it is read from the control instant")
+"""The declaration of sampling jitter, common to sensors that see the attitude."""
 
 
 def resolution(unit: str) -> Parameter:
@@ -91,6 +95,14 @@ def shown(vector: Vector, step: Step, most: Scalar) -> Vector:
 
 def _in_steps(step: Scalar, x: Scalar) -> Scalar:
     return step * nearest(x / step)
+
+
+def when_read(state: Any, jitter: Step, dice: Dice, place: int) -> Any:
+    """The state with the attitude of the instant at which a sensor is read, to which the body turns at a constant rate."""
+    if not jitter:
+        return state
+    half = scale(0.5 * jitter[0] * dice.normals(place, 1)[0], state.rate)
+    return state._replace(attitude=normalise(turned(state.attitude, (1.0, *half))))
 
 
 def stretch(axes: Axes) -> float:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.analysis.meter import stays_within
 from starhold.analysis.rigid_body import DECADES, acceleration, error_angle
+from starhold.analysis.validity_notes import column_of
 from starhold.parts.bodies import rigid_body
 from starhold.parts.effectors import wheels
 from starhold.report.plots import (
@@ -61,6 +62,8 @@ class AttitudePlots:
     other parts record."""
     marks: tuple[Mark, ...] = ()
     """When faults happen and are acted on, and modes begin (s)."""
+    shaded: tuple[tuple[float, float], ...] = ()
+    """From when to when the estimate of a law is not valid (s)."""
 
 
 def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: float = math.inf) -> AttitudePlots:
@@ -95,6 +98,7 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario, end: flo
             *recorded_plots(flights, factor, KNOWN, readers_of(scenario)),
         ),
         tuple(mark for mark in (*map(Mark, fault_times(scenario)), *begun(flights)) if mark.time <= end),
+        unsure(flights),
     )
 
 
@@ -106,6 +110,18 @@ def begun(flights: Sequence[Flight]) -> list[Mark]:
         for name, modes in of.items()
         for one in modes[:MOST_MARKS]
     ]
+
+
+def unsure(flights: Sequence[Flight]) -> tuple[tuple[float, float], ...]:
+    """List from when to when (s) the estimate of a law is not valid; of one that goes to and fro, the first few times."""
+    spans = dict[tuple[float, float], None]()
+    for run in (flight.recording for flight in flights):
+        name = column_of(run.arrays)
+        bad = run[name] < 0.5 if name else np.zeros(len(run["time"]), bool)
+        turns = np.flatnonzero(np.diff(np.r_[False, bad, False]))[: 2 * MOST_MARKS]
+        ends = np.r_[run["time"], run["time"][-1]]
+        spans |= dict.fromkeys((float(ends[a]), float(ends[b])) for a, b in turns.reshape(-1, 2))
+    return tuple(spans)
 
 
 def readers_of(scenario: Scenario) -> tuple[str, ...]:

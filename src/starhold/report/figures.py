@@ -35,8 +35,8 @@ def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
         return [save(make(), folder / f"{key}.png") for key, make in list(what.items())[part]]
 
 
-def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str) -> Any:
-    """A figure of panels over one time axis."""
+def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str, shaded: Any = ()) -> Any:
+    """A figure of panels over one time axis, grey where the estimate is not valid."""
     count = len(plot.panels)
     end = max(float(times[-1]), 1e-9)
     rows = word_rows(marks, end)
@@ -59,6 +59,11 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
             axis.yaxis.get_offset_text().set_size(8.5)
         for level in panel.levels:
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
+        for first, last in shaded:
+            axis.axvspan(first, last, color="0.5", alpha=0.15, linewidth=0.0)
+            if axis is axes[0]:
+                words = axis.get_xaxis_transform()
+                axis.text(first, 0.98, " estimate not valid", transform=words, va="top", size=7.5, color="0.3", clip_on=True)
         for mark in marks:
             axis.axvline(mark.time, color="0.2", linewidth=0.9, linestyle=":")
             if mark in rows and axis is axes[0]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from starhold.algebra.structure import flatten
 from starhold.analysis.rigid_body import recorded_meter
+from starhold.analysis.validity_notes import column_of
 from starhold.certification.assumptions import standing
 from starhold.laws.interface import Gain
 from starhold.report.answer import columns_list, facts, key_metrics, lost_alarm, proofs, ranking, verdicts
@@ -144,7 +145,8 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
     """Return the equations of the metrics of a law's flights; numbers that a slider or the duration changes go by name."""
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
-    meter = recorded_meter(0, law.period, every, limit, settling.attitude_tolerance, settling.rate_tolerance)
+    tolerances, estimated = (settling.attitude_tolerance, settling.rate_tolerance), column_of(run.arrays) is not None
+    meter = recorded_meter(0, law.period, every, limit, *tolerances, estimated=estimated)
     program = meter.program(tuple((name, run[name].shape[1:]) for name, _ in law.columns), 0.0)
     known = {
         "memories": [memory.name for memory in program.memories],

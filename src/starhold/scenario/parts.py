@@ -21,6 +21,7 @@ from starhold.parts.contract import CLOCK
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
+from starhold.scenario.assumed import with_assumed
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.csv_files import csv_lines, number_in
 from starhold.scenario.schema import columns
@@ -71,7 +72,7 @@ def read_parts(
         read = read_part(cast(dict[str, Any], data), body, folder, where, key, shared, units)
         taken = {fitted.name for fitted in collected}
         collected.append(replace(read, name=free_name(read.name or None, read.part.name, taken, where, key)))
-    return tuple(collected)
+    return with_assumed(collected, tables)
 
 
 def read_part(

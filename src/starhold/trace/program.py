@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import Any, NamedTuple, TypeAlias
 
 from starhold.algebra.operations import Operation
@@ -119,12 +120,15 @@ class Program(NamedTuple):
 
 def statements(block: Block) -> Iterator[Any]:
     """Yield all statements of a block and of those within it, but not of the functions it calls."""
-    for s in block:
-        yield s
-        if isinstance(s, Loop):
-            yield from statements(s.head)
-        if isinstance(s, (Loop, Branch)):
-            yield from statements(s.body)
+    blocks = [iter(block)]
+    while blocks:
+        for s in blocks[-1]:
+            yield s
+            if isinstance(s, (Loop, Branch)):
+                blocks.append(chain(s.head, s.body) if isinstance(s, Loop) else iter(s.body))
+                break
+        else:
+            blocks.pop()
 
 
 def reads(block: Block) -> Iterator[Value]:
@@ -152,11 +156,9 @@ def prune(block: Block, outs: Iterable[Value]) -> tuple[Block, dict[str, Value]]
     their values; and the values that stand for their names now."""
     wanted, names = set(outs), dict[str, Value]()
     # A loop within may show that a slot of the loop round it never changes either.
-    while True:
+    while any(_settles(slot) for s in statements(block) if isinstance(s, Loop) for slot in s.slots):
         settled: dict[str, Value] = {}
         block = _settled(block, settled)
-        if not settled:
-            break
         wanted = {renamed(out, settled) for out in wanted}
         names = {name: renamed(value, settled) for name, value in names.items()} | settled
     return pruned(block, live_names(block, wanted)), names
@@ -186,9 +188,8 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
     for s in block:
         if isinstance(s, Loop):
             slots = [slot._replace(before=renamed(slot.before, names)) for slot in s.slots]
-            # Each turn hands this slot on as it is.
             for slot in slots:
-                if slot.after == slot.name or (not isinstance(slot.after, str) and _same(slot.after, slot.before)):
+                if _settles(slot):
                     names[slot.name] = names[slot.end] = slot.before
             head, body = _settled(s.head, names), _settled(s.body, names)
             kept = tuple(slot._replace(after=renamed(slot.after, names)) for slot in slots if slot.end not in names)
@@ -205,32 +206,34 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
     return tuple(result)
 
 
-def _same(a: Value, b: Value) -> bool:
-    return type(a) is type(b) and repr(a) == repr(b)
+def _settles(slot: Slot) -> bool:
+    """Return whether each turn hands a slot on as it is."""
+    after, before = slot.after, slot.before
+    return after == slot.name or (not isinstance(after, str) and type(after) is type(before) and repr(after) == repr(before))
 
 
 def live_names(block: Block, outs: Iterable[Value]) -> set[Value]:
     """Return what is read for the sake of the outs, or of what is written."""
-    names, before = set(outs), -1
-    # Backwards, so that chains of reads are mostly found at once.
-    order = [*statements(block)][::-1]
-    acts = {id(s): writes((s,)) for s in order if isinstance(s, (Loop, Branch, Call))}
-    while before != (before := len(names)):
-        left: list[Any] = []
-        for s in order:
-            if isinstance(s, Loop):
-                slots = [slot for slot in s.slots if {slot.name, slot.end} & names]
-                if slots or acts[id(s)]:
-                    names.update((s.most, s.done, *(x for slot in slots for x in (slot.before, slot.after))))
-                left.append(s)
-            elif isinstance(s, Branch):
-                if acts[id(s)]:
-                    names.add(s.truth)
-            elif isinstance(s, Store) or acts.get(id(s)) or any(ref in names for ref in _refs(s)):
-                names.update(reads((s,)))
-            else:
-                left.append(s)
-        order = left
+    makers, names, todo = dict[Value, tuple[Value, ...]](), set[Value](), [*outs]
+    for s in statements(block):
+        if isinstance(s, Loop):
+            for slot in s.slots:
+                makers[slot.name] = makers[slot.end] = (s.most, s.done, slot.before, slot.after)
+            if writes((s,)):
+                todo += (s.most, s.done)
+        elif isinstance(s, Branch):
+            if writes((s,)):
+                todo.append(s.truth)
+        elif isinstance(s, Store) or (isinstance(s, Call) and writes((s,))):
+            todo += reads((s,))
+        else:
+            read = (s.index,) if isinstance(s, Load) else s.args
+            makers.update((ref, read) for ref in _refs(s))
+    while todo:
+        name = todo.pop()
+        if name not in names:
+            names.add(name)
+            todo += makers.get(name, ())
     return names
 
 

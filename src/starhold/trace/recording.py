@@ -48,6 +48,27 @@ MARK = "\u241e"
 _CONSTANTS = {NUMBER: (float, int), TRUTH: (bool,), WORD: (int,), INDEX: (int,), STATIC: (int,)}
 
 
+_SHORTENED = frozenset(("both", "either", "same_index", "index_plus", "index_minus", "index_product"))
+"""Operations that a known value may decide."""
+
+
+def _shortened(name: str, values: tuple[Any, ...], refs: list[Value]) -> Any:
+    """Return what an operation gives where a known value decides it; None where none does."""
+    if name in ("both", "either"):
+        known = next((value for value in values if isinstance(value, bool)), None)
+        if known is None:
+            return None
+        other = values[1] if values[0] is known else values[0]
+        return other if known is (name == "both") else known
+    if name == "same_index":
+        return True if refs[0] == refs[1] else None
+    if name == "index_product":
+        return None if 1 not in refs else values[0] if refs[1] == 1 else values[1]
+    if refs[1] == 0:
+        return values[0]
+    return values[1] if name == "index_plus" and refs[0] == 0 else None
+
+
 def _ref(value: Any) -> Value:
     return value.ref if isinstance(value, Handle) else value
 
@@ -155,30 +176,20 @@ class Recorder:
         if operation.name == "number_of" and kind_of(values[0]) == NUMBER:
             # A count that is kept from step to step is a number already.
             return values[0]
+        refs = list[Value]()
         for value, kind in zip(values, operation.takes, strict=True):
-            fits = value.kind == kind if isinstance(value, Handle) else isinstance(value, _CONSTANTS.get(kind, ()))
-            if not fits or (isinstance(value, bool) and kind != TRUTH):
+            if isinstance(value, Handle):
+                fits, ref = value.kind == kind, value.ref
+            else:
+                fits, ref = isinstance(value, _CONSTANTS.get(kind, ())) and (type(value) is not bool or kind == TRUTH), value
+            if not fits:
                 self._unfit(operation, value, kind)
-        # A truth that is known decides.
-        if operation.name in ("both", "either"):
-            known = next((value for value in values if isinstance(value, bool)), None)
-            if known is not None:
-                other = values[1] if values[0] is known else values[0]
-                return other if known is (operation.name == "both") else known
-        refs = tuple(
-            float(value) if kind == NUMBER and not isinstance(value, Handle) else _ref(value)
-            for value, kind in zip(values, operation.takes, strict=True)
-        )
-        if operation.name == "same_index" and refs[0] == refs[1]:
-            return True
-        if operation.name in ("index_plus", "index_minus") and refs[1] == 0:
-            return values[0]
-        if operation.name == "index_plus" and refs[0] == 0:
-            return values[1]
-        if operation.name == "index_product" and 1 in refs:
-            return values[0] if refs[1] == 1 else values[1]
-        key: Any = (operation.name, *((type(r), repr(r)) for r in refs))
-        return self._once(key, lambda ref: Op(ref, operation, refs), operation.gives)
+            refs.append(float(ref) if kind == NUMBER and type(ref) is not str else ref)
+        if operation.name in _SHORTENED and (known := _shortened(operation.name, values, refs)) is not None:
+            return known
+        # Equal constants of two types, or of two signs, are not the same.
+        key: Any = (operation.name, *(r if type(r) is str else (type(r), repr(r)) for r in refs))
+        return self._once(key, lambda ref: Op(ref, operation, tuple(refs)), operation.gives)
 
     def _unfit(self, operation: Operation, value: Any, kind: str) -> NoReturn:
         if value is ABSENT:

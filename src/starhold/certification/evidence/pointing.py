@@ -36,8 +36,10 @@ linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
 
 POINTS = "points"
-ANGLES = (175, 150, 120, 90, 60, 45, 30, 20, 10)
+ANGLES = (175, 150, 120, 90, 60, 45, 30, 20, 15, 10)
 """The initial rotations (deg) from which convergence is attempted."""
+RATES = (5, 3, 2, 1, 0.5)
+"""The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
 LEAST = 1e-6
 """The deflection (rad) of a spring as stiff as the law under the least external torque that is considered."""
 HEED = 0.5
@@ -205,12 +207,13 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
         begun = loop.loop.without("sensor", "estimator")
         shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
         rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
-        tried = [(list(map(radians, ANGLES)), rate, limits) for limits in (loop.limits, {}) for rate in rates]
+        angles, beyond = list(map(radians, ANGLES)), list(map(radians, RATES))
+        tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
         kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
     else:
         turn, rate = (float(Fraction(like.get(f"start.{name}", like.get(name, 0)))) for name in ("angle", "rate"))
-        tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like})]
+        tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, [])]
         kinds = [SHARE in like]
     for noisy in kinds:
         own = pushes(loop.loop, loop.known.envelope(noisy))
@@ -265,11 +268,17 @@ class Pushed:
         """Return the claim with its numbers, and its evidence except that about noise."""
         return self.loop.claim(POINTS, self.words, V, **told) | {"evidence": self.evidence | evidence}
 
-    def find_largest(self, angles: list[float], rate: float, limits: dict[str, float]) -> bool:
-        """Find the claim from the largest possible of these rotations, which are in decreasing order."""
+    def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
+        """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
+        a start that moves; both are in decreasing order."""
         # A start within a smaller set is also within the larger one.
         first = bisect_left(angles, True, key=lambda angle: self.begun(angle, rate, limits) is not None)
-        return any(self.find(angle, rate, limits) for angle in angles[first:])
+        faster = [one for one in beyond if one > rate > 0.0]
+        for angle in angles[first:]:
+            place = bisect_left(faster, True, key=lambda one: self.begun(angle, one, limits) is not None)
+            if any(self.find(angle, one, limits) for one in (*faster[place : place + 1], rate)):
+                return True
+        return False
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
         """Return the claim's numbers of the start set, and a chain from there for each lean of V; None, and the reason in

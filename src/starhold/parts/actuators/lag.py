@@ -13,7 +13,7 @@ CARD = Card(
     title="First-order lag",
     summary="lag u' + u = command, each component of u' within the rate limit",
     sources=("Spacecraft Dynamics and Control (1997)",),
-    assumptions=("starts from what acts",),
+    assumptions=("starts from the applied torque",),
 )
 ROLE = "actuator"
 BODY = ""

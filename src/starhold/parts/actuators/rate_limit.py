@@ -12,7 +12,7 @@ CARD = Card(
     title="Rate limit",
     summary="u moves to the command along a straight line, each component of u' within the limit",
     sources=("Spacecraft Dynamics and Control (1997)",),
-    assumptions=("starts from what acts",),
+    assumptions=("starts from the applied torque",),
 )
 ROLE = "actuator"
 BODY = ""

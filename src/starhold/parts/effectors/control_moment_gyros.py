@@ -51,7 +51,7 @@ CARD = Card(
         "Analytical Mechanics of Space Systems (2018): variable-speed control moment gyros",
     ),
     assumptions=(
-        "balanced rotors, rigid bearings without friction",
+        "balanced rotors, rigid frictionless bearings",
         "the craft's inertia is that of the whole with every gimbal at angle zero and rotors that stand still in it",
         "steering knows the body's rate, angles and speeds without error, and acts all the time",
         "the gimbals' servo makes up for the moment that the turning body has on them, within the motors' limits",

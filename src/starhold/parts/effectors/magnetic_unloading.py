@@ -19,7 +19,7 @@ CARD = Card(
     sources=(magnetic_field.SOURCE, "Spacecraft Dynamics and Control (1997): momentum unloading, cross-product law"),
     assumptions=(
         *magnetorquers.CARD.assumptions[:-1],
-        "no law knows of its torque, which wheels take up as they hold the attitude",
+        "its torque is unknown to all laws; the wheels absorb it as they hold the attitude",
         "momentum along the field stays until the field has turned",
     ),
 )

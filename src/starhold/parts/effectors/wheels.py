@@ -32,7 +32,7 @@ CARD = Card(
     title="Reaction wheels",
     summary="h' = motor torque - friction about each spin axis; the body feels -sum a h' - w x sum a h",
     sources=("published study of control by reaction wheels with the largest degree of stability",),
-    assumptions=("rotors balanced but for what is stated", "rigid bearings"),
+    assumptions=("rotors balanced except as stated", "rigid bearings"),
 )
 ROLE = "effector"
 TABLE = "wheels"

@@ -15,7 +15,7 @@ CARD = Card(
     title="Constant torque",
     summary="M = constant",
     sources=("definition",),
-    assumptions=("no law knows of it",),
+    assumptions=("unknown to all laws",),
 )
 ROLE = "environment"
 

@@ -29,7 +29,7 @@ CARD = Card(
         "plates do not shade one another",
         "density and direction of the wind are held for a control period",
         "the torque alone: the orbit does not decay by it",
-        "no law knows of it",
+        "unknown to all laws",
     ),
 )
 ROLE = "environment"

@@ -19,7 +19,7 @@ CARD = Card(
     assumptions=(
         *magnetic_field.ASSUMPTIONS,
         "the field in inertial axes is held for a control period",
-        "no law knows of it",
+        "unknown to all laws",
     ),
 )
 ROLE = "environment"

@@ -27,7 +27,7 @@ CARD = Card(
         "the light is held for a control period",
         "the torque alone: the orbit is not pushed by it",
         "no light from the Earth",
-        "no law knows of it",
+        "unknown to all laws",
     ),
 )
 ROLE = "environment"

@@ -20,7 +20,7 @@ CARD = Card(
     title="Torque from a table",
     summary="M(t) along straight lines between the rows of a table, none before the first and after the last",
     sources=("definition",),
-    assumptions=("no law knows of it", "held for a control period at its value at the start"),
+    assumptions=("unknown to all laws", "held for a control period at its value at the start"),
 )
 ROLE = "environment"
 Row: TypeAlias = tuple[float, float, float, float]

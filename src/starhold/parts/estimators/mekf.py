@@ -13,7 +13,7 @@ from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, renormalise
 from starhold.algebra.rotation import short_turn
-from starhold.algebra.scalar import Scalar, Truth, both, less, less_equal, maximum, sqrt, where
+from starhold.algebra.scalar import Scalar, Truth, both, less, less_equal, maximum, where
 from starhold.algebra.structure import chosen
 from starhold.algebra.structured import when
 from starhold.algebra.vector import (
@@ -36,6 +36,7 @@ from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
 from starhold.parts.boresight import unit_boresight
 from starhold.parts.contract import Card, Noise, Parameter, Recursion
+from starhold.parts.covariance import GYRO_BIAS, GYRO_NOISE, GYRO_WALK, carried, deviations, summed, symmetric
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
@@ -57,6 +58,7 @@ CARD = Card(
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 SEVERAL = {"attitude": "more_trackers"}
+ASSUMES = {"attitude": ("cross", "roll", "boresight")}
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO, "is_valid": 0.0}
 HOUR = 3600.0
 MOST = 100_000
@@ -70,21 +72,18 @@ Tracker: TypeAlias = tuple[float, float, float, float, float]
 class Params(NamedTuple):
     """The noise of gyro and star tracker that the filter assumes, in the terms of those sensors."""
 
-    noise: Annotated[
-        float, Parameter("rad/s", also="rad/sqrt(s)", at_least=0.0, text="of the gyro: deviation of the mean over a second")
-    ]
-    bias_walk: Annotated[
-        float,
-        Parameter("rad/s", also="rad/s/sqrt(h)", at_least=0.0, text="of the gyro: deviation of the bias's change in 1 h"),
-    ]
-    bias: Annotated[float, Parameter("rad/s", above=0.0, text="of the gyro: deviation of the bias at the start")]
-    cross: Annotated[float, Parameter("rad", above=0.0, text="of the star tracker: deviation across the boresight")]
-    roll: Annotated[float, Parameter("rad", above=0.0, text="of the star tracker: deviation about the boresight")]
-    boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="of the star tracker, body axes")] = (
-        0.0,
-        0.0,
-        1.0,
-    )
+    noise: Annotated[float, GYRO_NOISE]
+    bias_walk: Annotated[float, GYRO_WALK]
+    bias: Annotated[float, GYRO_BIAS]
+    cross: Annotated[
+        float, Parameter("rad", above=0.0, text="of the star tracker: deviation across the boresight; its own if absent")
+    ] = math.inf
+    roll: Annotated[
+        float, Parameter("rad", above=0.0, text="of the star tracker: deviation about the boresight; its own if absent")
+    ] = math.inf
+    boresight: Annotated[
+        Vector, Parameter("1", shape=(3,), spread=False, text="of the star tracker, body axes; its own if absent")
+    ] = (0.0, 0.0, 1.0)
     start: Annotated[Quaternion, START] = NO_TURN
     start_deviation: Annotated[
         float, Parameter("rad", above=0.0, text="of that attitude: deviation about each axis; 76 deg if nothing is known")
@@ -97,7 +96,7 @@ class Params(NamedTuple):
         Parameter(
             "rad, rad, 1, 1, 1",
             columns=("cross", "roll", "x", "y", "z"),
-            text="a row for each star tracker after the first, in their order: its deviations and boresight",
+            text="a row for each star tracker after the first: its deviations and boresight; theirs if absent",
         ),
     ] = ()
 
@@ -171,11 +170,11 @@ class Instant(NamedTuple):
 
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a control step. ValueError for a boresight without direction, a start that is no quaternion, or a
-    further tracker without noise."""
-    trackers = [spread_of(params.cross, params.roll, params.boresight)]
-    for cross, roll, *boresight in params.more_trackers:
-        if not min(cross, roll) > 0.0:
-            raise ValueError("the deviations of more_trackers must be above 0")
+    tracker without noise."""
+    trackers: list[Matrix] = []
+    for cross, roll, *boresight in ((params.cross, params.roll, *params.boresight), *params.more_trackers):
+        if not 0.0 < min(cross, roll) <= max(cross, roll) < math.inf:
+            raise ValueError("the deviations cross and roll of each star tracker must be above 0, here or in its own table")
         trackers.append(spread_of(cross, roll, cast(Vector, tuple(boresight))))
     # The rate between two readings is their mean: each turns the attitude by its noise for half a period, and so does the
     # step of the bias between them.
@@ -288,11 +287,7 @@ def propagated(memory: Memory, rate: Vector, params: Numbers, period: Scalar) ->
     """The estimate a control period on: the rate between the gyro's two readings is their mean."""
     mean = subtract(scale(0.5, add(memory.rate, rate)), memory.bias)
     turn, axes, drift = turned(mean, period)
-    mixed = summed(product(axes, memory.mixed), product(drift, memory.walk))
-    spread = summed(
-        product(summed(product(axes, memory.turn), product(drift, transpose(memory.mixed))), transpose(axes)),
-        product(mixed, transpose(drift)),
-    )
+    spread, mixed = carried(memory.turn, memory.mixed, memory.walk, axes, drift)
     return memory._replace(
         attitude=renormalise(multiply(memory.attitude, turn)),
         turn=symmetric(combine(1.0, spread, params.reading + params.turned, IDENTITY)),
@@ -327,21 +322,21 @@ def recursion(params: Params, noise: Noise, period: float, rate: Vector) -> Recu
     (_, axes, drift), reading, walk = turned(rate, period), noise.rate, noise.walk
     known = -2.0 * numbers.reading / period
 
-    def carried(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
+    def drifted(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         (turn, bias, last), now, walked = errors, scale(reading, random[0]), scale(walk, random[1])
         mean = subtract(scale(0.5, add(add(last, now), walked)), bias)
         ahead, bias = subtract(apply(axes, turn), apply(drift, mean)), subtract(bias, walked)
         return (ahead, bias, now), ahead, subtract(now, bias)
 
     def corrected(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
-        (ahead, bias, now), *_ = carried(errors, random)
+        (ahead, bias, now), *_ = drifted(errors, random)
         deviation = subtract(reduce(add, map(apply, seen, random[2:])), ahead)
         bias = add(bias, apply(gain.bias, deviation))
         rate = subtract(subtract(now, bias), scale(known, apply(gain.sure, deviation)))
         kept = (add(ahead, apply(gain.ahead, deviation)), bias, now)
         return kept, add(ahead, apply(gain.turn, deviation)), rate
 
-    return Recursion(corrected, carried, noise.every, 3, 2 + len(seen))
+    return Recursion(corrected, drifted, noise.every, 3, 2 + len(seen))
 
 
 @cache
@@ -358,22 +353,6 @@ def settled(params: Numbers, every: int, rate: Vector, period: float) -> Gains |
             return gain
         before = gain
     return None
-
-
-def summed(a: Matrix, b: Matrix) -> Matrix:
-    """Return a + b."""
-    return combine(1.0, a, 1.0, b)
-
-
-def symmetric(a: Matrix) -> Matrix:
-    """Return the mean of a matrix and its transpose, which differ by rounding."""
-    x, y, z = 0.5 * (a[0][1] + a[1][0]), 0.5 * (a[0][2] + a[2][0]), 0.5 * (a[1][2] + a[2][1])
-    return ((a[0][0], x, y), (x, a[1][1], z), (y, z, a[2][2]))
-
-
-def deviations(a: Matrix) -> Vector:
-    """Return the square roots of the diagonal."""
-    return (sqrt(a[0][0]), sqrt(a[1][1]), sqrt(a[2][2]))
 
 
 def examples() -> list[Params]:

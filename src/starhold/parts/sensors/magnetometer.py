@@ -48,11 +48,12 @@ class Params(NamedTuple):
     axis_errors: Annotated[Matrix | Vector, as_built.AXES] = ZERO
     resolution: Annotated[float, as_built.resolution("T")] = 0.0
     limit: Annotated[float, as_built.limit("T")] = math.inf
+    jitter: Annotated[float, as_built.JITTER] = 0.0
 
 
 class Numbers(NamedTuple):
     """Deviation and bias (T), the scale factor, the field, and the outage (control steps); () or its axes, its step (T),
-    and its limit (T)."""
+    its limit (T), and the jitter of its instants (s)."""
 
     noise: Scalar
     bias: Vector
@@ -62,6 +63,7 @@ class Numbers(NamedTuple):
     axes: as_built.Axes = ()
     step: as_built.Step = ()
     limit: tuple[Scalar, ...] = ()
+    jitter: as_built.Step = ()
 
 
 class Reading(NamedTuple):
@@ -83,6 +85,7 @@ def prepare(params: Params, period: float) -> Numbers:
         as_built.axes_of(params.mounting_error, params.axis_errors),
         as_built.step_of(params.resolution),
         (params.limit,) if params.limit < math.inf else (),
+        as_built.step_of(params.jitter),
     )
 
 
@@ -93,6 +96,7 @@ def remember(params: Numbers, state: Any) -> Vector:
 
 def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Vector]:
     """The field at this control step, or in an outage the last one before it."""
+    state = as_built.when_read(state, params.jitter, dice, 3)
     true = magnetic_field.field_at(state.position, step, params.field)
     seen = as_built.along(params.axes, to_body(state.attitude, true))
     shown = add(add(scale(params.factor, seen), params.bias), dice.vector(0, params.noise))
@@ -105,7 +109,7 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
 
 def error(params: Params) -> Errors:
     """The largest error beside noise and without outages, wherever there is no ground."""
-    if params.outage != NEVER or params.limit < math.inf:
+    if params.outage != NEVER or params.limit < math.inf or as_built.is_given(params.jitter):
         return UNBOUNDED
     skewed = as_built.stretch(as_built.axes_of(params.mounting_error, params.axis_errors))
     share = abs(params.scale_error) * (1.0 + skewed) + skewed

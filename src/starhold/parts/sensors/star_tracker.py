@@ -55,13 +55,14 @@ class Params(NamedTuple):
         float, Parameter("rad/s", above=0.0, text="above which stars smear and there is no reading; none if absent")
     ] = math.inf
     epoch: Annotated[Date, EPOCH] = START
+    jitter: Annotated[float, as_built.JITTER] = 0.0
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
 
 
 class Numbers(NamedTuple):
     """Deviations (rad), the unit vector of the boresight, control steps from update to update, those of the delay, and those
-    of the outage; the cones that blind, the squared rate limit (rad2/s2), and the turn of its mounting, () for
-    none."""
+    of the outage; the cones that blind, the squared rate limit (rad2/s2), the turn of its mounting, and the jitter of its
+    instants (s), () for none."""
 
     cross: Scalar
     roll: Scalar
@@ -72,6 +73,7 @@ class Numbers(NamedTuple):
     cones: blinding.Cones | tuple[()] = ()
     square: tuple[Scalar, ...] = ()
     mounted: as_built.Turn = ()
+    jitter: as_built.Step = ()
 
 
 class Memory(NamedTuple):
@@ -109,6 +111,7 @@ def prepare(params: Params, period: float) -> Numbers:
         blinding.prepared(looks, params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, period),
         (params.rate_limit * params.rate_limit,) if params.rate_limit < math.inf else (),
         mounted,
+        as_built.step_of(params.jitter),
     )
 
 
@@ -124,6 +127,7 @@ def remember(params: Numbers, state: Any) -> Memory:
 
 def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Memory]:
     """The last update, a new one where it is due."""
+    state = as_built.when_read(state, params.jitter, dice, 3)
     seen = memory.waiting[-1] if params.late else state.attitude
     due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
     if params.cones:
@@ -147,7 +151,7 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
 def error(params: Params) -> Errors:
     """That of the mounting where an attitude is there as it is; what the craft turns until it comes has no bound."""
     silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
-    if params.delay or silent or params.rate_limit < math.inf:
+    if params.delay or as_built.is_given(params.jitter) or silent or params.rate_limit < math.inf:
         return UNBOUNDED
     return NO_ERRORS._replace(attitude=math.hypot(*params.mounting_error))
 

@@ -50,11 +50,12 @@ class Params(NamedTuple):
     epoch: Annotated[Date, EPOCH] = START
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    jitter: Annotated[float, as_built.JITTER] = 0.0
 
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the Sun, the control
-    period (s), and the outage (control steps); () or its axes."""
+    period (s), and the outage (control steps); () or its axes, and the jitter of its instants (s)."""
 
     noise: Scalar
     boresight: Vector
@@ -63,6 +64,7 @@ class Numbers(NamedTuple):
     period: Scalar
     outage: Window
     axes: as_built.Axes = ()
+    jitter: as_built.Step = ()
 
 
 class Reading(NamedTuple):
@@ -78,12 +80,15 @@ def prepare(params: Params, period: float) -> Numbers:
     outage = in_steps(params.outage, period)
     axes = as_built.axes_of(params.mounting_error, ZERO)
     boresight = unit_boresight(params.boresight)
-    return Numbers(params.noise, boresight, cosine, sun.prepared(params.epoch), period, outage, axes)
+    return Numbers(
+        params.noise, boresight, cosine, sun.prepared(params.epoch), period, outage, axes, as_built.step_of(params.jitter)
+    )
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The Sun at this control step."""
     seen = sun.sun(number_of(step) * params.period, params.sun)
+    state = as_built.when_read(state, params.jitter, dice, 3)
     toward = as_built.along(params.axes, to_body(state.attitude, seen.direction))
     inside = less_equal(params.cosine, dot(toward, params.boresight))
     lit = less(0.5, sun.in_view(state.position, seen))

@@ -22,7 +22,7 @@ CARD = Card(
     assumptions=(
         *sun.ASSUMPTIONS,
         "two-body motion",
-        "the Sun stands beside the line through craft and Earth: near it the yaw turns without bound",
+        "the Sun is off the line through craft and Earth: near that line the yaw rate is unbounded",
     ),
 )
 ROLE = "target"

@@ -136,6 +136,14 @@ function guides(panel, plot, chart) {
       const high = u.valToPos(level, "y", true);
       line([bbox.left, high], [right, high], [6, 4]);
     }
+    // A strip below where the estimate is not valid, in the flight of the file.
+    ctx.fillStyle = colours.soft;
+    for (const [start, end] of chart.live ? [] : report.unsure || []) {
+      const [from, to] = [Math.max(start, x.min), Math.min(end, x.max)].map((time) => u.valToPos(time, "x", true));
+      if (to <= from || plot.split) continue;
+      ctx.fillRect(from, bbox.top + bbox.height - 4 * dot, to - from, 4 * dot);
+      ctx.fillText("estimate not valid", from + 3 * dot, bbox.top + bbox.height - 7 * dot);
+    }
     // What is proved is about the flight of the file.
     for (const [number, times, most] of chart.live ? [] : panel.bounds || []) {
       if (hidden.has(number)) continue;

@@ -60,12 +60,13 @@ def picture(flights: Sequence[Flight], scenario: Scenario) -> Picture:
     """Draw the attitude over time, the steps to an accuracy, and angle and torque of a short transient alone."""
     plots, shown, name = collect(flights, POINTS, scenario), without_runs(flights), scenario.name
     drawn = (plots.scalar, plots.attitude, plots.rate, plots.torque, plots.angle, plots.roll_pitch_yaw, *plots.further)
-    figures: Picture = {plot.name: partial(over_time, plot, plots.times, plots.marks, shown, name) for plot in drawn}
+    more = plots.marks, shown, name, plots.shaded
+    figures: Picture = {plot.name: partial(over_time, plot, plots.times, *more) for plot in drawn}
     if (end := early(flights)) is not None:
         first = collect(until(flights, end), POINTS, scenario, end)
         for plot in (first.angle, first.torque):
             cut = replace(plot, title=f"{plot.title}, transient")
-            figures[f"{plot.name}-transient"] = partial(over_time, cut, first.times, first.marks, shown, name)
+            figures[f"{plot.name}-transient"] = partial(over_time, cut, first.times, first.marks, shown, name, first.shaded)
     return figures | {"accuracy": partial(_accuracy_figure, shown, name)}
 
 
@@ -77,7 +78,7 @@ def page(flights: Sequence[Flight], scenario: Scenario) -> PageParts:
     plots, end = collect(flights, PAGE_POINTS, scenario), early(flights)
     scene = _scene(scenario, flights)
     data = {"times": rounded(plots.times), "plots": [*_drawn(plots, flights, scenario), _accuracy(flights)]}
-    data |= {"scene": scene, **_happenings(scenario, flights)}
+    data |= {"scene": scene, "unsure": plots.shaded, **_happenings(scenario, flights)}
     longest = max(len(flight.recording["time"]) for flight in flights)
     sampling = Sampling(thinning(longest, PAGE_POINTS))
     if end is not None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, final
 
 from starhold.algebra.quantity import Quantity
-from starhold.analysis.meter import recorded_of
+from starhold.analysis.meter import recorded_of, says_valid
 from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
@@ -83,8 +83,9 @@ class RigidBodyStudy(BodyStudy):
         tolerances = settling.attitude_tolerance, settling.rate_tolerance
         steps, still = scenario.table.simulation.steps, loop.target.part.flag("STILL")
         wheels = "wheel_momentum" in recorded_of(loop)
-        modal: Any = {"begins": begins_asked(scenario, loop.law), "fault": first_fault(scenario, loop)}
-        return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **modal)
+        more: Any = {"begins": begins_asked(scenario, loop.law), "fault": first_fault(scenario, loop)}
+        more["estimated"] = says_valid(loop.composition())
+        return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **more)
 
     def metric_set(self, run: Recording) -> MetricSet:
         return METRICS

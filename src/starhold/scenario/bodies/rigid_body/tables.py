@@ -90,7 +90,7 @@ class Spacecraft(Table):
     """The body and its actuators."""
 
     inertia: Annotated[Any, *INERTIA]
-    torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, text="largest torque"))] = math.inf
+    torque_limit: Annotated[float, *quantity(Gain("N m", above=0.0, plain=(1e3, "mN m"), text="largest torque"))] = math.inf
     limit: Annotated[
         Literal["axis", "norm", "none"], Field(description="whether the limit holds for each axis, the norm, or not at all")
     ] = "axis"
@@ -119,11 +119,10 @@ class Pointing(Table):
 class Initial(Pointing):
     """Attitude and rate at the start, in the inertial frame or relative to the target."""
 
-    rate: Annotated[Any, *quantity(Gain("rad/s", shape=(3,), spread=False, text="angular velocity, body axes"))] = (
-        0.0,
-        0.0,
-        0.0,
-    )
+    rate: Annotated[
+        Any,
+        *quantity(Gain("rad/s", shape=(3,), spread=False, plain=(math.tau, "deg/s"), text="angular velocity, body axes")),
+    ] = (0.0, 0.0, 0.0)
     relative_to: Annotated[Literal["inertial", "target"], Field(description="what attitude and rate are relative to")] = (
         "inertial"
     )
@@ -153,7 +152,9 @@ class Environment(Table):
     """External torques."""
 
     gravity_gradient: Annotated[Flag, Field(description="gravity-gradient torque; laws know it")] = False
-    torque_noise: Annotated[float, *quantity(Gain("N m", at_least=0.0, text="standard deviation per axis and step"))] = 0.0
+    torque_noise: Annotated[
+        float, *quantity(Gain("N m", at_least=0.0, plain=(10.0, "mN m"), text="standard deviation per axis and step"))
+    ] = 0.0
 
 
 class Sensor(Table):
@@ -197,9 +198,12 @@ class Rotor(Table):
     coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
     momentum: Annotated[float, *quantity(Gain("N m s", text="at the start"))] = 0.0
     top_speed: Annotated[
-        float | None, *quantity(Gain("rad/s", above=0.0, text='in place of momentum_limit, such as "6000 rpm"'))
+        float | None,
+        *quantity(Gain("rad/s", above=0.0, plain=(2e3, "rpm"), text='in place of momentum_limit, such as "6000 rpm"')),
     ] = None
-    speed: Annotated[float | None, *quantity(Gain("rad/s", text="at the start in place of momentum, body at rest"))] = None
+    speed: Annotated[
+        float | None, *quantity(Gain("rad/s", plain=(2e3, "rpm"), text="at the start in place of momentum, body at rest"))
+    ] = None
     static_friction: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="largest, of a slow rotor"))] = None
     stribeck_speed: Annotated[
         float | None, *quantity(Gain("rad/s", above=0.0, text="at which friction is largest, the static one"))
