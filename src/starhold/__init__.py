@@ -1,3 +1,4 @@
+# ruff: noqa: F403, F405
 """starhold designs, certifies, flies and compares control laws for spacecraft.
 
 import starhold as sh
@@ -28,37 +29,8 @@ from typing import TYPE_CHECKING, Any
 from starhold.version import __version__
 
 if TYPE_CHECKING:
-    from starhold.api import (
-        budget,
-        campaign,
-        certify,
-        compare,
-        design,
-        environment,
-        export_aem,
-        export_c,
-        export_oem,
-        export_requirements,
-        failures,
-        invariant,
-        linearise,
-        load,
-        margins,
-        metrics,
-        modal_roots,
-        place,
-        read_aem,
-        read_oem,
-        reproduce,
-        review,
-        serve,
-        simulate,
-        stepper,
-        steppers,
-        sweep,
-        to_pandas,
-        verify,
-    )
+    # The functions below, for those who read types.
+    from starhold.api import *
     from starhold.api import make_scenario as scenario
     from starhold.errors import InputError
 

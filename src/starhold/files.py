@@ -3,11 +3,13 @@
 import atexit
 import errno
 import os
+import re
 import shutil
 import tempfile
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from starhold.errors import InputError
 
@@ -78,6 +80,20 @@ def atomic_write(path: Path) -> Generator[Path]:
     finally:
         if hidden is not None:
             shutil.rmtree(hidden, ignore_errors=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text in UTF-8, with the same line ends on every system; whole, as `atomic_write`."""
+    with atomic_write(path) as hidden:
+        hidden.write_text(text, encoding="utf-8", newline="\n")
+
+
+def filled(package: str, template: str, values: Mapping[str, Any]) -> str:
+    """Return the text of a template of a package with values in place of each @KEY@."""
+    from importlib import resources
+
+    text = (resources.files(package) / "templates" / f"{template}.txt").read_text(encoding="utf-8")
+    return re.sub(r"@(\w+)@", lambda match: str(values.get(match[1], match[0])), text)
 
 
 def passing_folder(purpose: str) -> str:

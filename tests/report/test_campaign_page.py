@@ -9,7 +9,8 @@ import pytest
 
 from starhold.campaign.results import CampaignResult, LawResult
 from starhold.campaign.verdicts import judge, percent
-from starhold.report.campaign_page import envelopes, histograms, render, write_page
+from starhold.files import write_text
+from starhold.report.campaign_page import envelopes, histograms, render
 from starhold.report.campaign_units import Wording, count_text, figure, headline
 from tests.browser import Browser
 from tests.report import flown
@@ -50,7 +51,7 @@ def test_the_same_results_give_the_same_bytes_whatever_the_time_took(tmp_path: A
     paths = [tmp_path / name for name in ("one.html", "two.html")]
     slow = replace(whole(), seconds=4711.5, flown=17)
     for path, campaign in zip(paths, (whole(), slow), strict=True):
-        write_page(path, flown.scenario("detumbling"), campaign)
+        write_text(path, render(flown.scenario("detumbling"), campaign))
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from starhold.report.page import write_page
+from starhold.files import write_text
+from starhold.report.page import render
 from starhold.scenario.reading import Scenario, load, parse
 from starhold.studies import compare as studies
 from tests.browser import Browser
@@ -42,7 +43,9 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def written(scenario: Scenario, path: Path) -> Path:
     entries = scenario.laws
-    write_page(path, scenario, [studies.fly_law(scenario, entry, studies.build(scenario, entry)) for entry in entries])
+    write_text(
+        path, render(scenario, [studies.fly_law(scenario, entry, studies.build(scenario, entry)) for entry in entries])
+    )
     return path
 
 

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from starhold.analysis.rigid_body import METRICS
+from starhold.files import write_text
 from starhold.report.answer import key_metrics
 from starhold.report.body import Sampling
-from starhold.report.page import living_data, render, write_page
+from starhold.report.page import living_data, render
 from starhold.scenario.reading import Scenario, builtin_text, load, parse
 from starhold.studies import compare as studies
 from starhold.studies.flight import Flight
@@ -43,7 +44,7 @@ def fly(scenario: Scenario, prove: bool = False) -> list[Flight]:
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("living") / "report.html"
     scenario = parse(flown.text(), "short")
-    write_page(path, scenario, fly(scenario, prove=True))
+    write_text(path, render(scenario, fly(scenario, prove=True)))
     return path
 
 

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from starhold.analysis.rigid_body import MEASURES, METRICS
+from starhold.files import write_text
 from starhold.parts.craft import check_inertia
 from starhold.report.attitude_plots import closest_limit
 from starhold.report.bodies.rigid_body import _box
-from starhold.report.page import render, write_page
+from starhold.report.page import render
 from starhold.report.settings import settings
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
@@ -195,9 +196,9 @@ def test_names_from_files_are_no_markup() -> None:
 
 def test_equal_flights_give_equal_bytes(tmp_path: Path, page: str, station: str) -> None:
     path, scenario = tmp_path / "report.html", flown.told("l2-deficit")
-    write_page(path, flown.scenario(), flown.flights())
+    write_text(path, render(flown.scenario(), flown.flights()))
     assert path.read_bytes() == page.encode()
-    write_page(path, scenario, compare(scenario))
+    write_text(path, render(scenario, compare(scenario)))
     assert path.read_bytes() == station.encode()
 
 

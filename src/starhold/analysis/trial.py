@@ -77,7 +77,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     level = min(4.0 * top, math.inf if level is None else level)
     free, states = _paced(free, certificate, draw(flights, height, level, random), random)
     highest, torque = 0.0, 0.0
-    for batch, share in _falling(free, certificate, claim, states, _value(free, programs), 1e-15 * top):
+    for batch, share in falling(free, certificate, claim, states, _value(free, programs), 1e-15 * top):
         highest = max(highest, share)
         if _limited(claim):
             torque = max(torque, _need(batch.states, loop, claim))
@@ -91,24 +91,22 @@ def _limited(claim: Claim) -> bool:
     return not claim.numbers.keys().isdisjoint(("motors", "limit"))
 
 
-def _falling(
+def falling(
     free: ClosedLoop, certificate: Certificate, claim: Claim, states: Array, value: Height, floor: float
 ) -> Generator[tuple[Batch, float]]:
     """Return the flights leg by leg, with the largest V as a share of that a leg before; BrokenClaimError where one
-    increases by more than a small part of it and `floor`."""
-    before = value(states)
+    diverges, or its V increases by more than a small part of it and `floor`."""
+    before, rows = value(states), free.body.module.ROWS
     for steps in LEGS:
         batch = simulate_many(free, states, steps)
         if (batch.lost_at >= 0.0).any():
-            raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(batch.lost_at >= 0.0)), "is lost"))
+            raise _broken(certificate, claim, states, int(np.argmax(batch.lost_at >= 0.0)), "is lost", rows)
         states, after = batch.states, value(batch.states)
-        shares = after / np.maximum(before, 1e-300)
+        shares = after / np.maximum(before, max(floor, 1e-300))
         rising = after > before * (1.0 + SLACK) + floor
         if rising.any():
             lane = int(np.argmax(shares * rising))
-            raise BrokenClaimError(
-                _where(certificate, claim, states, lane, f"has V = {after[lane]:g} after {before[lane]:g}")
-            )
+            raise _broken(certificate, claim, states, lane, f"has V = {after[lane]:g} after {before[lane]:g}", rows)
         before = after
         yield batch, float(shares.max())
 
@@ -143,10 +141,10 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
         states, s, after = batch.states, s_of(batch.states), height(batch.states)
         rising = (after > before * (1.0 + SLACK)) & (np.linalg.norm(s, axis=0) > chatter)
         if (batch.lost_at >= 0.0).any() or rising.any():
-            raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(rising)), "leaves the surface"))
+            raise _broken(certificate, claim, states, int(np.argmax(rising)), "leaves the surface")
         highest, before = max(highest, float((after / np.maximum(before, 0.5 * least * chatter**2)).max())), after
     if (np.linalg.norm(s, axis=0) > chatter).any():
-        raise BrokenClaimError(_where(certificate, claim, states, int(np.argmax(before)), "has not reached the surface"))
+        raise _broken(certificate, claim, states, int(np.argmax(before)), "has not reached the surface")
     return Trial(flights, level, highest, None)
 
 
@@ -345,6 +343,9 @@ def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
     return float(size.max()) / loop.craft.torque_limit
 
 
-def _where(certificate: Certificate, claim: Claim, states: Array, lane: int, what: str) -> str:
-    shown = ", ".join(f"{x:.9g}" for x in states[: ROWS.rate.stop, lane])
-    return f"{certificate.name}, {claim.kind}: the flight at (q, w) = ({shown}) {what}"
+def _broken(
+    certificate: Certificate, claim: Claim, states: Array, lane: int, what: str, rows: Any = ROWS
+) -> BrokenClaimError:
+    # A state begins with what its motion is known by.
+    shown = ", ".join(f"{x:.9g}" for x in states[: rows[1].stop, lane])
+    return BrokenClaimError(f"{certificate.name}, {claim.kind}: the flight at ({shown}) {what}")

@@ -118,7 +118,7 @@ def rerun(
     from starhold.campaign.again import fly_again
     from starhold.cli.console import console
     from starhold.cli.show import print_outcome, print_results
-    from starhold.files import atomic_write
+    from starhold.files import write_text
     from starhold.report.painter import Painter
     from starhold.report.results import open_folder, write_results, write_run
 
@@ -126,21 +126,16 @@ def rerun(
     flight, scenario = again.flight, again.scenario
     place = open_folder(output or Path("results") / f"{scenario.name}-{flight.name}-{run}", force)
     write_run(flight.recording, place / "run.nc")
-    with atomic_write(place / "scenario.toml") as hidden:
-        hidden.write_text(scenario.text, encoding="utf-8")
+    write_text(place / "scenario.toml", scenario.text)
     print_outcome([flight])
     with Painter(scenario, [flight], place, pictures is Drawn.ALL) as painter:
         page = write_results(scenario, [flight], place, pictures is not Drawn.NONE)
-        unpainted = painter.finish()
-    if again.differs:
-        names = ", ".join(again.differs[:4])
-        console.print(
-            f"[red]Other bits than in the campaign; another machine may have flown it: {names}[/red]", soft_wrap=True
-        )
-    else:
-        console.print("The same bits as in the campaign.")
-    print_results(page)
-    if unpainted is not None:
-        raise unpainted
+        said = "The same bits as in the campaign."
+        if again.differs:
+            names = ", ".join(again.differs[:4])
+            said = f"[red]Other bits than in the campaign; another machine may have flown it: {names}[/red]"
+        console.print(said, soft_wrap=True)
+        print_results(page)
+        painter.finish()
     if flight.lost is not None:
         raise typer.Exit(DIVERGED)

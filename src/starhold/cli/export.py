@@ -98,15 +98,14 @@ def link(
 ) -> None:
     """Write a C header with the messages of `starhold serve` and the layout of a scenario's measurements."""
     from starhold.cli.console import console
-    from starhold.files import atomic_write
+    from starhold.files import write_text
     from starhold.link.header import header
     from starhold.scenario.building import build
     from starhold.scenario.reading import load
 
     _refuse_present(output, force)
     scenario = load(file)
-    with atomic_write(output) as hidden:
-        hidden.write_text(header(build(scenario, scenario.pick(law)), scenario.name), encoding="utf-8")
+    write_text(output, header(build(scenario, scenario.pick(law)), scenario.name))
     console.print(f"{output}", soft_wrap=True)
 
 

@@ -163,11 +163,8 @@ def _fly(
             from starhold.cli.show_certificates import print_proved
 
             print_proved(flights)
-        page = write_results(scenario, flights, folder, pictures is not Drawn.NONE)
-        unpainted = painter.finish()
-    print_results(page)
-    if unpainted is not None:
-        raise unpainted
+        print_results(write_results(scenario, flights, folder, pictures is not Drawn.NONE))
+        painter.finish()
     return flights
 
 
@@ -215,7 +212,7 @@ def new(
 ) -> None:
     """Write a commented scenario file that runs as it is."""
     from starhold.cli.console import console
-    from starhold.files import atomic_write
+    from starhold.files import write_text
     from starhold.scenario.reading import builtin_names, builtin_text, nearest
     from starhold.scenario.writing import template_text
 
@@ -234,11 +231,9 @@ def new(
         text = f"#:schema ./{beside.name}\n{text}"
     if path.exists() and not force:
         raise InputError(str(path), "", "a file that exists", "another name, or --force")
-    with atomic_write(path) as hidden:
-        hidden.write_text(text, encoding="utf-8")
+    write_text(path, text)
     if schema:
-        with atomic_write(beside) as hidden:
-            hidden.write_text(_schema_text(), encoding="utf-8")
+        write_text(beside, _schema_text())
     console.print(f"Wrote {path}. Try: starhold compare {path}", soft_wrap=True)
 
 

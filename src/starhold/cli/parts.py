@@ -10,7 +10,7 @@ import typer
 
 from starhold.cli.arguments import FAILED_CHECK
 from starhold.errors import InputError
-from starhold.report.commands import Block, Column, Heading, Table
+from starhold.report.commands import Block, Column, Heading, Table, coloured
 
 if TYPE_CHECKING:
     from starhold.laws.catalogue import Law
@@ -96,8 +96,7 @@ def check_part(
     examined, failed = _find(part), 0
     for verdict in examine(examined) if isinstance(examined, Law) else examine_part(examined):
         failed += verdict.outcome == "failed"
-        colour = {"passed": "green", "failed": "red", "does not apply": "dim"}[verdict.outcome]
-        console.print(f"[{colour}]{verdict.outcome:>14}[/{colour}]  {escape(verdict.name)}")
+        console.print(f"{coloured(verdict.outcome, f'{verdict.outcome:>14}')}  {escape(verdict.name)}")
         if verdict.reason:
             console.print(f"{'':16}{verdict.reason}", markup=False)
     if failed:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,9 +12,6 @@ import typer
 from starhold.cli.arguments import FAILED_CHECK, Force, ReproductionOutput
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from concurrent.futures import Future
-
     from starhold.publications.reproduction import Reproduction
 
 LONGEST_FIRST = "BEDCA"
@@ -46,8 +42,9 @@ def reproduce(
 
 def _make(letters: list[str], folder: Path, processes: int | None) -> list[Reproduction]:
     """Reproduce the publications, each in its own process, and return them in order."""
-    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
     from multiprocessing import get_context
+    from threading import Thread
 
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -56,38 +53,30 @@ def _make(letters: list[str], folder: Path, processes: int | None) -> list[Repro
     context = get_context("spawn")
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     count = min(processes or os.cpu_count() or 1, len(letters))
-    queue: Any = context.Queue()
+    queue: Any = context.SimpleQueue()
     with (
         Progress(*columns, console=console) as bars,
         ProcessPoolExecutor(count, context, initializer=_begin, initargs=(queue,)) as pool,
     ):
         tasks = {letter: bars.add_task(letter, total=None) for letter in letters}
         futures = {letter: pool.submit(_work, letter, folder) for letter in sorted(letters, key=LONGEST_FIRST.index)}
+
+        def show() -> None:
+            for letter, done, whole in iter(queue.get, None):
+                bars.update(tasks[letter], completed=done, total=whole)
+
+        shower = Thread(target=show, daemon=True)
+        shower.start()
         try:
-            _watch(
-                set(futures.values()),
-                queue,
-                lambda letter, done, whole: bars.update(tasks[letter], completed=done, total=whole),
-            )
+            for future in wait(futures.values(), return_when=FIRST_EXCEPTION).done:
+                future.result()
         except BaseException:
             for process in list((pool._processes or {}).values()):
                 process.kill()
             raise
+        queue.put(None)
+        shower.join()
         return [futures[letter].result() for letter in letters]
-
-
-def _watch(left: set[Future[Any]], queue: Any, show: Callable[[str, int, int], None]) -> None:
-    """Show their progress until all are done, or one has failed."""
-    from concurrent.futures import FIRST_COMPLETED, wait
-    from queue import Empty
-
-    while left:
-        done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
-        with suppress(Empty):
-            while True:
-                show(*queue.get_nowait())
-        for future in done:
-            future.result()
 
 
 _queue: Any = None

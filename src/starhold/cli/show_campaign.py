@@ -16,12 +16,11 @@ from starhold.cli.show import print_rows, printable
 from starhold.errors import InputError
 from starhold.report.campaign_tables import Section, again, brackets, drivers, indices, metrics, verdicts
 from starhold.report.campaign_units import Wording, counted, figure, headline, outcome_of
-from starhold.report.commands import Cell
+from starhold.report.commands import Cell, coloured
 
 if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
 
-COLOURS = {"met": "green", "missed": "red", "not decided": "yellow"}
 METRICS, DRIVERS, AGAIN = 8, 4, 3
 """How many metrics, drivers of each kind and runs of a law are printed; the page lists all."""
 
@@ -110,5 +109,4 @@ def _print(section: Section | None, columns: int | None = None, with_note: bool 
 def marked(cell: Any) -> str:
     """Return text without markup or terminal control characters; outcomes are coloured."""
     text = escape(printable(f"{cell}"))
-    colour = COLOURS.get(cell.kind, "") if isinstance(cell, Cell) else ""
-    return f"[{colour}]{text}[/{colour}]" if colour else text
+    return coloured(cell.kind if isinstance(cell, Cell) else "", text)

@@ -25,7 +25,7 @@ from starhold.certification.wording import (
 )
 from starhold.cli.console import console
 from starhold.cli.show import print_rows, printable
-from starhold.report.commands import Column
+from starhold.report.commands import Column, coloured
 from starhold.report.commands import Table as Rows
 
 if TYPE_CHECKING:
@@ -36,15 +36,6 @@ if TYPE_CHECKING:
 
 LONGEST = 1_000
 """The most characters of a text from a file that are printed."""
-COLOURS = {
-    "proved": "green",
-    "refuted": "red",
-    "undecided": "yellow",
-    "holds": "green",
-    "fails": "red",
-    "not checked": "yellow",
-    "not claimed": "dim",
-}
 
 
 def print_certificate(tried: Tried, why: bool = False) -> None:
@@ -52,7 +43,7 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
     once, and why a claim is not proved. why: also how each was shown, and all assumptions."""
     certificate, trial, inside = tried
     subject = certificate.subject
-    console.print(f"[bold]{_safe(certificate.name)}[/bold]: {_coloured(certificate.outcome)}")
+    console.print(f"[bold]{_safe(certificate.name)}[/bold]: {coloured(certificate.outcome)}")
     if not certificate.claims:
         console.print(f"  no claim: {_safe(unclaimed(subject))}")
     for heading, claims in grouped(certificate).items():
@@ -61,7 +52,7 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
         for claim in claims:
             how = f" [dim]({methods(claim)})[/dim]" if why else ""
             text = _safe(statement(claim, subject))
-            table.add_row(f"  {_coloured(claim.outcome)}", HEADINGS[claim.kind], text + how)
+            table.add_row(f"  {coloured(claim.outcome)}", HEADINGS[claim.kind], text + how)
             if why and "eigenvalues" in claim.numbers:
                 table.add_row("", "", f"[dim]eigenvalues {eigenvalues(claim)}[/dim]")
             for line in reasons(claim):
@@ -100,11 +91,11 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
     """At most three rows about a certificate: its first claim, the names of the others, and the bounds of the flight."""
     claims, name = ranked(certificate), certificate.name
     if not claims:
-        yield name, _coloured("undecided"), "no claim"
+        yield name, coloured("undecided"), "no claim"
         return
     first, *others = strongest(claims)
     covered = coverage(first, certificate.subject)
-    yield name, _coloured(first.outcome), statement(first, certificate.subject) + (f" ({covered})" if covered else "")
+    yield name, coloured(first.outcome), statement(first, certificate.subject) + (f" ({covered})" if covered else "")
     named: dict[str, list[str]] = {}
     for claim in others:
         named.setdefault(claim.outcome, []).append(HEADINGS[claim.kind])
@@ -164,7 +155,7 @@ def print_findings(findings: Sequence[Finding]) -> None:
         verdicts = {finding.verdict for finding in group}
         worst = next(v for v in ("fails", "not checked", "not claimed", "holds") if v in verdicts)
         obligations = ", ".join(f.obligation for f in group if f.obligation)
-        rows.append([_safe(name), _safe(claim), _safe(obligations), _coloured(worst)])
+        rows.append([_safe(name), _safe(claim), _safe(obligations), coloured(worst)])
     print_rows(Rows([*map(Column, ("certificate", "claim", "obligations", "verdict"))], rows))
     failed = [finding for finding in findings if finding.verdict == "fails"]
     for f in failed:
@@ -185,7 +176,3 @@ def _safe(text: str) -> str:
     """Return text from a file in printable form: no markup, no terminal control characters, no broken character."""
     plain = printable(text)
     return escape(plain if len(plain) <= LONGEST else f"{plain[:LONGEST]} …")
-
-
-def _coloured(outcome: str) -> str:
-    return f"[{COLOURS[outcome]}]{outcome}[/{COLOURS[outcome]}]"

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import conjugate, multiply
 from starhold.errors import InputError
-from starhold.files import atomic_write, read_text
+from starhold.files import read_text, write_text
 from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, days_of, precession
 
 Version = Literal["1.0", "2.0"]
@@ -137,8 +137,7 @@ def write_message(path: Path, version: str, metadata: list[str], rows: list[str]
     """Write a message of one segment. InputError where the file cannot be written."""
     made = [f"CREATION_DATE = {datetime.now(UTC):%Y-%m-%dT%H:%M:%S}", "ORIGINATOR = STARHOLD"]
     lines = [version, *made, "", "META_START", *metadata, "META_STOP", "", *rows, ""]
-    with atomic_write(path) as hidden:
-        hidden.write_text("\n".join(lines), encoding="ascii", newline="\n")
+    write_text(path, "\n".join(lines))
 
 
 def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str) -> _Message:

@@ -16,7 +16,7 @@ from starhold.export.code import Code
 from starhold.export.shells import filled
 from starhold.export.source import UNPROVED, Proof, texts
 from starhold.export.vectors import selftest_rows, vectors
-from starhold.files import atomic_write
+from starhold.files import atomic_write, write_text
 from starhold.trace.program import Call, statements
 from starhold.version import __version__
 
@@ -140,5 +140,4 @@ def write(exported: Exported, folder: Path, scenario: str, law: str) -> None:
         "measured": [cost._asdict() for cost in exported.costs],
         "files": list(exported.files),
     }
-    with atomic_write(folder / MANIFEST) as hidden:
-        hidden.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    write_text(folder / MANIFEST, json.dumps(content, indent=2) + "\n")

@@ -5,9 +5,9 @@ import re
 import uuid
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
-from importlib import resources
 from typing import Any
 
+from starhold import files
 from starhold.errors import InputError
 from starhold.export.code import Code
 from starhold.export.law import numbers
@@ -46,10 +46,7 @@ def filled(template: str, code: Code, **more: Any) -> dict[str, str]:
         "STATES": kept,
         **more,
     }
-    text = (resources.files("starhold.export") / "templates" / f"{template}.txt").read_text(encoding="utf-8")
-    for key, value in values.items():
-        text = text.replace(f"@{key}@", str(value))
-    parts = re.split(r"^==> (.*)\n", text, flags=re.MULTILINE)
+    parts = re.split(r"^==> (.*)\n", files.filled("starhold.export", template, values), flags=re.MULTILINE)
     return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
@@ -88,7 +85,7 @@ def _fmu(code: Code) -> dict[str, bytes]:
     listed = [f'    <Float64 name="{name}" valueReference="{k}" {role}/>' for k, (name, role) in enumerate(roles, 1)]
     text = texts(code, "", code.flight.loop.law.name)
     ends = [(kind, k) for kind in ("Output", "InitialUnknown") for k in range(1 + len(inputs), 1 + len(roles))]
-    files = filled(
+    made = filled(
         "fmu",
         code,
         VERSION=__version__,
@@ -97,14 +94,14 @@ def _fmu(code: Code) -> dict[str, bytes]:
         VARIABLES="\n".join(listed),
         STRUCTURE="\n".join(f'    <{kind} valueReference="{k}"/>' for kind, k in ends),
     )
-    files["sources/fmi.c"] = re.sub(r"^@REFUSED@ (\S+)\((.*)\)(.*)$", _refused, files["sources/fmi.c"], flags=re.MULTILINE)
-    files |= {f"sources/{code.name}.c": text.source, f"sources/{code.name}.h": text.header}
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
+    made["sources/fmi.c"] = re.sub(r"^@REFUSED@ (\S+)\((.*)\)(.*)$", _refused, made["sources/fmi.c"], flags=re.MULTILINE)
+    made |= {f"sources/{code.name}.c": text.source, f"sources/{code.name}.h": text.header}
+    archived = io.BytesIO()
+    with zipfile.ZipFile(archived, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in made.items():
             # Always the same bytes.
             archive.writestr(zipfile.ZipInfo(name, (2000, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
-    return {f"{code.name}.fmu": made.getvalue()}
+    return {f"{code.name}.fmu": archived.getvalue()}
 
 
 def _process(code: Code) -> dict[str, str]:
@@ -119,8 +116,8 @@ def _process(code: Code) -> dict[str, str]:
         begin = next(one.first for wanted in known for one in layout.fields if f"{one.name}.".startswith(f"{wanted}."))
         places += range(1 + begin, 1 + begin + len(numbers(value)))
     rows = [f"    {places[kept]}" for kept in kept_inputs(code)] or ["    0"]
-    files = filled("process", code, PLACES=",\n".join(rows), PLACED=len(rows))
-    return files | {HEADER: header(loop, loop.law.name)}
+    made = filled("process", code, PLACES=",\n".join(rows), PLACED=len(rows))
+    return made | {HEADER: header(loop, loop.law.name)}
 
 
 def _refused(match: re.Match[str]) -> str:
@@ -143,9 +140,9 @@ SHELLS: dict[str, Callable[[Code], Mapping[str, str | bytes]]] = {
 
 def shell_files(code: Code, shells: Iterable[str]) -> dict[str, str | bytes]:
     """Return the files of shells. InputError for an unknown one, and where a law does not fit one."""
-    files: dict[str, str | bytes] = {}
+    made: dict[str, str | bytes] = {}
     for shell in shells:
         if shell not in SHELLS:
             raise InputError("export c", "shell", shell, f"one of {', '.join(SHELLS)}")
-        files |= SHELLS[shell](code)
-    return files
+        made |= SHELLS[shell](code)
+    return made

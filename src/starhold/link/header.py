@@ -2,8 +2,8 @@
 
 import re
 import textwrap
-from importlib import resources
 
+from starhold.files import filled
 from starhold.link.layout import Layout
 from starhold.link.protocol import COMMANDS, HEAD, MAGIC, RULES, TAIL, VERSION, Kind
 from starhold.loop.closed_loop import ClosedLoop
@@ -38,10 +38,7 @@ def header(loop: ClosedLoop, scenario: str) -> str:
         "UNIT": getattr(loop.body.module, "TIME_UNIT", "s"),
         "PLACES": ",\n".join(f"    {place_name(name)} = {first} /* {size} */" for name, first, size in places),
     }
-    text = (resources.files("starhold.link") / "templates" / "starhold_link.txt").read_text(encoding="utf-8")
-    for key, value in values.items():
-        text = text.replace(f"@{key}@", str(value))
-    return text
+    return filled("starhold.link", "starhold_link", values)
 
 
 def _about(kind: Kind) -> str:

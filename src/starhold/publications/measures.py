@@ -2,13 +2,18 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from starhold.analysis.rigid_body import error_angle
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.verdicts import Finding
+
+CLOCKS = {"s": 1.0, "min": 60.0}
+"""Units of time of a figure (s)."""
 
 
 def metric(
@@ -54,3 +59,36 @@ def history(
         for place, number in enumerate(components or range(columns.shape[1]))
     ]
     return Figure([Panel(f"time, {desk.recording(file, law, changes).time_unit}", label, curves)])
+
+
+def histories(
+    desk: Desk, runs: Sequence[tuple[str, str]], until: float, clock: str = "s", levels: Sequence[float] = (), **what: Any
+) -> Figure:
+    """Draw a panel as `history` does for each of several flights, values held from sample to sample, with these levels."""
+    figures = {law: history(desk, file, law, until=until, **what) for file, law in runs}
+    panels: list[Panel] = []
+    for law, figure in figures.items():
+        curves = [replace(one, x=one.x / CLOCKS[clock], style="steps") for one in figure.panels[0].curves]
+        panels.append(replace(figure.panels[0], x_label=f"time, {clock}", curves=curves, title=law, levels=levels))
+    return Figure(panels, columns=2)
+
+
+def angles(
+    desk: Desk, runs: Mapping[str, Sequence[str]], until: float = math.inf, clock: str = "s", log: bool = False
+) -> Figure:
+    """The angle of rotation from the target over time, of several flights: file and law by their names."""
+    curves: list[Curve] = []
+    for name, (file, law) in runs.items():
+        time, error = samples(desk, file, law, "attitude_error", until)
+        curves.append(Curve(time / CLOCKS[clock], np.degrees(error_angle(error)), name))
+    return Figure([Panel(f"time, {clock}", "angle from the target, °", curves, log_y=log)])
+
+
+def bounded(desk: Desk, of: Mapping[str, Sequence[Any]], name: str, at_most: float = math.inf, unit: str = "") -> Finding:
+    """Tell for several flights, by names file, law and perhaps changes, whether a metric (SI) exists and is at most so
+    large."""
+    values = {case: desk.flight(*flight).metrics[name] for case, flight in of.items()}
+    shown = ", ".join(f"{case} {'none' if value is None else f'{value:.3g}'}" for case, value in values.items())
+    return Finding(
+        {case: value is not None and value <= at_most for case, value in values.items()}, f"{shown} {unit}".rstrip()
+    )

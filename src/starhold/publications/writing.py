@@ -9,7 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from starhold.files import atomic_write
+from starhold.files import write_text
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.paper import FigureItem, Paper, Section
 from starhold.publications.reproduction import Judged, Reproduction, reproduce
@@ -284,10 +284,10 @@ def _curve(axis: Any, curve: Curve, hue: str) -> None:
 def write_paper(letter: str, folder: Path, notice: Callable[[int, int], None] | None = None) -> Reproduction:
     """Make a publication and write its page and its files into `folder`, which exists."""
     made = reproduce(letter, notice)
-    _write(folder / f"{letter}.html", paper_page(made, {name: draw(figure) for name, figure in made.figures.items()}))
+    write_text(folder / f"{letter}.html", paper_page(made, {name: draw(figure) for name, figure in made.figures.items()}))
     (folder / letter).mkdir(exist_ok=True)
     for name, text in made.files.items():
-        _write(folder / letter / f"{name}.toml", text)
+        write_text(folder / letter / f"{name}.toml", text)
     return made
 
 
@@ -305,11 +305,6 @@ def write_index(made: Sequence[Reproduction], folder: Path) -> Path:
             for one in made
         },
     }
-    _write(folder / INDEX, index_page(made))
-    _write(folder / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=True) + "\n")
+    write_text(folder / INDEX, index_page(made))
+    write_text(folder / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False, allow_nan=True) + "\n")
     return folder / INDEX
-
-
-def _write(path: Path, text: str) -> None:
-    with atomic_write(path) as hidden:
-        hidden.write_text(text, encoding="utf-8", newline="\n")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from starhold.campaign.again import fly_again
 from starhold.campaign.verdicts import percent
-from starhold.files import atomic_write
+from starhold.files import write_text
 from starhold.report import campaign_tables as tables
 from starhold.report.campaign_tables import Section, drivers, indices, picture
 from starhold.report.campaign_units import Wording, count_text, flown_text, headings_of, headline, outcome_of, plain_measure
@@ -142,7 +142,8 @@ def _envelope(name: str, by_law: dict[int, Envelope], words: Wording) -> dict[st
     if len(known) and math.log10(float(known.max()) / float(known.min())) > DECADES:
         high = math.log10(float(known.max()))
         low = max(math.log10(float(known.min())), high - DEEPEST)
-        span, ticks = [round(low - 0.05 * (high - low), 4), round(high + 0.05 * (high - low), 4)], _ticks(high - low)
+        margin, ticks = 0.05 * (high - low), max(1, math.ceil((high - low) / 6.0))
+        span = [round(low - margin, 4), round(high + margin, 4)]
     return {
         "name": name,
         "title": measure.heading,
@@ -154,10 +155,6 @@ def _envelope(name: str, by_law: dict[int, Envelope], words: Wording) -> dict[st
         "ticks": ticks,
         "curves": curves,
     }
-
-
-def _ticks(decades: float) -> int:
-    return max(1, math.ceil(decades / 6.0))
 
 
 def _lines(envelope: Envelope) -> dict[str, NDArray[np.float64]]:
@@ -192,13 +189,8 @@ MOST_AGAIN, MOST_DRIVERS = 25, 10
 NBSP = "\N{NO-BREAK SPACE}"
 
 
-def write_page(path: Path, scenario: Scenario, result: CampaignResult) -> None:
-    """Write the report of a campaign as one HTML file; the same results give the same bytes."""
-    path.write_text(render(scenario, result), encoding="utf-8", newline="\n")
-
-
 def render(scenario: Scenario, result: CampaignResult) -> str:
-    """Make the report as HTML text; whatever comes from files is escaped."""
+    """Make the report of a campaign as HTML text: the same of the same results. Whatever comes from files is escaped."""
     words = Wording.of(scenario.body, result)
     spreads, over_time = histograms(result, words), envelopes(result, words)
     required = tables.verdicts(result, words)
@@ -345,6 +337,5 @@ def write_campaign(scenario: Scenario, result: CampaignResult) -> Path:
             flown = fly_again(result.folder, again.run, law.law)
             write_run(flown.flight.recording, result.folder / RECORDED / f"{law.law}-{again.run}.nc")
     page = result.folder / PAGE
-    with atomic_write(page) as hidden:
-        write_page(hidden, scenario, result)
+    write_text(page, render(scenario, result))
     return page

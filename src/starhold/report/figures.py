@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -34,13 +33,6 @@ def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
         # A name in a script that the font lacks is drawn as boxes; a warning would not help the user.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         return [save(make(), folder / f"{key}.png") for key, make in list(what.items())[part]]
-
-
-def warm_up() -> None:
-    """Make the plotting library load its fonts and file formats now, not at the first figure."""
-    figure, axes = blank(1, 1, 1.0, "", [], "", "")
-    axes[0].set_yscale("log")
-    figure.savefig(BytesIO())
 
 
 def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str, shaded: Any = ()) -> Any:

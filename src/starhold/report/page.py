@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -216,13 +215,8 @@ def _limit(flight: Flight) -> dict[str, Any]:
     return {"kind": attrs["limit"], "size": limit if np.isfinite(limit) else None}
 
 
-def write_page(path: Path, scenario: Scenario, flights: Sequence[Flight]) -> None:
-    """Write the report of a scenario's flights as one HTML file; the same flights give the same bytes."""
-    path.write_text(render(scenario, flights), encoding="utf-8", newline="\n")
-
-
 def render(scenario: Scenario, flights: Sequence[Flight]) -> str:
-    """Make the report as HTML text. All text from files is escaped."""
+    """Make the report of a scenario's flights as HTML text: the same of the same flights. All text from files is escaped."""
     parts = report_of(scenario.body).page(flights, scenario)
     living = "the page of this body has none" if parts.sampling is None else living_data(scenario, flights, parts.sampling)
     (lead, *plots), (required, counts) = parts.data["plots"], verdicts(scenario, flights)

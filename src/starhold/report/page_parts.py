@@ -20,7 +20,7 @@ from starhold.studies.flight import Flight
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
-POINTS = 1500
+PAGE_POINTS = 1500
 """The number of samples of a curve."""
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:"
 WITH_PLOTLY = ("planes.js", "campaign.js")
@@ -147,7 +147,7 @@ def views(flights: Sequence[Flight], frames: int, title: str, what: str, note: s
     )
 
 
-def over_time(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
+def over_time_data(plot: Plot, flights: Sequence[Flight]) -> dict[str, Any]:
     """Return the data of a plot over time for the script that draws it."""
     order = back_to_front(flights, plot)
     panels = [panel_data(panel, order, thin=plot.chatters) for panel in plot.panels]

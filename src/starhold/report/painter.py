@@ -4,117 +4,77 @@ from __future__ import annotations
 
 import gc
 import os
-import pickle
 import signal
-import subprocess
-import sys
+import traceback
 from collections.abc import Sequence
-from contextlib import suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
-from threading import Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.files import clear_unfinished
 from starhold.report.body import report_of
+from starhold.studies.timing import can_fork
 
 if TYPE_CHECKING:
+    from starhold.report.figures import Picture
     from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
 
-UNWRITABLE = 2
-"""The exit code where the files cannot be written; the reason is on standard error."""
+AT_ONCE = 2
 
 
 class Painter:
     """Processes that draw the figures of flights into `folder`, which exists; `finish` waits until they have. Leaving the
-    context ends them. Where nothing is to be drawn, no process starts, and figures of earlier flights are removed.
-    """
+    context ends them. Where nothing is to be drawn, no process starts, and figures of earlier flights are removed."""
 
     def __init__(self, scenario: Scenario, flights: Sequence[Flight], folder: Path, draw: bool = True) -> None:
         picture = report_of(scenario.body).picture(flights, scenario)
-        self._folder = folder
-        self._process: subprocess.Popen[bytes] | None = None
         if not draw:
             for name in picture:
                 (folder / f"{name}.png").unlink(missing_ok=True)
-            return
-        self._process = subprocess.Popen(
-            # A process group of its own, which the process that draws the other half joins.
-            [sys.executable, "-m", "starhold.report.painter"],
-            stdin=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            process_group=0,
-        )
-        # On a thread, because the process does not read yet.
-        self._sender = Thread(target=self._send, args=((picture, folder.absolute()),))
-        self._sender.start()
+        # A copy of this process has nearly everything loaded.
+        context: Any = get_context("fork" if can_fork() else "spawn")
+        self._folder, (self._failures, self._told) = folder, context.Pipe(duplex=False)
+        given = [(picture, folder.absolute(), slice(first, None, AT_ONCE), self._told) for first in range(AT_ONCE)]
+        self._processes = [context.Process(target=_draw, args=args) for args in given if draw]
+        for process in self._processes:
+            process.start()
 
     def __enter__(self) -> Painter:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        if self._process is None:
-            return
-        killed = self._process.poll() is None
-        if killed:
-            self._kill()
-        self._sender.join()
-        self._process.communicate()
-        if killed:
+        late = [process for process in self._processes if process.is_alive()]
+        for process in late:
+            process.kill()
+            process.join()
+        if late:
             clear_unfinished(self._folder)
 
-    def _kill(self) -> None:
-        """End all processes that draw; on a system without process groups only the one started here."""
-        assert self._process is not None
-        if hasattr(os, "killpg"):
-            with suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGKILL)
-        else:
-            self._process.kill()
-
-    def _send(self, what: object) -> None:
-        assert self._process is not None
-        assert self._process.stdin is not None
-        # If it has died, `finish` reports why.
-        with suppress(OSError):
-            pickle.dump(what, self._process.stdin)
-            self._process.stdin.flush()
-
-    def finish(self) -> InputError | None:
-        """Wait for the files. Return why they cannot be written, if so; RuntimeError for any other failure."""
-        if self._process is None:
-            return None
-        self._sender.join()
-        _, said = self._process.communicate()
-        message = said.decode(errors="replace").strip()
-        if self._process.returncode == UNWRITABLE:
-            return InputError(message.splitlines()[0], "", "", "")
-        if self._process.returncode != 0:
-            raise RuntimeError(f"the figures could not be drawn: {message[-2000:]}")
-        return None
+    def finish(self) -> None:
+        """Wait for the files. InputError where they cannot be written; RuntimeError for any other failure."""
+        for process in self._processes:
+            process.join()
+        failure = self._failures.recv() if self._failures.poll() else ""
+        if isinstance(failure, InputError):
+            raise failure
+        if failure or any(process.exitcode for process in self._processes):
+            raise RuntimeError(f"the figures could not be drawn: {failure}")
 
 
-def main() -> None:
-    """Run the process that draws: load the modules, read what to draw, draw it."""
-    # Ctrl-C goes to the parent alone, which ends this process.
+def _draw(picture: Picture, folder: Path, part: slice, failures: Connection) -> None:
+    """Draw a part of the figures; what prevents that goes to `failures`, and what libraries say to nobody."""
+    # Ctrl-C goes to the original process alone, which ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     gc.disable()
-    from starhold.report.figures import paint, warm_up
+    from starhold.report.figures import paint
 
-    warm_up()
-    what, folder = pickle.load(sys.stdin.buffer)
-    # Everything is loaded, so a second process draws the other half without start-up cost.
-    other = os.fork() if hasattr(os, "fork") else None
-    share = slice(None) if other is None else slice(0 if other else 1, None, 2)
     try:
-        paint(what, folder, share)
+        paint(picture, folder, part)
     except InputError as error:
-        print(error, file=sys.stderr)
-        sys.exit(UNWRITABLE)
-    if other:
-        sys.exit(os.waitstatus_to_exitcode(os.waitpid(other, 0)[1]))
-
-
-if __name__ == "__main__":
-    main()
+        failures.send(error)
+    except Exception:
+        failures.send(traceback.format_exc()[-2000:])

@@ -153,7 +153,8 @@ def collect(flights: Sequence[Flight], points: int, scenario: Scenario) -> PathP
     longest = max((flight.recording["time"] for flight in flights), key=len)
     factor = thinning(len(longest), points)
     clock, tick = ("years", YEAR) if longest[-1] * units.time > LONG else ("days", DAY)
-    rings = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, CircleGoal)})
+    goals = [goal_of(entry.gains) for entry in entries]
+    rings = sorted({goal.radius for goal in goals if isinstance(goal, CircleGoal)})
     portrait = phase_portrait(flights, entries, scenario)
     return PathPlots(
         thin_times(longest, factor) * (units.time / tick),
@@ -173,10 +174,6 @@ def unit_text(scenario: Scenario) -> str:
     """Name the unit of lengths."""
     length = scenario.table.libration.units.length
     return "Earth diameters" if length == EARTH_DIAMETER else f"units of {length / 1e3:g} km"
-
-
-def _goal(entry: LawEntry) -> object:
-    return goal_of(entry.gains)
 
 
 def _path(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -224,8 +221,9 @@ def _control(flights: Sequence[Flight], entries: Sequence[LawEntry], factor: int
 def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenario: Scenario) -> PlanePlot:
     """Plot (x, y), (y, z) and (u_y, u_z), as published, and (u_x, u_z), in which the control comes nearest to the limit;
     with the circle and the limit."""
-    radii = sorted({goal.radius for goal in map(_goal, entries) if isinstance(goal, CircleGoal)})
-    size = max([*radii, *(max(map(abs, goal_of(entry.gains).at(0.0)[0])) for entry in entries)]) or 1.0
+    goals = [goal_of(entry.gains) for entry in entries]
+    radii = sorted({goal.radius for goal in goals if isinstance(goal, CircleGoal)})
+    size = max([*radii, *(max(map(abs, goal.at(0.0)[0])) for goal in goals)]) or 1.0
     kept = [flight for flight in flights if flight.lost is None]
     places = [_path(flight.recording["position"]) for flight in flights]
     controls = [_path(flight.recording["control"]) for flight in flights]
@@ -249,7 +247,7 @@ def _projections(flights: Sequence[Flight], entries: Sequence[LawEntry], scenari
         bounds = [_square(guide) for guide in bounds]
     strong = (1.0 + ROOM) * max([most, *(float(np.abs(guide.x).max()) for guide in bounds)])
     x = reach(0)
-    places_of = [goal.place for goal in map(_goal, entries) if isinstance(goal, EquilibriumGoal)]
+    places_of = [goal.place for goal in goals if isinstance(goal, EquilibriumGoal)]
     rests = [Guide(np.array([y]), np.array([z]), "rest", kind="points") for _, y, z in places_of]
     planes = [
         Plane("x", "y", [Line(p[:, 0], p[:, 1]) for p in places], [], (-x, x, -across, across), False),

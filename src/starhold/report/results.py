@@ -17,7 +17,7 @@ from starhold.certification.certificate import FILE as CERTIFICATES
 from starhold.certification.certificate import KERNEL
 from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
-from starhold.files import atomic_write, claim, clear_unfinished
+from starhold.files import atomic_write, claim, clear_unfinished, write_text
 from starhold.report import commands
 from starhold.scenario.checking import cut
 from starhold.scenario.reading import LONGEST_PATH
@@ -123,8 +123,7 @@ def write_lemmas(folder: Path) -> list[Path]:
     files = _lemma_files(folder)
     proved = check((folder / CERTIFICATES).read_text(encoding="utf-8")) if files else []
     for name, places in files.items():
-        with atomic_write(folder / name) as hidden:
-            hidden.write_text(printed([proved[place] for place in places]), encoding="utf-8")
+        write_text(folder / name, printed([proved[place] for place in places]))
     return [folder / name for name in files]
 
 
@@ -138,8 +137,7 @@ def write_run(run: Recording, path: Path) -> None:
 def write_summary(scenario: str, results: dict[str, Any], path: Path) -> None:
     """Write the metrics of each law of a scenario of this name in SI units as JSON; a missing value is null."""
     content = {"scenario": scenario, "starhold_version": __version__, "laws": _finite(results)}
-    with atomic_write(path) as hidden:
-        hidden.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
 
 def _finite(value: Any) -> Any:
@@ -165,20 +163,18 @@ def write_result(result: commands.Result, name: str, subject: str, folder: Path)
             result.certificate(hidden)
         if json.loads(written["Certificate"].read_text(encoding="utf-8"))["claims"]:
             _write_kernel(folder)
+    page = markdown = None
     if result.document is not None:
         from starhold.report.document import pages_of
         from starhold.report.page_parts import versions
 
-        texts = pages_of(result.title, result.document, f"{versions()}.")
-        for what, kind, text in zip(("Page", "Markdown"), ("html", "md"), texts, strict=True):
-            written[what] = folder / f"{name}.{kind}"
-            with atomic_write(written[what]) as hidden:
-                hidden.write_text(text, encoding="utf-8", newline="\n")
-    for what, kind, text in (("For CI", "xml", result.xml), ("Scenario", "toml", result.toml)):
+        page, markdown = pages_of(result.title, result.document, f"{versions()}.")
+    texts = {"Page": ("html", page), "Markdown": ("md", markdown)}
+    texts |= {"For CI": ("xml", result.xml), "Scenario": ("toml", result.toml)}
+    for what, (kind, text) in texts.items():
         if text is not None:
             written[what] = folder / f"{name}.{kind}"
-            with atomic_write(written[what]) as hidden:
-                hidden.write_text(text, encoding="utf-8")
+            write_text(written[what], text)
     if result.figure is not None:
         written["Picture"] = write_part(result, "png", folder / f"{name}.png")
     return written
@@ -234,10 +230,9 @@ def write_results(scenario: Scenario, flights: Sequence[Flight], folder: Path, d
         write_proofs(certificates, scenario.name, folder)
     if not drawn:
         return folder
-    from starhold.report.page import write_page
+    from starhold.report.page import render
 
-    with atomic_write(folder / PAGE) as hidden:
-        write_page(hidden, scenario, flights)
+    write_text(folder / PAGE, render(scenario, flights))
     return folder / PAGE
 
 

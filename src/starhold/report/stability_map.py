@@ -38,7 +38,7 @@ class StabilityMap(NamedTuple):
 def stability_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> StabilityMap:
     """Compute the map around the optimum. Arguments and errors as in `draw_map`."""
     best = optimum(ratios, alpha, omega, budget)
-    # The optimum at fixed shares of both sides, so that the words around it never meet the lines.
+    # The optimum at fixed shares of both sides, so that the words around it stay on their sides of the border.
     K_a = np.linspace(0.0, 2.0 * best.K_a, POINTS)
     K_w = np.linspace(0.0, 1.6 * best.K_w, POINTS)
     eta = degree(K_a, K_w[:, None], ratios)
@@ -75,7 +75,9 @@ def draw_map(ratios: ArrayLike, alpha: float, omega: float, budget: float) -> An
     x, y, z = (f"{ratio:.4g}" for ratio in what.ratios)
     figure.text(0.085, 0.96, "decay rate (degree of stability) over the gains", fontsize=11, fontweight="bold")
     given = f"moments {x} : {y} : {z},  α = {what.alpha:.4g} rad,  ω = {what.omega:.4g} / t₀,  L = {what.budget:.4g}"
-    figure.text(0.085, 0.922, given, fontsize=8.5, color="0.3")
+    best = f"optimum: K_a = {what.best.K_a:.4g},  K_w = {what.best.K_w:.4g},  η = {what.best.eta:.4g}"
+    for height, words in ((0.932, given), (0.905, best)):
+        figure.text(0.085, height, words, fontsize=8.5, color="0.3")
     figure.legend(
         handles=handles,
         loc="lower left",
@@ -121,63 +123,13 @@ def _curves(axis: Any, what: StabilityMap) -> list[Any]:
 
 
 def _words(axis: Any, what: StabilityMap) -> None:
-    """Label the decisive mode on each side of the border, and the optimum with its numbers."""
+    """Label the decisive mode on each side of the border, which runs through the middle of the map, and mark the optimum."""
     named, best = sorted(_axes(what.ratios), key=lambda pair: pair[1]), what.best
-    numbers = f"optimum\nK_a = {best.K_a:.4g}\nK_w = {best.K_w:.4g}\nη = {best.eta:.4g}"
-    texts = (
-        (f"slow aperiodic root\nof {named[0][0]} decides", (0.17, 0.88), 1),
-        (f"oscillation\nof {named[-1][0]} decides", (0.83, 0.12), -1),
-        (numbers, (0.68, 0.5), 0),
-    )
     box = {"boxstyle": "round,pad=0.3", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
-    for text, place in zip((text for text, _, _ in texts), _places(what, texts), strict=True):
-        line = {"arrowstyle": "-", "color": "0.15", "linewidth": 0.9, "shrinkB": 7.0} if text == numbers else None
-        axis.annotate(
-            text,
-            (best.K_a, best.K_w),
-            xytext=place,
-            textcoords="axes fraction",
-            ha="center",
-            va="center",
-            fontsize=9,
-            bbox=box,
-            arrowprops=line,
-            zorder=6,
-        )
+    above, below = f"slow aperiodic root\nof {named[0][0]} decides", f"oscillation\nof {named[-1][0]} decides"
+    for x, y, text in ((0.17, 0.88, above), (0.83, 0.12, below)):
+        axis.text(x, y, text, transform=axis.transAxes, ha="center", va="center", fontsize=9, bbox=box, zorder=6)
     axis.plot([best.K_a], [best.K_w], "*", markersize=18, color=LINE, markeredgecolor="white", markeredgewidth=1.2, zorder=7)
-
-
-def _places(what: StabilityMap, texts: Any) -> list[tuple[float, float]]:
-    """Return centres, as shares of the axes, of labels that hide as little as possible of the lines and of each other: each
-    as near as possible to its preferred place, above the border (1), below it (-1) or anywhere (0)."""
-    u = np.linspace(0.0, 1.0, 600)
-    K_a, K_w, c = u * what.K_a[-1], u * what.K_w[-1], boundary(what.ratios)
-    curves = [(factor * K_w**2 / what.K_a[-1], u) for factor in (c, *(1.0 / (8.0 * i) for i in what.ratios))]
-    if what.omega > 0.0:
-        curves.append((u, (what.budget - 2.0 * what.alpha * K_a) / what.omega / what.K_w[-1]))
-    if what.alpha > 0.0:
-        curves.append(((what.budget - what.omega * K_w) / (2.0 * what.alpha) / what.K_a[-1], u))
-    star = np.array([[what.best.K_a / what.K_a[-1]], [what.best.K_w / what.K_w[-1]]])
-    taken = np.hstack([np.array(curve) for curve in curves] + [star])
-    # A corner of the box lies above the border where K_a < c K_w^2.
-    bend = c * what.K_w[-1] ** 2 / what.K_a[-1]
-    steps = np.linspace(0.0, 1.0, 61)
-    places: list[tuple[float, float]] = []
-    for text, wanted, side in texts:
-        lines = text.split("\n")
-        half = np.array([0.012 + 0.0058 * max(map(len, lines)), 0.014 + 0.0182 * len(lines)])
-        choices: list[tuple[int, float, tuple[float, float]]] = []
-        for x in steps[(steps > half[0] + 0.01) & (steps < 0.99 - half[0])]:
-            for y in steps[(steps > half[1] + 0.01) & (steps < 0.99 - half[1])]:
-                if side and side * (bend * (y - side * half[1]) ** 2 - (x + side * half[0])) < 0.0:
-                    continue
-                hidden = (np.abs(taken - [[x], [y]]) < half[:, None] + 0.008).all(axis=0).sum()
-                choices.append((int(hidden), float(np.hypot(x - wanted[0], y - wanted[1])), (float(x), float(y))))
-        place = min(choices, default=(0, 0.0, wanted))[2]
-        places.append(place)
-        inside = (np.mgrid[-1:1:21j, -1:1:21j].reshape(2, -1) * half[:, None]) + np.array(place)[:, None]
-        taken = np.hstack([taken, inside])
-    return places
 
 
 def _axes(ratios: tuple[float, ...]) -> list[tuple[str, float]]:

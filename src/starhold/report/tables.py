@@ -10,15 +10,11 @@ from typing import Any
 import numpy as np
 
 from starhold.files import atomic_write
-from starhold.report.commands import Cell, Column, Table
+from starhold.report.commands import OUTCOMES, Cell, Column, Table
 from starhold.report.plots import colour
 
-PILLS = {
-    **dict.fromkeys(("met", "proved", "settled", "kept", "agrees", "holds"), "proved"),
-    **dict.fromkeys(("missed", "refuted", "diverged", "exceeded", "differs", "fails"), "refuted"),
-    **dict.fromkeys(("not decided", "undecided", "not settled", "close", "depends"), "undecided"),
-}
-"""The style of each outcome: good, bad or open."""
+PILLS = {"green": "proved", "red": "refuted", "yellow": "undecided"}
+"""The styles of pages for the colours of outcomes."""
 
 
 class Markup(str):
@@ -83,7 +79,8 @@ def _cell(value: Any, side: str) -> str:
 
 def pill(outcome: str, text: str = "") -> str:
     """Show an outcome, or a text in its place, in the outcome's colour; nothing where there is none."""
-    return f'<span class="outcome {PILLS[outcome]}">{escape(text or outcome)}</span>' if outcome in PILLS else ""
+    style = PILLS.get(OUTCOMES.get(outcome, ""))
+    return f'<span class="outcome {style}">{escape(text or outcome)}</span>' if style else ""
 
 
 def swatch(number: int) -> str:

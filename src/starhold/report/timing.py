@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from starhold.files import atomic_write
+from starhold.files import write_text
 from starhold.report.figures import framed, plain, save
 from starhold.report.plots import COLOURS
 from starhold.report.results import TIMING
@@ -19,8 +19,7 @@ BINS = 60
 def write_timing(timing: dict[str, Any], folder: Path) -> Path:
     """Write what `Served.timing` tells into a folder, as JSON and as a picture, and return the picture's path."""
     numbers, picture = (folder / name for name in TIMING)
-    with atomic_write(numbers) as hidden:
-        hidden.write_text(json.dumps(timing, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(numbers, json.dumps(timing, allow_nan=False) + "\n")
     return save(draw_timing(timing), picture)
 
 

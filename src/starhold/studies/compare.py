@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from starhold.analysis.ranking import MetricSet
 from starhold.analysis.rigid_body import error_angle
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build as build
 from starhold.scenario.reading import Scenario
 from starhold.simulation.lane import Progress, Recording, fly
@@ -135,14 +136,10 @@ def _law_counters(entry: Any, memory: Any) -> dict[str, Any]:
     }
 
 
-Loop = TypeVar("Loop")
-
-
-def halved(loop: Loop) -> Loop:
+def halved(loop: ClosedLoop) -> ClosedLoop:
     """Return the loop with twice as many integration steps, each half as long, and the same control steps and random
     numbers."""
-    known: Any = loop
-    return replace(known, substeps=2 * known.substeps)
+    return replace(loop, substeps=2 * loop.substeps)
 
 
 def step_error(run: Recording, finer: Recording, names: Iterable[str]) -> dict[str, float | None]:

@@ -121,13 +121,6 @@ def study(
     return failures
 
 
-def study_with_proof(
-    scenario: Scenario, entry: LawEntry, notice: Callable[[int, int, str], None] = lambda done, total, name: None
-) -> list[Failure]:
-    """Return the failures of `study`, each with the proved pointing bound of its loop, which takes seconds."""
-    return study(scenario, entry, notice, proof=True)
-
-
 def directions_lacking(axes: Array) -> Array:
     """Return orthonormal body directions (n, 3) about which wheels with these axes (k, 3) give almost no torque."""
     if len(axes) == 0:

@@ -23,6 +23,7 @@ from starhold.scenario.checking import cut, nearest, read_toml, show, validate
 from starhold.scenario.quantity import quantity
 from starhold.scenario.tables import Flag, Table
 from starhold.scenario.units import to_number
+from starhold.studies.frames import run_frame
 
 Array: TypeAlias = NDArray[np.float64]
 SUFFIXES = {".csv": "csv", ".parquet": "parquet", ".aem": "aem", ".nc": "netcdf"}
@@ -113,13 +114,7 @@ def table_of(source: Any, path: Path, mapping: MappingTable) -> tuple[Any, Mappi
 
     kind = mapping.kind or SUFFIXES.get(path.suffix.lower(), "netcdf" if path.is_dir() else "")
     if hasattr(source, "data_vars") or kind == "netcdf":
-        run = source if hasattr(source, "data_vars") else open_run(path)
-        columns: dict[str, Any] = {"time": run["time"].to_numpy()}
-        for name, values in run.data_vars.items():
-            numbers = values.to_numpy().reshape(len(columns["time"]), -1)
-            meant = Quantity("", "", "".join(map(str, values.dims[1:])))
-            columns |= dict(zip(heads_of(str(name), meant, numbers.shape[1]), numbers.T, strict=True))
-        return pd.DataFrame(columns), mapping
+        return run_frame(source if hasattr(source, "data_vars") else open_run(path)), mapping
     if kind not in SUFFIXES.values():
         raise InputError(str(path), "", show(path.suffix), f"telemetry, {', '.join(SUFFIXES)}, or a kind in a mapping")
     if not path.is_file():

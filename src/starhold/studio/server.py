@@ -195,29 +195,24 @@ class Studio:
         checked = await self._checked(given["text"])
         if "name" not in checked:
             return JSONResponse(checked, 422)
-        try:
-            job = self.jobs.start(given["kind"], checked["name"], given["text"], self.where, self.folder, checked["laws"])
-        except ValueError as error:
-            return JSONResponse({"error": str(error)}, 409)
-        return JSONResponse(job.status(), 201)
+        return self._begun(given["kind"], checked["name"], given["text"], self.where, self.folder, checked["laws"])
 
     async def _again(self, request: Request) -> Response:
         """Fly one run of a campaign that is a job of this studio again."""
         given, job = await _strings(request, "law", "run"), self.jobs.get(request.path_params["number"])
-        if (
-            given is None
-            or job is None
-            or job.kind != "campaign"
-            or not given["run"].isdecimal()
-            or given["law"] not in job.laws
-        ):
+        if given is None or job is None or job.kind != "campaign":
             return _malformed()
+        law, run = given["law"], given["run"]
+        if not run.isdecimal() or law not in job.laws:
+            return _malformed()
+        return self._begun(RERUN, f"{law}, run {run}", "", str(job.folder), self.folder, (law, run))
+
+    def _begun(self, *job: Any) -> Response:
+        """Begin a job, unless as many as may are at work."""
         try:
-            name = f"{given['law']}, run {given['run']}"
-            job = self.jobs.start(RERUN, name, "", str(job.folder), self.folder, (given["law"], given["run"]))
+            return JSONResponse(self.jobs.start(*job).status(), 201)
         except ValueError as error:
             return JSONResponse({"error": str(error)}, 409)
-        return JSONResponse(job.status(), 201)
 
     async def _stop(self, request: Request) -> Response:
         self.jobs.stop(request.path_params["number"])

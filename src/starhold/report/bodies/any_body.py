@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 from starhold.report.body import PageParts
 from starhold.report.figures import POINTS, Picture, over_time, without_runs
-from starhold.report.page_parts import POINTS as PAGE_POINTS
-from starhold.report.page_parts import over_time as over_time_data
-from starhold.report.page_parts import rounded
+from starhold.report.page_parts import PAGE_POINTS, over_time_data, rounded
 from starhold.report.plots import Curve, Plot, recorded_plots, thin_times, thinning
 
 if TYPE_CHECKING:

@@ -11,9 +11,7 @@ import numpy as np
 from starhold.analysis.libration_point import DAY, YEAR, goal_of
 from starhold.report.body import PageParts
 from starhold.report.figures import POINTS, Picture, headed, over_time, width_of, without_runs
-from starhold.report.page_parts import POINTS as PAGE_POINTS
-from starhold.report.page_parts import over_time as over_time_data
-from starhold.report.page_parts import rounded, views
+from starhold.report.page_parts import PAGE_POINTS, over_time_data, rounded, views
 from starhold.report.path_plots import PathPlots, collect
 from starhold.report.plane_plots import GREY, draw_planes, plane_data
 from starhold.report.plots import colour, first_alone

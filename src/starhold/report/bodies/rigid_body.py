@@ -28,9 +28,7 @@ from starhold.report.attitude_plots import (
 )
 from starhold.report.body import PageParts, Sampling
 from starhold.report.figures import POINTS, Picture, over_time, without_runs
-from starhold.report.page_parts import POINTS as PAGE_POINTS
-from starhold.report.page_parts import over_time as over_time_data
-from starhold.report.page_parts import panel_data, rounded, views
+from starhold.report.page_parts import PAGE_POINTS, over_time_data, panel_data, rounded, views
 from starhold.report.plots import Panel, Plot, thinning
 from starhold.report.tables import swatch
 from starhold.scenario.bodies.rigid_body.faults import fault_times

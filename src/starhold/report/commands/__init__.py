@@ -14,7 +14,22 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from starhold.report.document import Section
-    from starhold.scenario.reading import LawEntry, Scenario
+    from starhold.scenario.reading import Scenario
+
+
+OUTCOMES = {
+    **dict.fromkeys(("met", "proved", "settled", "kept", "agrees", "holds", "passed"), "green"),
+    **dict.fromkeys(("missed", "refuted", "diverged", "exceeded", "differs", "fails", "failed"), "red"),
+    **dict.fromkeys(("not decided", "undecided", "not settled", "close", "depends", "not checked"), "yellow"),
+    **dict.fromkeys(("not claimed", "does not apply"), "dim"),
+}
+"""The colour of each outcome: good, bad, open or of no account."""
+
+
+def coloured(outcome: str, text: str = "") -> str:
+    """Return an outcome, or a text in its place, with the style marks of its colour; a text alone where it has none."""
+    colour = OUTCOMES.get(outcome)
+    return f"[{colour}]{text or outcome}[/{colour}]" if colour else text
 
 
 class Column(NamedTuple):
@@ -120,14 +135,15 @@ def number_or_text(value: str | float) -> str | float:
         return value
 
 
-def later(path: str) -> Callable[..., Any]:
-    """Return the function at a path below starhold; its module is loaded at the first call."""
+def as_given(text: str) -> str:
+    """Return a text unchanged: what reads an option that is no key and names no file."""
+    return text
+
+
+def later(path: str, **more: Any) -> Callable[..., Any]:
+    """Return the function at a path below starhold, with these arguments; its module is loaded at the first call."""
     module, _, name = path.rpartition(".")
-    return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given)
-
-
-def _named(scenario: Scenario, law: str | None) -> LawEntry:
-    return scenario.pick(law)
+    return lambda *given: getattr(import_module(f"starhold.{module}"), name)(*given, **more)
 
 
 class Command(NamedTuple):
@@ -146,7 +162,7 @@ class Command(NamedTuple):
     suffix: str
     study: Callable[..., Any]
     present: Callable[..., Result]
-    pick: Callable[[Scenario, str | None], Any] = _named
+    pick: Callable[[Scenario, str | None], Any] = lambda scenario, law: scenario.pick(law)
     law: str = "which law of the file; the first if not given"
     doing: str | None = "{}"
     options: Mapping[str, Option] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from starhold.report.commands import Column, Command, Option, Result, Table, later
+from starhold.report.commands import Column, Command, Option, Result, Table, coloured, later
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -51,9 +51,8 @@ def _table(budget: Budget) -> Table:
     ratios = [budget.level(TOGETHER, index) / max(budget.level(COMBINED, index), 1e-300) for index in budget.indices]
     rows.append(["together / root sum square", *(f"{ratio:.3g}" for ratio in ratios)])
     if budget.required:
-        verdicts = {True: "[green]met[/green]", False: "[red]missed[/red]"}
         shown = {
-            index: f"{most / units[index][1]:.4g} {verdicts[budget.level(TOGETHER, index) <= most]}"
+            index: f"{most / units[index][1]:.4g} {coloured('met' if budget.level(TOGETHER, index) <= most else 'missed')}"
             for index, most in budget.required.items()
         }
         rows.append(["required, at most", *(shown.get(index, "") for index in budget.indices)])

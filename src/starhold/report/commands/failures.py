@@ -165,5 +165,5 @@ COMMAND = Command(
     present,
     later("studies.failures.pick"),
     doing="lost: {}",
-    prove=later("studies.failures.study_with_proof"),
+    prove=later("studies.failures.study", proof=True),
 )

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
-from starhold.report.commands import Block, Column, Command, Option, Result, Table, later
+from starhold.report.commands import Block, Column, Command, Option, Result, Table, as_given, later
+from starhold.report.commands.replay import TELEMETRY
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.studies.identify import Identified
+EXAMPLE = '"spacecraft.inertia, part.gyro.bias"'
+WHOSE = "recorded, law or none: what commands the craft; as recorded where that is, else the law"
 POINTS = 4000
 """Samples of a curve that are drawn."""
 
@@ -110,26 +113,10 @@ COMMAND = Command(
     later("studies.identify.study"),
     present,
     doing=None,
-    options={
-        "telemetry": Option(
-            "",
-            "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder",
-            content=lambda given: given,
-            argument="TELEMETRY",
-        ),
-        "mapping": Option(
-            "", "a TOML file that says what its columns hold, or the name of one", content=lambda given: given
-        ),
-        "free": Option(
-            "",
-            'keys of the numbers to fit, with commas between: "spacecraft.inertia, part.gyro.bias"',
-            content=lambda given: given,
-        ),
-        "commands": Option(
-            "",
-            "recorded, law or none: what commands the craft; as recorded where that is, else the law",
-            content=lambda given: given,
-        ),
+    options=TELEMETRY
+    | {
+        "free": Option("", f"keys of the numbers to fit, with commas between: {EXAMPLE}", content=as_given),
+        "commands": Option("", WHOSE, content=as_given),
     },
     unstable=True,
     kinds=("csv", "png", "toml"),

@@ -6,15 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from starhold.report.commands import Block, Column, Command, Heading, Result, Table, later
+from starhold.report.commands import Block, Column, Command, Heading, Result, Table, coloured, later
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
     from starhold.certification.invariant.problem import SetCertificate
     from starhold.studies.phase_portraits import Portrait
-
-COLOURS = {"proved": "green", "refuted": "red", "undecided": "yellow"}
 
 
 def listed() -> list[Block]:
@@ -41,16 +39,10 @@ def present(problem: InvariantProblem, certificate: SetCertificate) -> Result:
     drawn = [item for item in shown if item.V is not None]
     assumptions = texts(a for claim in certificate.claims for a in claim.assumptions)
     blocks = ["", Heading(certificate.name), _table(certificate, shown), f"  assuming: {'; '.join(assumptions)}", ""]
-    figure = partial(_draw, drawn, problem.name) if drawn else None
+    figure = partial(later("report.invariant_picture.draw"), drawn, problem.name) if drawn else None
     outcome = {"proved": "met", "refuted": "missed"}.get(certificate.outcome, "undecided")
     written: Any = partial(sets.write, certificate)
     return Result(problem.name, blocks, figure=figure, certificate=written, outcome=outcome)  # type: ignore[arg-type]
-
-
-def _draw(drawn: list[Portrait], title: str) -> Any:
-    from starhold.report.invariant_picture import draw
-
-    return draw(drawn, title)
 
 
 def _table(certificate: Certificate, portraits: list[Portrait]) -> Table:
@@ -61,9 +53,8 @@ def _table(certificate: Certificate, portraits: list[Portrait]) -> Table:
     rows: list[list[str]] = []
     for claim, portrait in zip(certificate.claims, portraits, strict=True):
         heading, name = HEADINGS[claim.numbers["theorem"]], escape(claim.witness["name"])
-        colour = COLOURS[claim.outcome]
         title = f"{name}\n[dim]{heading}[/dim]" if name else heading
-        rows.append([title, f"[{colour}]{claim.outcome}[/{colour}]", escape(sentence(claim))])
+        rows.append([title, coloured(claim.outcome), escape(sentence(claim))])
         lines = [f"[dim]{line}[/dim]" for line in (size(claim.numbers, portrait.orbit_area), limit(claim.numbers)) if line]
         lines += [
             f"needed, but {o.outcome}: {OBLIGATIONS[o.name]}; {escape(evidence(o))}"

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from starhold.report.commands import Block, Column, Command, Option, Result, Table, later
+from starhold.report.commands import Block, Column, Command, Option, Result, Table, as_given, later
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.studies.replay import Comparison, Replay
 
+TELEMETRY = {
+    "telemetry": Option(
+        "", "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder", content=as_given, argument="TELEMETRY"
+    ),
+    "mapping": Option("", "a TOML file that says what its columns hold, or the name of one", content=as_given),
+}
+"""What names recorded telemetry."""
 MOST_PANELS = 6
 """Quantities that a figure shows: those that part first."""
 
@@ -59,10 +66,6 @@ def _numbers(result: Replay) -> Table:
     return Table(columns, rows)
 
 
-def _as_given(text: Any) -> Any:
-    return text
-
-
 def draw(result: Replay, title: str) -> Any:
     """A panel for each quantity: how far it is from what was recorded, and how far it may be, dashed."""
     import numpy as np
@@ -92,13 +95,8 @@ COMMAND = Command(
     later("studies.replay.study"),
     present,
     doing=None,
-    options={
-        "telemetry": Option(
-            "", "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder", content=_as_given, argument="TELEMETRY"
-        ),
-        "mapping": Option("", "a TOML file that says what its columns hold, or the name of one", content=_as_given),
-        "tolerance": Option("", "share of the largest value; else 0.01", content=later("studies.replay.tolerance_of")),
-    },
+    options=TELEMETRY
+    | {"tolerance": Option("", "share of the largest value; else 0.01", content=later("studies.replay.tolerance_of"))},
     unstable=True,
     kinds=("csv", "png"),
 )

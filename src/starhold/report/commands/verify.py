@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from starhold.report.commands import Block, Column, Command, Result, Table, later
+from starhold.report.commands import Block, Column, Command, Result, Table, coloured, later
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.studies.verification import RequirementVerdict
 
 NUMBERS = (Column("number", "", ">"), Column("limit", "", ">"), Column("margin", "", ">"))
-STYLES = {"met": "green", "missed": "red", "not decided": "yellow"}
 
 
 def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementVerdict]) -> Result:
@@ -21,8 +20,7 @@ def present(scenario: Scenario, entry: LawEntry, verdicts: Sequence[RequirementV
 
     rows: list[list[Any]] = []
     for one in verdicts:
-        style = STYLES[one.verdict]
-        shown = f"[{style}]{one.verdict}[/{style}]{escape(one.sentence.removeprefix(one.verdict))}"
+        shown = f"{coloured(one.verdict)}{escape(one.sentence.removeprefix(one.verdict))}"
         rows.append([escape(one.id), *numbers(one), one.method, shown])
     blocks: list[Block] = ["", Table([Column("requirement"), *NUMBERS, Column("method"), Column("verdict")], rows), ""]
     blocks += [f"{one.id}: {one.evidence}." for one in verdicts if one.verdict != "met"]

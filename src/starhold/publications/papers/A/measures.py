@@ -6,13 +6,11 @@ from typing import Any
 import numpy as np
 
 from starhold.algebra.vector import ZERO
-from starhold.analysis.rigid_body import error_angle
 from starhold.laws import lqr
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
-from starhold.publications.measures import samples
 from starhold.publications.verdicts import Finding
 from starhold.synthesis.riccati import closed_form, linear_model, solve_riccati
 from starhold.synthesis.weights import balance, kappa
@@ -149,20 +147,6 @@ def falling(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
     return Finding(verdicts, "sample by sample, over the whole flights")
 
 
-def settled(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
-    """Return which flights settle."""
-    times = {law: desk.flight(file, law).metrics["settling_time"] for file, law in runs}
-    note = ", ".join(f"{law} {time:.0f} s" for law, time in times.items() if time is not None)
-    return Finding({law: time is not None for law, time in times.items()}, note)
-
-
-def below_wheels(desk: Desk, runs: Sequence[tuple[str, str]]) -> Finding:
-    """Return which flights need less than 0.1 N m."""
-    peaks = {law: desk.flight(file, law).metrics["peak_torque"] for file, law in runs}
-    note = ", ".join(f"{law} {peak:.3g}" for law, peak in peaks.items())
-    return Finding({law: peak < 0.1 for law, peak in peaks.items()}, f"{note} N m")
-
-
 def gyroscopic_beyond(desk: Desk, rates: Sequence[Sequence[str]]) -> Finding:
     """Return from which rates form I fails to settle in 12 h; wheels of 0.1 N m balance the gyroscopic torque of none."""
     verdicts: dict[str, bool] = {}
@@ -206,25 +190,6 @@ def offset(desk: Desk, law: str) -> Finding:
     return Finding(
         bool(abs(error / wanted - 1.0) < 0.1), f"{angle:.4f}° left, {np.degrees(2.0 * wanted):.4f}° by the formula"
     )
-
-
-def angles(desk: Desk, runs: Sequence[tuple[str, str]], until: float = np.inf, log: bool = False) -> Figure:
-    """The angle of rotation from the target over time, of several flights."""
-    curves: list[Curve] = []
-    for file, law in runs:
-        time, error = samples(desk, file, law, "attitude_error", until)
-        curves.append(Curve(time / 60.0, np.degrees(error_angle(error)), law))
-    return Figure([Panel("time, min", "angle from the target, °", curves, log_y=log)])
-
-
-def torques(desk: Desk, runs: Sequence[tuple[str, str]], until: float) -> Figure:
-    """The torque about each axis over time, a panel a flight."""
-    panels: list[Panel] = []
-    for file, law in runs:
-        time, torque = samples(desk, file, law, "torque", until)
-        curves = [Curve(time / 60.0, torque[:, axis], "xyz"[axis], "steps") for axis in range(3)]
-        panels.append(Panel("time, min", "torque, N m", curves, law))
-    return Figure(panels, columns=2)
 
 
 def lyapunov_functions(desk: Desk, runs: Sequence[tuple[str, str]]) -> Figure:

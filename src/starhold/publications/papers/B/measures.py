@@ -47,17 +47,6 @@ def gravity_torque(desk: Desk) -> Finding:
 # Flights
 
 
-def arrives(desk: Desk, file: str, laws: Sequence[str], within: float, changes: Mapping[str, Any] | None = None) -> Finding:
-    """Tell for each law whether its error of attitude stays within a bound (rad) over the last quarter of the flight."""
-    return cases(desk, [{"name": law, "file": file, "law": law, "changes": changes} for law in laws], within)
-
-
-def cases(desk: Desk, of: Sequence[Mapping[str, Any]], within: float) -> Finding:
-    """Tell for several flights whether each ends within a bound (rad): `name`, `file`, `law` and perhaps `changes`."""
-    ends = {one["name"]: _final(desk, one["file"], one["law"], one.get("changes")) for one in of}
-    return Finding({name: end <= within for name, end in ends.items()}, _listed(ends, "rad"))
-
-
 def _final(desk: Desk, file: str, law: str, changes: Mapping[str, Any] | None = None) -> float:
     value = desk.flight(file, law, changes).metrics["final_attitude_error"]
     return float("inf") if value is None else float(value)

@@ -170,16 +170,6 @@ def euler_krylov(desk: Desk, file: str, laws: Sequence[str], until: float) -> Fi
     return Figure(panels, columns=2)
 
 
-def wheel_torques(desk: Desk, file: str, laws: Sequence[str], until: float) -> Figure:
-    """The commands to the wheels over time, a panel a law, with the weak wheel's limit."""
-    panels: list[Panel] = []
-    for law in laws:
-        time, command = samples(desk, file, law, "wheel_command", until)
-        curves = [Curve(time, 1e3 * command[:, n], f"wheel {'xyz'[n]}", "steps") for n in range(3)]
-        panels.append(Panel("time, s", "commanded torque, mN m", curves, law, levels=(-1e3 * WEAK, 1e3 * WEAK)))
-    return Figure(panels, columns=2)
-
-
 def regions(desk: Desk) -> Figure:
     """The plane of the gains of the example: the regions (20), the curve (23), the line (24), and gains of equal degree of
     stability."""

@@ -295,14 +295,6 @@ def unknown_torque(desk: Desk) -> Finding:
     return Finding(abs(seen / left - 1.0) < 1e-6, f"{seen * DEGREES:.4f}° flown, {left * DEGREES:.4f}° by the formula")
 
 
-def errors_under_torque(desk: Desk) -> Figure:
-    """The error angle over time with a known and an unknown torque."""
-    names = {"known-torque": "known: the gravity gradient", "unknown-torque": "not known: 23 N m"}
-    runs = {name: desk.recording(file, "modal") for file, name in names.items()}
-    curves = [Curve(run["time"], error_angle(run["attitude_error"]) * DEGREES, name) for name, run in runs.items()]
-    return Figure([Panel("time, s", "error angle, deg", curves, log_y=True)])
-
-
 def inside_the_region(desk: Desk) -> Finding:
     """Return whether the printed start is inside the sets that are proved, however the quaternion's sign is chosen."""
     run = desk.recording("landing", "rounded")
