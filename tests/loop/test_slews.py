@@ -1,24 +1,19 @@
 """Slews that begin with a mode, onto targets that move: by differences over time, by SciPy, and in every reader."""
 
 import math
-from dataclasses import replace
 
 import erfa
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from starhold.algebra.structure import flatten
-from starhold.loop.kernels import fly_plainly
 from starhold.scenario.reading import parse
-from starhold.simulation.lane import fly
-from tests.loop.test_modes import same_in_every_lane
 from tests.making import built, flown
 from tests.missions import cubesat, mode
 from tests.refusals import refused
 
 INERTIA = np.array([0.05, 0.065, 0.025])
-PERIOD, RATE, ACCELERATION, TORQUE = 0.5, math.radians(0.8), math.radians(0.01), 1e-5
+PERIOD, RATE, ACCELERATION, TORQUE = 0.5, math.radians(0.8), math.radians(0.01), 5e-6
 LAW = '[[law]]\nname = "mission"\ntype = "modes"\nquaternion_sign = "hysteresis"\n'
 SLEW = 'slew = {{ rate = "0.8 deg/s", acceleration = "0.01 deg/s^2"{} }}'
 NADIR = 'target = { mode = "orbital" }'
@@ -41,7 +36,7 @@ def reference(run):
     return attitude, error.apply(run["rate"] - run["rate_error"])
 
 
-@pytest.mark.parametrize("more, target", [("", NADIR), (', torque_limit = "0.01 mN m"', YAW)])
+@pytest.mark.parametrize(("more", "target"), [("", NADIR), (', torque_limit = "0.005 mN m"', YAW)])
 def test_a_mode_slews_from_the_attitude_of_the_craft_onto_a_target_that_moves(more, target):
     run = flown(built(mission(more, target)), 1800)
     attitude, rate = reference(run)
@@ -68,7 +63,7 @@ def test_a_mode_slews_from_the_attitude_of_the_craft_onto_a_target_that_moves(mo
         along, across = np.abs(momentum), np.abs(np.cross(axis, momentum))
         most = min(RATE, math.sqrt(0.5 * TORQUE / across.max()))
         limits = most, min(ACCELERATION, ((TORQUE - most**2 * across) / along).min())
-        assert limits[1] < 0.5 * ACCELERATION
+        assert limits[1] < 0.9 * ACCELERATION
     least = away[onto] / limits[0] + limits[0] / limits[1]
     if away[onto] < limits[0] ** 2 / limits[1]:
         least = 2.0 * math.sqrt(away[onto] / limits[1])
@@ -76,11 +71,24 @@ def test_a_mode_slews_from_the_attitude_of_the_craft_onto_a_target_that_moves(mo
 
 
 def test_a_mode_slews_around_the_sun():
-    """The axis stays out of the cone but for what the target turns meanwhile; what is flown straight passes through it."""
-    nearest = []
-    sun = sun_of(sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0)
+    """A turn that leads an axis right through the Sun goes around it; the angle at every instant is by ERFA."""
+    days = sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0 - 2451545.0
+    sun = erfa.pmat06(2451545.0, days) @ -erfa.epv00(2451545.0, days)[0]["p"]
+    sun /= np.linalg.norm(sun)
     held = Rotation.from_euler("ZYX", [-20, 35, 80], degrees=True)
-    end = Rotation.from_rotvec(np.radians(120.0) * held.inv().apply(sun))
-    for keep in ("", ', axis = AXIS, keep_out = "30 deg"'):
-        target = f'target = {{ mode = "inertial", attitude = {(held * end).as_quat(scalar_first=True).tolist()} }}'
-        print(target)
+    normal = np.cross(held.apply([0, 0, -1]), sun)
+    angle = math.atan2(np.linalg.norm(normal), held.apply([0, 0, -1]) @ sun)
+    end = Rotation.from_rotvec(2.0 * angle * normal / np.linalg.norm(normal)) * held
+    target = f'target = {{ mode = "inertial", attitude = {end.as_quat(scalar_first=True).tolist()} }}'
+    nearest = []
+    for keep in ("", ', axis = [0, 0, -1], keep_out = "30 deg"'):
+        run = flown(built(mission(keep, target, SLEW.replace("0.01 deg", "0.05 deg"), duration=360)), 719)
+        attitude, _ = reference(run)
+        nearest.append(math.degrees(np.arccos(np.clip(attitude.apply([0, 0, -1]) @ sun, -1.0, 1.0)).min()))
+        assert (attitude[-1].inv() * end).magnitude() < 1e-12
+    assert nearest[0] < 0.5
+    assert 29.99 < nearest[1] < 45.0
+    with refused("law[1].mode[2].slew", "the axis needs a direction"):
+        mission(', axis = [0, 0, 0], keep_out = "30 deg"')
+    with refused("law[1].mode[2].slew.rate", "nothing"):
+        mission(slew='slew = {{ acceleration = "0.01 deg/s^2" }}')

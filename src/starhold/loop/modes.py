@@ -86,7 +86,7 @@ class ModeTargets:
             module: Any = part.module
             if isinstance(module, Slewing):
 
-                def begin(*_: Any, module: Any = module, numbers: Any = numbers) -> tuple[Followed]:
+                def begin(before: Followed, module: Any = module, numbers: Any = numbers) -> tuple[Followed]:
                     return (module.begun(numbers, state, attitude, step, craft, before),)
 
                 (before,) = when(both(first, _is(memory.mode, place)), begin, before)

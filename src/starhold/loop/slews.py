@@ -19,8 +19,8 @@ RESTING = Leg((1.0, 0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 class Slew(NamedTuple):
-    """The largest rate (rad/s), acceleration (rad/s2) and torque about each body axis (N m) of a slew, the cone that it keeps
-    out of and the Sun at the start (each () for none)."""
+    """The largest rate (rad/s), acceleration (rad/s2) and torque about each body axis (N m) of a slew, the cone that it
+    keeps out of, and the Sun at the start (each () for none)."""
 
     rate: Scalar
     acceleration: Scalar

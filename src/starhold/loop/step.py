@@ -144,7 +144,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         if by_mode:
             # The measurement of the law of a mode that begins is relative to the mode's own target.
             before = carry.memories.followed
-            if slews:
+            if target is not None and slews:
                 attitude = sight.state.attitude
                 before = target.module.begun(setup.target, carry.state, attitude, step, craft, before, carry.memory)
                 carry = carry._replace(memories=carry.memories._replace(followed=before))

@@ -17,7 +17,9 @@ from starhold.scenario.tables import Table
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
-TORQUE = Gain("N m", above=0.0, text="largest about each body axis, for which rate and acceleration are lowered; none if absent")
+TORQUE = Gain(
+    "N m", above=0.0, text="largest about each body axis, for which rate and acceleration are lowered; none if absent"
+)
 
 
 class SlewTable(Table):

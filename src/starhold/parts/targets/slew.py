@@ -81,7 +81,8 @@ def prepare(params: Params, period: float) -> Numbers:
             if (there := dot(to_reference(attitude, cone.axis), seen)) > cone.cosine:
                 raise ValueError(f"the axis is {_degrees(there)} from the Sun where the slew {word}; {_kept(params)}")
         if nearest > cone.cosine:
-            raise ValueError(f"the axis passes the Sun at {_degrees(nearest)} whatever the detour; {_kept(params)}")
+            passed = f"the axis passes the Sun at {_degrees(nearest)} on the best detour of two turns"
+            raise ValueError(f"{passed}; {_kept(params)}")
     legs = tuple(leg_of(turn, params.rate, params.acceleration) for turn in turns)
     return Numbers(start, legs, params.begin, params.torque_limit, period)
 
