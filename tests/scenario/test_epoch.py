@@ -110,10 +110,17 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
     assert declaring == {
         "residual-dipole", "solar-pressure", "magnetometer", "sun-sensor", "triad", "magnetic-unloading", "magnetorquers",
         "ground-station", "sun", "yaw-steering", "star-tracker", "coarse-sun-sensors", "quest", "slew",
+        "ground-strip",
     }  # fmt: skip
-    assert declaring - {"magnetorquers", "sun", "yaw-steering", "coarse-sun-sensors", "quest", "slew"} == set(
-        epochs(scenario())
-    )
+    assert declaring - {
+        "magnetorquers",
+        "sun",
+        "yaw-steering",
+        "coarse-sun-sensors",
+        "quest",
+        "slew",
+        "ground-strip",
+    } == set(epochs(scenario()))
 
 
 def _declares(part):
