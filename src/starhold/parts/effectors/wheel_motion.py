@@ -18,7 +18,6 @@ from starhold.algebra.circular import cosine_sine
 from starhold.algebra.elementary import exp
 from starhold.algebra.scalar import Scalar, absolute, less, maximum, minimum, where
 from starhold.algebra.several import each
-from starhold.algebra.structure import leaves
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, scale
 from starhold.parts.as_built import in_body, is_given, turn_of
 from starhold.parts.craft import vector
@@ -70,7 +69,7 @@ def with_more(
 def mounted(wheels: Wheels, errors: Sequence[Vector]) -> Wheels:
     """The wheels with each spin axis turned by a small angle about the body axes (rad), which laws and allocation do not
     know."""
-    if not is_given(errors):
+    if not is_given(*errors):
         return wheels
     axes = tuple(in_body(turn_of(error), axis) for error, axis in zip(errors, wheels.axes, strict=True))
     return wheels._replace(axes=axes, known_axes=wheels.axes)
@@ -79,12 +78,6 @@ def mounted(wheels: Wheels, errors: Sequence[Vector]) -> Wheels:
 def as_known(wheels: Wheels) -> Wheels:
     """The wheels with the axes for which laws and allocation take them."""
     return wheels._replace(axes=wheels.known_axes, known_axes=()) if wheels.known_axes else wheels
-
-
-def same(axes: Any, others: Any) -> bool:
-    """Whether axes are the same; numbers that differ between lanes are so where they are one array."""
-    pairs = zip(leaves(axes), leaves(others), strict=True)
-    return all(a is b or (isinstance(a, float) and isinstance(b, float) and a == b) for a, b in pairs)
 
 
 def _sides(axis: Vector) -> tuple[Vector, Vector]:

@@ -30,7 +30,6 @@ from starhold.parts.effectors.wheel_motion import (
     as_known,
     at_top_speed,
     limited,
-    same,
     shaken,
     slopes,
     speeds,
@@ -363,10 +362,7 @@ def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
 
 def shared_as(params: Wheels, known: Wheels) -> Wheels:
     """The wheels with a torque shared out among them as among those that laws take them for, if these are as many."""
-    known = as_known(known)
-    if len(params.axes) != len(known.axes):
-        return params
-    return params._replace(least=known.least, known_axes=() if same(params.axes, known.axes) else known.axes)
+    return params._replace(least=known.least) if len(params.axes) == len(known.axes) else params
 
 
 def axial_inertia(params: Wheels) -> NDArray[np.float64]:
