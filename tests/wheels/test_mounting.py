@@ -1,6 +1,5 @@
 """Wheels that are mounted askew: the body moves as SciPy has it, law and allocation go on as if they were not."""
 
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

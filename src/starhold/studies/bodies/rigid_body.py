@@ -22,6 +22,7 @@ from starhold.studies.modes import (
     hand_overs,
     mode_departures,
     named_modes,
+    parts_asked,
     same_numbers,
 )
 
@@ -84,6 +85,7 @@ class RigidBodyStudy(BodyStudy):
         steps, still = scenario.table.simulation.steps, loop.target.part.flag("STILL")
         wheels = "wheel_momentum" in recorded_of(loop)
         modal: Any = {"begins": begins_asked(scenario, loop.law), "fault": first_fault(scenario, loop)}
+        modal["spans"] = parts_asked(scenario, loop.law)
         return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **modal)
 
     def metric_set(self, run: Recording) -> MetricSet:

@@ -30,6 +30,9 @@ class BudgetTable(Table):
     start: Annotated[
         float | None, *quantity(Gain("s", at_least=0.0, text="errors count from this time; half of the run if absent"))
     ] = None
+    end: Annotated[
+        float | None, *quantity(Gain("s", above=0.0, text="errors count until this time; the end of the run if absent"))
+    ] = None
     window: Annotated[
         float | None, *quantity(Gain("s", above=0.0, text="length of windows; a tenth of that time if absent"))
     ] = None
