@@ -89,6 +89,7 @@ name = "tracker"
 kind = "stuck"
 reading = "attitude"
 limit = "5 s"
+modes = ["wait", "point", "sun"]
 [[law.monitor]]
 name = "jump"
 kind = "rate"

@@ -223,7 +223,8 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
     clock = Clock(epoch, scenario.table.simulation.duration)
     modes, gains = _joined(tables, reads, on_loss, clock, where, key)
     monitors = tuple(
-        read_monitor(one, scenario, where, f"{key}.monitor[{place}]") for place, one in enumerate(table.monitor, 1)
+        read_monitor(one, [each.name for each in tables], scenario, where, f"{key}.monitor[{place}]")
+        for place, one in enumerate(table.monitor, 1)
     )
     law = make_law(Modes(tuple(modes), on_loss, tuple(monitor for monitor, _ in monitors)))
     if needs_sky(law.module.tests):
