@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.report.commands import Block, Column, Command, Option, Result, Table, later
+from starhold.report.commands.replay import MAPPING, TELEMETRY
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -114,12 +115,10 @@ COMMAND = Command(
         "telemetry": Option(
             "",
             "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder",
-            content=lambda given: given,
+            content=TELEMETRY,
             argument="TELEMETRY",
         ),
-        "mapping": Option(
-            "", "a TOML file that says what its columns hold, or the name of one", content=lambda given: given
-        ),
+        "mapping": Option("", "a TOML file that says what its columns hold, or the name of one", content=MAPPING),
         "free": Option(
             "",
             'keys of the numbers to fit, with commas between: "spacecraft.inertia, part.gyro.bias"',

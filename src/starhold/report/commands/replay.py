@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.studies.replay import Comparison, Replay
 
+TELEMETRY, MAPPING = (later(f"studies.telemetry_files.existing{name}") for name in ("", "_mapping"))
+"""The readers of the options of these names."""
 MOST_PANELS = 6
 """Quantities that a figure shows: those that part first."""
 
@@ -59,10 +61,6 @@ def _numbers(result: Replay) -> Table:
     return Table(columns, rows)
 
 
-def _as_given(text: Any) -> Any:
-    return text
-
-
 def draw(result: Replay, title: str) -> Any:
     """A panel for each quantity: how far it is from what was recorded, and how far it may be, dashed."""
     import numpy as np
@@ -94,9 +92,9 @@ COMMAND = Command(
     doing=None,
     options={
         "telemetry": Option(
-            "", "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder", content=_as_given, argument="TELEMETRY"
+            "", "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder", content=TELEMETRY, argument="TELEMETRY"
         ),
-        "mapping": Option("", "a TOML file that says what its columns hold, or the name of one", content=_as_given),
+        "mapping": Option("", "a TOML file that says what its columns hold, or the name of one", content=MAPPING),
         "tolerance": Option("", "share of the largest value; else 0.01", content=later("studies.replay.tolerance_of")),
     },
     unstable=True,
