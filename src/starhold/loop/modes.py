@@ -80,7 +80,7 @@ class ModeTargets:
     def begun(
         self, params: tuple[Any, ...], state: Any, attitude: Any, step: Any, craft: Any, before: Followed, memory: Any
     ) -> Followed:
-        """What is remembered as a control step of the present mode begins, at an attitude."""
+        """The memory of them as a control step of the present mode begins, at an attitude."""
         first = less(memory.age, 0.5)
         for place, (part, numbers) in enumerate(zip(self.parts, params, strict=True)):
             module: Any = part.module

@@ -82,14 +82,14 @@ def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
 
 
 def _sine(params: Numbers, swings: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """The angle (rad), its rate and its acceleration after so many swings."""
+    """The angle (rad), its rate and its acceleration of a sine after so many swings."""
     cosine, sine = cosine_sine(swings)
     often = math.tau * params.often
     return params.amplitude * sine, often * params.amplitude * cosine, -often * often * params.amplitude * sine
 
 
 def _raster(params: Numbers, swings: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """The same for straight lines, with a constant acceleration where it turns round."""
+    """The angle (rad), its rate and its acceleration on straight lines, with a constant acceleration at their ends."""
     phase = swings - nearest(swings)
     quarter = 0.25 - absolute(0.25 - absolute(phase))
     sense, towards = side(phase), side(0.25 - absolute(phase))
