@@ -89,6 +89,7 @@ name = "tracker"
 kind = "stuck"
 reading = "attitude"
 limit = "5 s"
+modes = ["wait", "point", "sun"]
 [[law.monitor]]
 name = "jump"
 kind = "rate"
@@ -125,13 +126,14 @@ WATCHFUL = (
     + mode(
         "point",
         'target = { mode = "orbital" }',
+        'slew = { rate = "1 deg/s", acceleration = "0.02 deg/s^2", torque_limit = 1e-5, keep_out = "40 deg" }',
         'until = { elevation_below = "5 deg", latitude = "10 deg", longitude = "20 deg", sun_angle_above = "2 deg", '
         'axis = [1, 0, 0], sunlight_above = 0.5, not_after = 280, after = "10 s" }',
     )
     + mode("sun", 'until = { not_before = "200 s", to = "point" }')
     + mode("safe", 'until = { after = "30 s", to = "wait" }')
 )
-"""A flight with every kind of condition and of monitor."""
+"""A flight with every kind of condition and of monitor, and a slew."""
 
 WHEELS = """
 [wheels]

@@ -146,6 +146,8 @@ def test_contributions_are_what_sources_add_to_the_loop_itself():
     short = LINEAR | {"simulation": {"duration": 100.0, "control_period": PERIOD}, "budget": {"start": 5.0, "runs": 8}}
     turned = short | {"initial": {"angles": ["0.2 deg", 0, 0]}}
     on, off = (sh.budget(sh.scenario(tables)) for tables in (short, turned))
+    # A budget that ends earlier is that of a shorter flight.
+    assert sh.budget(sh.scenario(LINEAR | {"budget": short["budget"] | {"end": 100.0 - PERIOD}})).records() == on.records()
     assert off.level(LOOP, "APE") > 5.0 * off.level("attitude noise", "APE")
     for source in NOISE:
         for index in on.indices:
@@ -175,6 +177,8 @@ def test_faults_never_come():
         ({"budget.window": 0.5}, "budget.window: found 0.5 s"),
         ({"budget.window": -1.0}, "budget.window"),
         ({"budget.window": "10 m"}, "budget.window"),
+        ({"budget.end": 700.0}, "budget.end: found 700 s"),
+        ({"budget.end": 101.0}, "budget.start: found 100 s"),
         ({"budget.separation": 495.0}, "budget.separation: found 495 s"),
         ({"budget.separation": 0.0}, "budget.separation"),
         ({"budget.start": 599.0}, "budget.start: found 599 s"),

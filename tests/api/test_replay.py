@@ -9,7 +9,7 @@ import starhold as sh
 from starhold.parts.estimators import mekf
 from starhold.studies.replay import tolerance_of
 from tests.api.flown_telemetry import FILE, flown, table
-from tests.refusals import refused
+from tests.refusals import complains, refused
 from tests.running import starhold
 
 SWAPPED_AT = 30.0
@@ -128,6 +128,15 @@ def test_what_cannot_be_replayed_is_refused(tmp_path):
     with refused("no gaussian_attitude and gaussian_rate"):
         sh.replay("three-laws-noise", telemetry=sh.simulate(sh.load("three-laws-noise").with_({"simulation.duration": 1.0})))
     assert tolerance_of("0.05") == 0.05
+
+
+@pytest.mark.parametrize("command", ["replay", "identify"])
+def test_a_wrong_file_is_named_before_a_folder_of_results(command, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "summary.json").write_text("{}")
+    for given in (["no.csv"], ["tm.csv", "--mapping", "no.toml"]):
+        (tmp_path / "tm.csv").write_text("time\n0\n")
+        complains(starhold(command, "cubesat-nadir", *given, "-o", "out", cwd=tmp_path), given[-1])
 
 
 @pytest.mark.slow

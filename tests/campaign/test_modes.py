@@ -10,7 +10,7 @@ from starhold.studies.compare import record
 from starhold.studies.verification import by_flight
 from tests.making import built
 from tests.missions import GUARDED, SAFE, WHEELS, cubesat, mode
-from tests.refusals import replaced
+from tests.refusals import refused, replaced
 
 FAULT = '[[part]]\ntype = "gyro"\nnoise = 1e-5\n[[fault]]\ntime = 40\nwheel = 1\nlost = true\ndelay = 30\n'
 SPIN = '[[law.monitor]]\nname = "spin"\nkind = "range"\nreading = "rate"\nlimit = "2.4 deg/s"\n'
@@ -57,6 +57,49 @@ def test_alarms_are_those_of_each_runs_own_flight(tmp_path):
         assert row["missed_detections"] == float(trips[-1] == trips[struck - 1])
     assert 2 < (frame["false_alarms"] > 0.0).sum() < 22
     assert 2 < (frame["missed_detections"] > 0.0).sum() < 22
+
+
+PARTS = """
+[[requirement]]
+id = "EARLY"
+method = "campaign"
+metric = "peak_attitude_error"
+window = ["10 s", "20 s"]
+at_most = "20 deg"
+[[requirement]]
+id = "LATE"
+method = "campaign"
+metric = "peak_rate_error"
+in_mode = "safe"
+after = "5 s"
+at_most = "2 deg/s"
+[campaign]"""
+
+
+def test_errors_in_a_window_or_a_mode_are_those_of_each_runs_own_flight():
+    text = replaced(TEXT[: TEXT.index("[[requirement]]") - 1] + TEXT[TEXT.index("[campaign]") :], "[campaign]", PARTS)
+    frame, never = sh.campaign(parse(text, "m.toml"), search=False).frame(), 0
+    for run, row in frame.iterrows():
+        flight = own_flight(text, row, run)
+        angles = 2.0 * np.arcsin(np.linalg.norm(flight["attitude_error"][20:41, 1:], axis=1))
+        assert row["peak_attitude_error of EARLY"] == pytest.approx(angles.max(), rel=1e-12)
+        late = (flight["mode"] == 2.0) & (flight["time_in_mode"] >= 5.0)
+        rates = np.linalg.norm(flight["rate_error"][late], axis=1)
+        never += not late.any()
+        if late.any():
+            assert row["peak_rate_error of LATE"] == pytest.approx(rates.max(), rel=1e-12)
+            assert row["margin.LATE"] == np.radians(2.0) - row["peak_rate_error of LATE"]
+        else:
+            assert np.isnan(row["peak_rate_error of LATE"])
+            assert row["margin.LATE"] == -np.inf
+    assert 2 < never < 22
+    for old, new, *words in (
+        ('in_mode = "safe"', 'in_mode = "rest"', "requirement[2].in_mode", "a mode of every law that is flown"),
+        ('"20 s"]', '"200 s"]', "requirement[1].window", "between 0 s and the flight's 100 s"),
+        ('"peak_rate_error"', '"effort"', "peak_attitude_error or peak_rate_error, of runs in a mode or a window"),
+    ):
+        with refused(*words):
+            sh.campaign(parse(replaced(text, old, new), "m.toml"), search=False)
 
 
 @pytest.mark.slow

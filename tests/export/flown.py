@@ -35,7 +35,12 @@ LAWS = {
     "mission": ("cubesat-mission", "mission"),
 }
 """Names in C: built-in scenario and law."""
-CLOCKED = ("sun", "yaw-steering")
+CLOCKED: dict[str, tuple[Any, ...]] = {
+    "sun": (),
+    "yaw-steering": (),
+    "ground-strip": (0.1, 0.0, 0.3, -0.1, 20.0, 100.0),
+    "scan": (0.2, 60.0, 1),
+}
 """Targets that depend on the time."""
 
 
@@ -111,7 +116,7 @@ def loop_of(name: str) -> Any:
         second = fit("sensor", "star-tracker", 2e-4, 3e-4, called="second")
         return replace(loop, parts=(*loop.parts, second)) if name == "two trackers" else loop
     if name in CLOCKED:
-        return choices()["orbital target"].without("target").with_parts(fit("target", name))
+        return choices()["orbital target"].without("target").with_parts(fit("target", name, *CLOCKED[name]))
     if name not in LAWS:
         return choices()[name]
     scenario = load(LAWS[name][0])

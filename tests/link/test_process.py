@@ -14,7 +14,7 @@ from tests.tiers import fewer, leading
 
 STEPS = 400
 LOOPS = ["lyapunov", "estimator", "sun", "yaw-steering", "wheel", "target from a table", "estimator on [sensor]", "l2",
-         "mission", "b_dot", "mpc"]  # fmt: skip
+         "mission", "b_dot", "mpc", "ground-strip", "scan", "modes that watch"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", leading(LOOPS, 3))

@@ -20,6 +20,7 @@ from starhold.studies.modes import epoch_of, modes_flown
 from starhold.studies.verification import by_flight
 from tests.making import built, flown
 from tests.missions import GUARDED, HEADS, SAFE, WHEELS, cubesat, mode
+from tests.refusals import refused
 
 FREE = GUARDED.replace('on_loss = "safe"\n', "")
 DAY = sum(erfa.cal2jd(2026, 3, 5)) + 6.5 / 24.0
@@ -98,6 +99,20 @@ def test_a_lost_tracker_leads_to_the_safe_mode_and_a_fix_out_of_it():
     assert (safe[0], safe[-1]) == (104.0, 159.5)
     assert np.array_equal(run["mode"] == 2.0, run["tripped"] == 1.0)
     assert run["trips"][-1] == 1.0
+
+
+def test_a_monitor_looks_in_its_modes_alone_and_anew_each_time():
+    monitor = '[[law.monitor]]\nname = "still"\nkind = "stuck"\nreading = "attitude"\nlimit = "5 s"\nmodes = ["sun"]\n'
+    text = cubesat(HEADS, GUARDED, monitor) + mode("wait", 'until = { after = "MOMENT" }')
+    text += mode("sun", 'until = { after = "400 s" }') + mode("safe")
+    # The outage begins at 100 s; in the mode before it counts for nothing.
+    for moment, safe in (("50 s", 104.0), ("120 s", 125.0), ("158 s", math.inf)):
+        scenario = parse(text.replace("MOMENT", moment), "m.toml")
+        run = flown(built(scenario), 600)
+        begins = [one.time for one in modes_flown(scenario.laws[0].law, run) if one.mode == "safe"]
+        assert (begins or [math.inf])[0] == pytest.approx(safe, abs=1.0)
+    with refused("law[1].monitor[1].modes", 'found "sum"', "did you mean sun?"):
+        parse(text.replace("MOMENT", "50 s").replace('["sun"]', '["sum"]'), "m.toml")
 
 
 @pytest.mark.slow

@@ -10,7 +10,8 @@ from scipy.optimize import linprog
 
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
-from starhold.parts.effectors.wheels import MOST, allocate, allocate_peak, lose, make_wheels, with_facets
+from starhold.parts.effectors.wheel_arrays import MOST
+from starhold.parts.effectors.wheels import allocate, allocate_peak, lose, make_wheels, with_facets
 
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 COPLANAR = (*three_orthogonal(), (1.0, 1.0, 0.0), (1.0, -2.0, 0.0))

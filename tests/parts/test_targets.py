@@ -163,11 +163,24 @@ def goals(name, steps, places, speeds, **params):
 START = np.array([6.878e6, 0.0, 0.0]), np.array([0.0, -1.017e3, 7.544e3])
 # Near the zero meridian, over the equator: the station is in view.
 NOON = {"epoch": (2026.0, 3.0, 5.0, 13.0, 5.0, 0.0)}
+STRIP = (
+    dict(
+        zip(
+            ("latitude", "longitude", "to_latitude", "to_longitude", "begin", "duration"),
+            (0.1, 0.0, 0.3, -0.1, 60.0, 300.0),
+            strict=True,
+        )
+    )
+    | NOON
+)
 CASES = {
     "orbital": {},
     "sun": {"reference": (0.3, -0.2, 1.0), **NOON},
     "yaw-steering": NOON,
     "ground-station": {"latitude": 0.1, "longitude": 0.0, "elevation": 0.0, **NOON},
+    "ground-strip": STRIP,
+    "scan": {"amplitude": 0.4, "swing": 800.0},
+    "scan raster": {"amplitude": 0.4, "swing": 300.0, "shape": 1},
 }
 
 
@@ -175,18 +188,61 @@ CASES = {
 def test_rates_and_accelerations_are_those_of_the_attitude(name):
     steps = np.arange(0, 900, 1)
     places, speeds = orbit(START[0], 1.05 * START[1], steps * PERIOD)
-    found, rotations = goals(name, steps, places, speeds, **CASES[name])
+    found, rotations = goals(name.partition(" ")[0], steps, places, speeds, **CASES[name])
     differences = (rotations[:-2].inv() * rotations[2:]).as_rotvec() / (2.0 * PERIOD)
     rates, accelerations = (np.array([getattr(goal, key) for goal in found]) for key in ("rate", "acceleration"))
     # A jump of the target, as a station comes into view, is no rate.
     smooth = np.linalg.norm(differences, axis=1) < 0.1
-    assert smooth.mean() > 0.99
+    if name in ("ground-strip", "scan raster"):
+        # Where the place begins to move, and where lines turn round.
+        jumps = [np.abs(np.diff(x, axis=0)).max(axis=1) > 0.05 * np.abs(x).max() for x in (rates, accelerations)]
+        smooth &= ~(jumps[0] | jumps[1])[1:] & ~(jumps[0] | jumps[1])[:-1]
+    assert smooth.mean() > 0.97
     size = np.abs(rates).max()
     assert size > (1e-8 if name == "sun" else 1e-3)
     assert np.abs(differences - rates[1:-1])[smooth].max() < 2e-5 * size
     slopes = (rates[2:] - rates[:-2]) / (2.0 * PERIOD)
     steady = np.abs(slopes).max(axis=1) < 1e-3
     assert np.abs(slopes - accelerations[1:-1])[smooth & steady].max() < 1e-4 * np.abs(accelerations).max() + 1e-18
+
+
+def test_a_strip_is_followed_on_the_ellipsoid_of_the_iau():
+    """The axis meets the ellipsoid at places that lie in the plane of the ends, evenly spread between them."""
+    steps = np.arange(0, 900, 5)
+    places, speeds = orbit(*START, steps * PERIOD)
+    turns, dates = goals("ground-strip", steps, places, speeds, **STRIP)[1], steps * PERIOD / 86400.0
+    spins = Rotation.from_rotvec(np.outer(erfa.gmst82(JULIAN[0], JULIAN[1] + (6.0 + 35.0 / 60.0) / 24.0 + dates), [0, 0, 1]))
+    here, ahead = spins.inv().apply(places), spins.inv().apply(turns.apply([0.0, 0.0, 1.0]))
+    shrink = np.array([1.0, 1.0, 1.0 / (1.0 - 1.0 / 298.257223563)]) / 6378137.0
+    p, d = here * shrink, ahead * shrink
+    b, c = np.sum(p * d, axis=1), np.sum(p * p, axis=1) - 1.0
+    met = here + ahead * ((-b - np.sqrt(b * b - np.sum(d * d, axis=1) * c)) / np.sum(d * d, axis=1))[:, None]
+    first, last = (np.array(erfa.gd2gc(1, *place, 0.0)) for place in ((0.0, 0.1), (-0.1, 0.3)))
+    first, last, met = (x / np.linalg.norm(x, axis=-1)[..., None] for x in (first, last, met))
+    share = np.clip((steps * PERIOD - 60.0) / 300.0, 0.0, 1.0)[:, None]
+    angle = math.acos(first @ last)
+    wanted = (np.sin((1.0 - share) * angle) * first + np.sin(share * angle) * last) / math.sin(angle)
+    assert np.abs(met - wanted).max() < 1e-6
+
+
+@pytest.mark.parametrize("shape", ["sinusoidal", "raster"])
+def test_a_scan_swings_across_the_motion(shape):
+    steps = np.arange(0, 600)
+    places, speeds = orbit(*START, steps * PERIOD)
+    params = {"amplitude": 0.4, "swing": 100.0, "shape": ("sinusoidal", "raster").index(shape), "turning": 0.1}
+    turns = goals("scan", steps, places, speeds, **params)[1]
+    axis, normal = turns.apply([0.0, 0.0, 1.0]), np.cross(places, speeds)
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    down = -places / np.linalg.norm(places, axis=1)[:, None]
+    assert np.abs(np.sum(axis * np.cross(normal, down), axis=1)).max() < 1e-14
+    angles, phase = np.arctan2(np.sum(axis * normal, axis=1), np.sum(axis * down, axis=1)), steps * PERIOD / 100.0
+    if shape == "sinusoidal":
+        assert np.abs(angles - 0.4 * np.sin(math.tau * phase)).max() < 1e-14
+    else:
+        straight = 2.0 / math.pi * np.arcsin(np.sin(math.tau * phase))
+        flat = np.abs(straight) < 0.89
+        assert np.abs(angles - 0.4 * straight / 0.95)[flat].max() < 1e-14
+        assert np.abs(angles).max() == pytest.approx(0.4, abs=1e-14)
 
 
 def test_a_station_is_seen_where_the_iau_s_routines_have_it():

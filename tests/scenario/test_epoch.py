@@ -111,6 +111,7 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
         "residual-dipole", "solar-pressure", "magnetometer", "sun-sensor", "triad", "magnetic-unloading", "magnetorquers",
         "ground-station", "sun", "yaw-steering", "star-tracker", "coarse-sun-sensors", "quest", "slew",
         "magnetometer-filter",
+        "ground-strip",
     }  # fmt: skip
     assert declaring - {
         "magnetorquers",
@@ -120,6 +121,7 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
         "quest",
         "slew",
         "magnetometer-filter",
+        "ground-strip",
     } == set(epochs(scenario()))
 
 

@@ -95,7 +95,7 @@ mode = "inertial"↵attitude = [1, 0, 0, 0] | mode = "history" | target.file
 mode = "inertial"↵attitude = [1, 0, 0, 0] | mode = "history"↵file = "no.csv" | target.file | no.csv
 attitude = [0, 1, 1, 1] | attitude = [0, 1, 1, 1]↵angles = [0, 0, 0] | initial.angles | either
 [orbit] | [orbit | not TOML
-"0.01 N m" | "0.01 N m"↵actuator_lag = 1e-20 | part lag | a time constant of 1e-20 | a slower one | too many
+"0.01 N m" | "0.01 N m"↵actuator_lag = 1e-20 | part lag | a time constant of 1e-20 s | a slower one | too many
 "0.01 N m" | "0.01 N m"↵actuator_lag = "10 ms" | substeps: found 1 | at least 20 substeps, for lag has a time
 k_rate = 0.09 | form = "settling"↵bandwidth = 0.1 | law[1].bandwidth: found an input of another form than "settling"
 """)
@@ -106,7 +106,7 @@ GAINS = "k_rate = 0.09                    # N m s\nk_attitude = 0.009           
 FAULTS += [
     [STATE, 'altitude = "600 km"', "orbit.inclination: found nothing; allowed: an angle"],
     ["[orbit]\n" + STATE, "#", "gravity"],
-    ["[target]", BENDING, "simulation.substeps", "at least 80 substeps, for flexible-modes has a time constant of 0.0025"],
+    ["[target]", BENDING, "simulation.substeps", "at least 80 substeps, for flexible-modes has a time constant of 0.0025 s"],
     ["k_rate = 0.09", FORM, 'found a gain beside form = "bandwidth"', "bandwidth, damping, or the gains without the form"],
     [GAINS, 'form = "bandwidth"\nbandwith = 0.1', "law[1].bandwith: found an unknown key; did you mean bandwidth?"],
     ["2000.0", 310 * "1", "simulation.duration", "60 digits"],

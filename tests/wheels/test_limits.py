@@ -11,7 +11,8 @@ from starhold.analysis.rigid_body import METRICS, measure
 from starhold.errors import InputError
 from starhold.loop.kernels import fly_plainly, make_step
 from starhold.parts.effectors.envelope import authority
-from starhold.parts.effectors.wheels import MOST, allocate_peak, with_facets
+from starhold.parts.effectors.wheel_arrays import MOST
+from starhold.parts.effectors.wheels import allocate_peak, with_facets
 from starhold.parts.part import Fitted, Part
 from starhold.report.attitude_plots import collect
 from starhold.scenario.bodies.rigid_body.craft import torque_limit

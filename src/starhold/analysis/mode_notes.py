@@ -1,4 +1,5 @@
-"""Notes on the modes of a flight: when they first begin, and whether losses that are noticed were there."""
+"""Notes on the modes of a flight: when they first begin, whether losses that are noticed were there, and the largest errors
+in a mode or a window."""
 
 from __future__ import annotations
 
@@ -6,35 +7,66 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from starhold.algebra.scalar import absolute, both, either, less, opposite, where
+from starhold.algebra.scalar import absolute, both, either, less, maximum, opposite, where
 from starhold.analysis.meter import INSTANT, Metric
 
 ALARMS = ("false_alarms", "missed_detections")
 """Losses that were noticed before any fault happened, and whether no loss was noticed from the first fault on."""
 
 
+PEAKS = {"peak_attitude_error": "angle", "peak_rate_error": "root"}
+"""Largest errors of a whole flight, or of the part that a requirement covers, with the kinds of metrics."""
+
+
+class Span(NamedTuple):
+    """A part of a flight: a mode, counted from 1 (none for all of it), and the times between which it lies, in seconds since
+    the mode began, or in instants of the flight."""
+
+    mode: tuple[float, ...]
+    begin: float
+    end: float
+
+    def covers(self, quantities: Mapping[str, Any], now: Any) -> Any:
+        """Whether an instant lies in it."""
+        since = quantities["time_in_mode"] if self.mode else now
+        inside = both(less(self.begin, since), less(since, self.end))
+        return both(_is(quantities["mode"], self.mode[0]), inside) if self.mode else inside
+
+
+def span(mode: int | None, begin: float, end: float, period: float) -> Span:
+    """The part of a flight between two times (s) that has the control instants from one to the other."""
+    first, last = math.ceil(begin / period - 1e-9) - 0.5, end / period + 0.5
+    return Span((), first, last) if mode is None else Span((float(mode),), first * period, last * period)
+
+
 class Wanted(NamedTuple):
-    """The modes whose begin is wanted for, counted from 1, and the instant of the first fault: infinite without any, none
-    where losses are not noticed."""
+    """The modes whose begin is wanted for, counted from 1; the instant of the first fault: infinite without any, none where
+    losses are not noticed; and the parts of a flight in which angles, and rates, are wanted for."""
 
     begins: tuple[float, ...] = ()
     fault: tuple[float, ...] = ()
+    angles: tuple[Span, ...] = ()
+    rates: tuple[Span, ...] = ()
 
 
 class Modal(NamedTuple):
-    """Notes on modes: the last instants before each first begins, and the counts of `ALARMS`."""
+    """Notes on modes: the last instants before each first begins, the counts of `ALARMS`, and the largest squares of half
+    the angle's sine and of the rate error in parts of the flight (-1: none of them was flown)."""
 
     begins: tuple[float, ...]
     alarms: tuple[float, ...]
+    angles: tuple[float, ...]
+    rates: tuple[float, ...]
 
 
 def begun(wanted: Wanted) -> Any:
     """The notes before a flight; none where nothing is wanted."""
-    return Modal((-1.0,) * len(wanted.begins), (0.0, 0.0) * len(wanted.fault)) if wanted.begins or wanted.fault else ()
+    none: Any = tuple((-1.0,) * len(each) for each in (wanted.begins, wanted.angles, wanted.rates))
+    return Modal(none[0], (0.0, 0.0) * len(wanted.fault), *none[1:]) if any(wanted) else ()
 
 
-def noted(seen: Any, quantities: Mapping[str, Any], now: Any, wanted: Wanted) -> Any:
-    """The notes of an instant."""
+def noted(seen: Any, quantities: Mapping[str, Any], now: Any, wanted: Wanted, angle: Any, rate: Any) -> Any:
+    """The notes of an instant, of the squares of half the angle's sine and of the rate error."""
     if not seen:
         return seen
     begins = tuple(
@@ -46,18 +78,29 @@ def noted(seen: Any, quantities: Mapping[str, Any], now: Any, wanted: Wanted) ->
         trips, early = quantities["trips"], less(now, wanted.fault[0])
         false = where(early, trips, alarms[0])
         alarms = (false, where(either(early, less(false + 0.5, trips)), 0.0, 1.0))
-    return Modal(begins, alarms)
+    peaks = (
+        tuple(where(one.covers(quantities, now), maximum(most, square), most) for most, one in zip(*pair, strict=True))
+        for square, pair in ((angle, (seen.angles, wanted.angles)), (rate, (seen.rates, wanted.rates)))
+    )
+    return Modal(begins, alarms, *peaks)
 
 
-def table(names: tuple[str, ...], rows: Any, wanted: Wanted, period: float) -> dict[str, Metric]:
-    """The metrics of notes that lie at these rows; names: of the begins. Nothing is missed where there is no fault."""
+def table(
+    names: tuple[str, ...], spans: Mapping[str, tuple[str, Span]], rows: Any, wanted: Wanted, period: float
+) -> dict[str, Metric]:
+    """The metrics of notes that lie at these rows; names: of the begins; spans: parts of a flight by the names of their
+    metrics, with the error that is wanted. Nothing is missed where there is no fault."""
     if not rows:
         return {}
     begins = {name: Metric("s", INSTANT, (row,), (period,), kept=0.0) for name, row in zip(names, rows.begins, strict=True)}
     alarms = {name: Metric("1", "number", (row,)) for name, row in zip(ALARMS, rows.alarms, strict=False)}
     if wanted.fault == (math.inf,):
         del alarms[ALARMS[1]]
-    return begins | alarms
+    peaks: dict[str, Metric] = {}
+    for (metric, kind), unit, places in zip(PEAKS.items(), ("rad", "rad/s"), (rows.angles, rows.rates), strict=True):
+        called = [name for name, (of, _) in spans.items() if of == metric]
+        peaks |= {name: Metric(unit, kind, (row,)) for name, row in zip(called, places, strict=True)}
+    return begins | alarms | peaks
 
 
 def _is(mode: Any, place: Any) -> Any:

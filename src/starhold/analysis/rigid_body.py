@@ -17,14 +17,12 @@ from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
 from starhold.analysis import mode_notes, validity_notes
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
-from starhold.analysis.mode_notes import Modal, Wanted
+from starhold.analysis.mode_notes import PEAKS, Modal, Span, Wanted
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
 from starhold.simulation.lane import Recording
 
 DECADES = range(1, 7)
 """The k of the accuracies 10^-k whose iterations are counted."""
-PEAKS = {"peak_attitude_error": "angle", "peak_rate_error": "root"}
-"""Largest errors of a whole flight, or of the part that a requirement covers, with the kinds of metrics."""
 EXTRAS = ("overshoot", "iterations", *PEAKS)
 """Metrics that campaigns and requirements measure on request; the first two cost more in a kernel."""
 OF_CAMPAIGNS = ("peak_rate", "drift", "peak_wheel_momentum", *PEAKS)
@@ -137,17 +135,20 @@ def make_meter(
     estimated: bool = False,
     begins: Mapping[str, int] = MappingProxyType({}),
     fault: tuple[float, ...] = (),
+    spans: Mapping[str, tuple[str, Span]] = MappingProxyType({}),
 ) -> Meter:
     """The meter of flights of so many steps of a period (s), or of samples at such intervals.
 
     limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
     that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
     rest; wheels: the body has some; estimated: an estimator says whether it is valid; begins: modes whose first begin is
-    noted, counted from 1, by the names of their metrics; fault: the instant of the first fault, as `Wanted` has it."""
+    noted, counted from 1, by the names of their metrics; fault: the instant of the first fault, as `Wanted` has it; spans:
+    parts of a flight in which one of PEAKS is noted, by the names of their metrics."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
-    wanted = Wanted(tuple(map(float, begins.values())), fault)
+    parts = (tuple(part for of, part in spans.values() if of == peak) for peak in PEAKS)
+    wanted = Wanted(tuple(map(float, begins.values())), fault, *parts)
     modal = mode_notes.begun(wanted)
     begun: Any = (
         -1.0,
@@ -178,7 +179,7 @@ def make_meter(
     early, late = (_note(limit, still, stage, turns, iterations) for stage in (False, True))
     table = (
         _table(rows, period, every, wheels)
-        | mode_notes.table(tuple(begins), rows.modal, wanted, period)
+        | mode_notes.table(tuple(begins), spans, rows.modal, wanted, period)
         | validity_notes.table(rows.validity, period)
         | {name: Metric("rad", "apart", (row,)) for name, row in zip(cones, rows.cones, strict=True)}
     )
@@ -293,7 +294,7 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             maximum(seen.window_angle, angle_square),
             maximum(seen.window_rate, rate_square),
             maximum(seen.window_torque, torque_square),
-            mode_notes.noted(seen.modal, quantities, now, bounds.modal),
+            mode_notes.noted(seen.modal, quantities, now, bounds.modal, angle_square, rate_square),
             validity_notes.noted(seen.validity, quantities, now, bounds.last),
         )
 

@@ -167,6 +167,7 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
         key, path = reading.place.key, reading.place.path
         name = str(path[0])
         modelled = name in body.modelled or (name in body.designed and _designs(tables) and key not in scenario.table.shared)
+        unknown = "mounting_error" in path
         computed = name == "part" and _is_known(scenario, tables["part"], int(path[1]), str(path[2]))
         if computed and not table.known_to_law:
             raise reading.place.refuse("known_to_law", "false", "true, because laws compute their commands with this number")
@@ -178,7 +179,7 @@ def _nominal_tables(readings: Sequence[KeyReading]) -> dict[str, Any]:
             raise reading.place.refuse(
                 "known_to_law", "false", "true, because laws of this body know the numbers of this table"
             )
-        if table.known_to_law and not modelled and not computed and name != body.marker:
+        if table.known_to_law and (unknown or not modelled) and not computed and name != body.marker:
             raise reading.place.refuse("known_to_law", "true", "false, because no law receives it or is designed with it")
         given = scenario.table.nominal
         if modelled and (name in given or not table.known_to_law):

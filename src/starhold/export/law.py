@@ -225,6 +225,10 @@ class Counted:
         """The goal of the module at the step of the count."""
         return self.module.goal(params[0], state, params[1], before, *mode)
 
+    def begun(self, params: tuple[Any, Any], state: Any, attitude: Any, step: Any, *more: Any) -> Any:
+        """The memory of the module at the step of the count."""
+        return self.module.begun(params[0], state, attitude, params[1], *more)
+
 
 class _Clock:
     """A control step that notes whether it is looked at."""
@@ -239,7 +243,7 @@ class _Clock:
 def _tells_time(loop: ClosedLoop) -> bool:
     """Tell whether the goal of a loop's target depends on the time, as those at the Sun and at stations do."""
     clock, mode = _Clock(), (0.0,) if loop.target.part.flag("BY_MODE") else ()
-    loop.target.part.module.goal(loop.setup().target, loop.start, clock, (1.0, 0.0, 0.0, 0.0), *mode)
+    loop.target.part.module.goal(loop.setup().target, loop.start, clock, loop.carry().memories.followed, *mode)
     return clock.seen
 
 

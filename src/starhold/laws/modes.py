@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
@@ -236,7 +236,7 @@ class Modes:
             following = where(truth, float(to), following)
         losses = memory.losses
         if self.on_loss is not None:
-            lost, losses = self._noticed(gains, losses, now)
+            lost, losses = self._noticed(gains, losses, now, memory.mode)
             following = where(lost, float(self.on_loss), following)
         switched = less(0.5, absolute(following - memory.mode))
         memories = tuple(
@@ -246,13 +246,16 @@ class Modes:
         instants = tuple(where(switched, 0.0, n) for n in instants)
         return Memory(following, where(switched, 0.0, age), instants, memories, memory.fresh, watch, losses)
 
-    def _noticed(self, gains: Any, losses: Losses, now: Facts) -> tuple[Truth, Losses]:
-        """Whether a mode is to begin because of a loss: as long as a monitor is tripped, and as the last wheel is lost of
-        those that may be."""
+    def _noticed(self, gains: Any, losses: Losses, now: Facts, mode: Scalar) -> tuple[Truth, Losses]:
+        """Whether a mode is to begin because of a loss in this one: as long as a monitor is tripped, and as the last wheel
+        is lost of those that may be. A monitor begins anew with its modes."""
         guards, tripped = list[Guard](), 0.0
         numbers = iter(gains[len(gains) - 2 * len(self.monitors) :])
         for place, (monitor, guard) in enumerate(zip(self.monitors, losses.guards, strict=True), 1):
             truth, guard = watched(monitor, guard, now, next(numbers), next(numbers))
+            if monitor.modes:
+                looks = reduce(either, (_is(mode, one) for one in monitor.modes))
+                truth, guard = both(looks, truth), chosen(looks, guard, monitor.at_start)
             # The first of them is told.
             tripped = where(both(truth, less(tripped, 0.5)), float(place), tripped)
             guards.append(guard)

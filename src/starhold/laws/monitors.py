@@ -36,6 +36,8 @@ class Monitor(NamedTuple):
     size: int = 1
     """How many numbers that has: 4 for an attitude, whose unit is rad."""
     sensor: int | None = 0
+    modes: tuple[int, ...] = ()
+    """The modes in which it looks, counted from 0; () for all."""
 
     def fields(self) -> list[Field]:
         """Its numbers under their keys."""

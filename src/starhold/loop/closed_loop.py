@@ -7,6 +7,7 @@ from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 
+from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.structure import alike, leaves
 from starhold.algebra.vector import ZERO, Vector, apply
 from starhold.laws.catalogue import Law
@@ -292,7 +293,7 @@ class ClosedLoop:
         sensors, estimator = self.used("sensor"), next(iter(self.used("estimator")), None)
         kept = NoMemory() if estimator is None else estimator.remembered(setup.estimator, start)
         memories = Memories(
-            goal.attitude if goal is not None and self.target.part.flag("FOLLOWS") else NoMemory(),
+            self._followed(goal.attitude, setup) if goal is not None and self.target.part.flag("FOLLOWS") else NoMemory(),
             tuple(f.remembered(numbers) for f, numbers in zip(self.used("environment"), setup.environments, strict=True)),
             tuple(f.remembered(numbers, start) for f, numbers in zip(sensors, setup.sensors, strict=True)),
             tuple(before_first(f.part, start) for f in sensors if is_recorded(f.part)),
@@ -310,7 +311,12 @@ class ClosedLoop:
     def _goal(self, start: Any, setup: Setup) -> Goal:
         """The goal at the start."""
         mode = (0.0,) if self.target.part.flag("BY_MODE") else ()
-        return self.target.part.module.goal(setup.target, start, 0, (1.0, 0.0, 0.0, 0.0), *mode)
+        return self.target.part.module.goal(setup.target, start, 0, self._followed((1.0, 0.0, 0.0, 0.0), setup), *mode)
+
+    def _followed(self, attitude: Quaternion, setup: Setup) -> Any:
+        """The memory of the target at the start, from the attitude that it is continued from."""
+        first = self.target.part.hook("first")
+        return attitude if first is None else first(setup.target, attitude)
 
 
 def is_recorded(sensor: Part) -> bool:

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from starhold.algebra.scalar import absolute, less
+from starhold.algebra.quaternion import NO_TURN
+from starhold.algebra.scalar import Truth, absolute, both, less
 from starhold.algebra.structure import chosen
+from starhold.algebra.structured import when
 from starhold.algebra.vector import ZERO
 from starhold.laws.modes import mode_laws
 from starhold.loop.closed_loop import ClosedLoop, can_be_inactive
+from starhold.loop.slews import RESTING, Followed, Slew, Slewing, reached, slewing
 from starhold.parts.contract import Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -61,17 +64,54 @@ class ModeTargets:
             if examine is not None:
                 examine(numbers, craft)
 
+    @property
+    def SLEWS(self) -> bool:  # noqa: N802
+        """Whether one of them is reached by a slew as its mode begins."""
+        return any(isinstance(part.module, Slewing) for part in self.parts)
+
+    def first(self, params: tuple[Any, ...], attitude: Any) -> Any:
+        """The memory of them at the start: the attitude that they are continued from, with the path of a slew if there is
+        one."""
+        if not self.SLEWS:
+            return attitude
+        slews = [numbers.slew for part, numbers in zip(self.parts, params, strict=True) if isinstance(part.module, Slewing)]
+        return Followed(attitude, 0.0, NO_TURN, (RESTING,) * (2 if any(slew.cone for slew in slews) else 1))
+
+    def begun(
+        self, params: tuple[Any, ...], state: Any, attitude: Any, step: Any, craft: Any, before: Followed, memory: Any
+    ) -> Followed:
+        """The memory of them as a control step of the present mode begins, at an attitude."""
+        first = less(memory.age, 0.5)
+        for place, (part, numbers) in enumerate(zip(self.parts, params, strict=True)):
+            module: Any = part.module
+            if isinstance(module, Slewing):
+
+                def begin(before: Followed, module: Any = module, numbers: Any = numbers) -> tuple[Followed]:
+                    return (module.begun(numbers, state, attitude, step, craft, before),)
+
+                (before,) = when(both(first, _is(memory.mode, place)), begin, before)
+        return before
+
     def goal(self, params: tuple[Any, ...], state: Any, step: Any, before: Any, mode: Any) -> Goal:
         """The goal of the present mode."""
-        goals = [part.module.goal(numbers, state, step, before) for part, numbers in zip(self.parts, params, strict=True)]
+        attitude = before.attitude if self.SLEWS else before
+        goals = [
+            part.module.goal(numbers, state, step, before if isinstance(part.module, Slewing) else attitude)
+            for part, numbers in zip(self.parts, params, strict=True)
+        ]
         present = goals[0]
         for place, goal in enumerate(goals[1:], 1):
-            present = chosen(less(absolute(mode - float(place)), 0.5), goal, present)
+            present = chosen(_is(mode, place), goal, present)
         return present
 
 
-def join_targets(targets: Sequence[Fitted]) -> Fitted:
-    """The target of a loop whose modes have these, one each."""
+def _is(mode: Any, place: int) -> Truth:
+    return less(absolute(mode - float(place)), 0.5)
+
+
+def join_targets(targets: Sequence[Fitted], slews: Sequence[Slew | None]) -> Fitted:
+    """The target of a loop whose modes have these, one each, some of them reached by slews."""
+    targets = [slewing(target, slew) for target, slew in zip(targets, slews, strict=True)]
     module: Any = ModeTargets(tuple(target.part for target in targets))
     # A target from a file is checked like all parts from files.
     file = next((target.part.file for target in targets if target.part.file is not None), None)
@@ -102,7 +142,7 @@ def loop_of_mode(loop: ClosedLoop, place: int) -> ClosedLoop:
     alone, target = replace(loop, law=law, gains=gains, events=()), loop.target
     if target.part.flag("BY_MODE"):
         module: Any = target.part.module
-        mode_target = Fitted(module.parts[place], target.params[place])
+        mode_target = reached(Fitted(module.parts[place], target.params[place]))
         alone = replace(alone, parts=tuple(mode_target if fitted is target else fitted for fitted in alone.parts))
     mode = loop.law.module.modes[place]
     active: list[Fitted] = []

@@ -68,6 +68,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
     still = target is None or target.flag("STILL")
     follows = target is not None and target.flag("FOLLOWS")
     by_mode = target is not None and target.flag("BY_MODE")
+    slews = target is not None and target.flag("SLEWS")
     # Such a law of modes looks at more than its measurement to decide which one commands.
     watches = named.modes is not None and named.modes.WATCHES
     timed = any(CLOCK in part.reads for part in (parts.law, *parts.effectors))
@@ -110,9 +111,11 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         )
         # Effectors that take the command know their speeds; others have no sensor.
         turning = zip(parts.effectors, carry.effectors, setup.effectors, strict=True)
-        momentum = total(e.module.momentum(inner, params) for e, inner, params in turning if e.flag("ACTS"))
+        momentum = total(_measured(e)(inner, params) for e, inner, params in turning if e.flag("ACTS"))
 
-        def show(goal):
+        def show(goal, before=memories.followed):
+            if goal is not None and follows:
+                before = before._replace(attitude=goal.attitude) if slews else goal.attitude
             scene = Scene(
                 goal,
                 still,
@@ -122,9 +125,8 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
                 setup.limit,
                 _readings(tuple(vars(readings)))(*vars(readings).values()),
             )
-            followed = goal.attitude if goal is not None and follows else memories.followed
             return body.observe(known, scene), memories._replace(
-                followed=followed, sensors=tuple(kept), readings=tuple(shown), estimator=estimator, estimate=estimate
+                followed=before, sensors=tuple(kept), readings=tuple(shown), estimator=estimator, estimate=estimate
             )
 
         return show, goal, Sight(known, tuple(every), estimate)
@@ -142,7 +144,12 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
             carry = carry._replace(memory=parts.law.module.decide(measurement, gains, carry.memory, *watched))
         if by_mode:
             # The measurement of the law of a mode that begins is relative to the mode's own target.
-            measurement, memories = show(goal_of(carry, carry.state, step, setup))
+            before = carry.memories.followed
+            if target is not None and slews:
+                attitude = sight.state.attitude
+                before = target.module.begun(setup.target, carry.state, attitude, step, craft, before, carry.memory)
+                carry = carry._replace(memories=carry.memories._replace(followed=before))
+            measurement, memories = show(goal_of(carry, carry.state, step, setup), before)
             h = where(less(carry.memory.age, 0.5), side(measurement.attitude[0]), h)
         if policy is not None:
             attitude, h = policy(measurement.attitude, h, setup.width)
@@ -282,6 +289,10 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         return slope((carry.state, carry.effectors, carry.actuators), begun, carry, craft, setup)
 
     return Step(measure, sense, update, propagate, check, sample, slope_of)
+
+
+def _measured(effector: Part) -> Callable[..., Any]:
+    return effector.hook("measured_momentum") or effector.module.momentum
 
 
 class _Begun(NamedTuple):

@@ -165,6 +165,10 @@ class Effector(Protocol):
         """Its angular momentum relative to the body (N m s, body axes)."""
         ...
 
+    def measured_momentum(self, state: Any, params: Any, /) -> Vector:
+        """This momentum as laws are given it; `momentum` itself where it is absent."""
+        ...
+
     def inertia_change(self, state: Any, params: Any, /) -> Matrix:
         """The inertia (3, 3; kg m2) that the whole has beyond the body's numbers as its shape changes; times the body's
         rate it belongs to the momentum."""

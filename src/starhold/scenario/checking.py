@@ -242,7 +242,8 @@ def check_substeps(loop: Any, where: str) -> None:
         return
     least = loop.period * fastest.fastest / RESOLVED * (1.0 - 1e-12)
     if loop.substeps < least:
-        why = f"a time constant of {1.0 / fastest.fastest:.3g}"
+        unit = getattr(loop.body.module, "TIME_UNIT", "s")
+        why = f"a time constant of {1.0 / fastest.fastest:.3g} {unit}".rstrip()
         if not least <= MOST_SUBSTEPS:
             allowed = f"a slower one: {least:.3g} substeps a control period are too many"
             raise InputError(where, f"part {fastest.called}", why, allowed)

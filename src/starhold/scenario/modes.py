@@ -15,6 +15,7 @@ from starhold.laws.catalogue import Law
 from starhold.laws.conditions import SETTINGS, TESTED, TESTS, TIMES, level_of, needs_sky, settings_of
 from starhold.laws.interface import Gain
 from starhold.laws.modes import AFTER, DWELL, NAME, WHEELS_LOST, Mode, Modes, Switch, make_law
+from starhold.loop.slews import Slew
 from starhold.parts.epoch import DAY, Date, date_of, days_of, iso_text
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies.interface import Body
@@ -22,6 +23,7 @@ from starhold.scenario.checking import make_gains, nearest, pick_law, refuse_uns
 from starhold.scenario.monitors import MonitorTable, read_monitor
 from starhold.scenario.quantity import Annotations, quantity, reader
 from starhold.scenario.schema import LawTable, law_model
+from starhold.scenario.slews import SlewTable, slew_of
 from starhold.scenario.tables import Name, Table, at_key, refuse_own, values_of
 from starhold.scenario.units import shown
 
@@ -39,6 +41,8 @@ class Read(NamedTuple):
     gains: Any
     targets: tuple[Fitted, ...] = ()
     """The targets of a law's modes where these have their own, one each."""
+    slews: tuple[Slew | None, ...] = ()
+    """How each of them is reached as its mode begins."""
 
 
 def read_gains(
@@ -169,6 +173,9 @@ class ModeTable(LawTable):
         WithJsonSchema({"type": "object"}),
         Field(description="as [target], or a [[part]] of this role; [target] if absent"),
     ] = None
+    slew: Annotated[
+        SlewTable | None, Field(description="turn by which the target is reached as the mode begins; none if absent")
+    ] = None
     effectors: Annotated[
         tuple[str, ...] | None,
         Field(description="those that work, of all that take commands or act from outside; all if absent"),
@@ -216,7 +223,8 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
     clock = Clock(epoch, scenario.table.simulation.duration)
     modes, gains = _joined(tables, reads, on_loss, clock, where, key)
     monitors = tuple(
-        read_monitor(one, scenario, where, f"{key}.monitor[{place}]") for place, one in enumerate(table.monitor, 1)
+        read_monitor(one, [each.name for each in tables], scenario, where, f"{key}.monitor[{place}]")
+        for place, one in enumerate(table.monitor, 1)
     )
     law = make_law(Modes(tuple(modes), on_loss, tuple(monitor for monitor, _ in monitors)))
     if needs_sky(law.module.tests):
@@ -225,7 +233,8 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
         gains.append(epoch)
     gains += [] if on_loss is None else [float(table.wheels_lost or 1.0)]
     gains += [number for _, numbers in monitors for number in numbers]
-    return Read(law, None, table, None, law.gains(*gains), _targets(reads, scenario, context, key))
+    slews = tuple(slew_of(one.slew, scenario, f"{key}.mode[{place}].slew") for place, one in enumerate(tables, 1))
+    return Read(law, None, table, None, law.gains(*gains), _targets(reads, slews, scenario, context, key), slews)
 
 
 def _mode_on_loss(table: Any, names: list[str], where: str, key: str) -> int | None:
@@ -240,10 +249,12 @@ def _mode_on_loss(table: Any, names: list[str], where: str, key: str) -> int | N
     return names.index(table.on_loss)
 
 
-def _targets(reads: Sequence[Read], scenario: Scenario, context: Any, key: str) -> tuple[Fitted, ...]:
-    """The target of each mode; none where no mode has its own."""
+def _targets(
+    reads: Sequence[Read], slews: Sequence[Slew | None], scenario: Scenario, context: Any, key: str
+) -> tuple[Fitted, ...]:
+    """The target of each mode; none where no mode has its own and none is reached by a slew."""
     given: list[Any] = [read.table.target for read in reads]
-    if all(one is None for one in given):
+    if all(one is None for one in (*given, *slews)):
         return ()
     keys = [f"{key}.mode[{place}].target" for place in range(1, len(given) + 1)]
     return tuple(scenario.hooks.target(scenario, one, context, at) for one, at in zip(given, keys, strict=True))

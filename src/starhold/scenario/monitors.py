@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -36,11 +36,17 @@ class MonitorTable(Table):
         Any, *raw("beyond which it trips, in the unit of what it looks at; of a rate per second, of stuck a time")
     ]
     times: Annotated[int, *quantity(replace(TIMES, whole=True))] = 1
+    modes: Annotated[list[str] | None, Field(description="the modes in which it looks; all if absent", min_length=1)] = None
 
 
-def read_monitor(table: MonitorTable, scenario: Scenario, where: str, key: str) -> tuple[Monitor, list[float]]:
-    """The monitor of a table with its numbers. InputError where the scenario has no such reading or estimate, or a limit has
-    another unit."""
+def read_monitor(
+    table: MonitorTable, modes: Sequence[str], scenario: Scenario, where: str, key: str
+) -> tuple[Monitor, list[float]]:
+    """The monitor of a table with its numbers, in a law whose modes have these names. InputError where the scenario has no
+    such reading or estimate, the law no such mode, or a limit has another unit."""
+    unknown = next((name for name in table.modes or () if name not in modes), None)
+    if unknown is not None:
+        raise InputError(where, f"{key}.modes", show(unknown), nearest(unknown, [*modes]))
     if (table.reading is None) == (table.estimate is None):
         raise InputError(where, key, "neither reading nor estimate" if table.reading is None else "both", "one of them")
     estimators = [fitted for fitted in scenario.parts if fitted.part.role == "estimator"]
@@ -69,7 +75,8 @@ def read_monitor(table: MonitorTable, scenario: Scenario, where: str, key: str) 
     if size == SIZES["quaternion"] and table.kind == "range":
         raise InputError(where, f"{key}.kind", show(table.kind), "rate, stuck or residual of an attitude, which has no size")
     unit = "rad" if size == SIZES["quaternion"] else quantity_there.unit
-    monitor = Monitor(table.name, table.kind, watched, unit, size, sensor)
+    looks = tuple(sorted({modes.index(name) for name in table.modes or ()}))
+    monitor = Monitor(table.name, table.kind, watched, unit, size, sensor, looks)
     try:
         limit = reader(monitor.fields()[0].gain)(table.limit)
     except PydanticCustomError as error:

@@ -11,6 +11,7 @@ from typing import Any
 
 from starhold.errors import InputError, shortly
 from starhold.laws.catalogue import Law
+from starhold.loop.slews import Slew
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies import body_of
 from starhold.scenario.bodies.interface import Body, Made
@@ -44,6 +45,8 @@ class LawEntry:
     """The design form of the gains, and its inputs; None where the file gives the gains themselves."""
     targets: tuple[Fitted, ...] = ()
     """The targets of a law's modes where these have their own, one each."""
+    slews: tuple[Slew | None, ...] = ()
+    """How each of them is reached as its mode begins."""
 
     def __repr__(self) -> str:
         return f"<law {self.name}: {self.law.name}, {self.gains}>"
@@ -233,7 +236,7 @@ def _read_law(data: Any, scenario: Scenario, context: Any, key: str, taken: set[
     """Return the law of a raw table, for a scenario that has no laws yet."""
     body, where = scenario.hooks, scenario.where
     reads = read_modes if has_modes(data, body) else read_gains
-    law, form, table, spec, gains, targets = reads(data, scenario, context, key)
+    law, form, table, spec, gains, targets, slews = reads(data, scenario, context, key)
     options = body.options(scenario, table, gains, key)
     name = free_name(table.name, law.name, taken, where, key)
-    return LawEntry(name, law, gains, options, form, spec, targets)
+    return LawEntry(name, law, gains, options, form, spec, targets, slews)

@@ -20,9 +20,9 @@ BEGINS = "mode_begins"
 Method: TypeAlias = Literal["proof", "flight", "campaign", "budget", "margin", "inspection"]
 METHODS_OF: Mapping[str, tuple[Method, ...]] = MappingProxyType(
     {
-        "after": ("flight", "proof"),
-        "in_mode": ("flight", "proof"),
-        "window": ("flight",),
+        "after": ("flight", "proof", "campaign"),
+        "in_mode": ("flight", "proof", "campaign"),
+        "window": ("flight", "campaign"),
         "axis": ("flight", "campaign"),
         "direction": ("flight", "campaign"),
         "share": ("campaign",),
@@ -106,7 +106,6 @@ class RequirementTable(Table):
                 allowed = "no such key" if unfit else "the name of the mode"
                 raise at_key(unfit or "in_mode", f'{allowed}, with metric = "{BEGINS}"', getattr(self, unfit or "in_mode"))
         for key, methods in METHODS_OF.items():
-            methods = (*methods, "campaign") if key == "in_mode" and self.metric == BEGINS else methods
             if key in self.model_fields_set and self.method is not None and self.method not in methods:
                 named = " or ".join(f'"{method}"' for method in methods)
                 raise at_key(key, f"only with method = {named}", getattr(self, key))
@@ -124,7 +123,15 @@ def column_of(table: RequirementTable) -> str:
     """The name, among metrics that are measured, of the one that a requirement bounds."""
     if table.metric == CONE:
         return f"angle of {table.called}" if table.id else "cone_angle"
-    return f"begin of {table.in_mode}" if table.metric == BEGINS else str(table.metric)
+    if table.metric == BEGINS:
+        return f"begin of {table.in_mode}"
+    return f"{table.metric} of {table.called}" if is_of_a_part(table) else str(table.metric)
+
+
+def is_of_a_part(table: RequirementTable) -> bool:
+    """Whether a requirement bounds the runs of a campaign in a mode or a window alone."""
+    parted = any(given is not None for given in (table.after, table.in_mode, table.window))
+    return parted and table.method == "campaign" and table.metric != BEGINS
 
 
 def without_requirements(given: Any, method: Method) -> Any:

@@ -117,8 +117,7 @@ class Budget:
 
     def row(self, name: str) -> Contribution:
         """Return the row of this name. KeyError where there is none."""
-        rows = {row.name: row for row in self.rows}
-        return rows[name]
+        return {row.name: row for row in self.rows}[name]
 
     def level(self, name: str, index: str) -> float:
         """Return the level of an index (rad) in the row of this name."""
@@ -300,8 +299,11 @@ class _Clock(NamedTuple):
         """Return the times of a scenario's [budget] table. InputError where they do not fit into its runs."""
         timing, wanted = scenario.table.simulation, scenario.table.budget
         period = timing.control_period * timing.record_every
-        last = (timing.steps - 1) // timing.record_every
-        start = 0.5 * timing.duration if wanted.start is None else wanted.start
+        end = wanted.end or timing.duration
+        if end > timing.duration:
+            raise InputError(scenario.where, "budget.end", f"{end:g} s", f"at most the run's {timing.duration:g} s")
+        last = min((timing.steps - 1) // timing.record_every, math.floor(end / period + 1e-9))
+        start = 0.5 * end if wanted.start is None else wanted.start
         first = math.ceil(start / period - 1e-9)
         count = last - first + 1
 
@@ -320,11 +322,9 @@ class _Clock(NamedTuple):
         apart = samples("separation", wanted.separation, 0.5, count - length, 1)
         if count * wanted.runs > MOST:
             raise InputError(scenario.where, "budget.runs", f"{wanted.runs} of {count} samples", f"at most {MOST} in all")
-        boresight = None if wanted.boresight is None else tuple(wanted.boresight)
-        settings = Settings(
-            first * period, length * period, apart * period, wanted.confidence, wanted.interpretation, wanted.runs, boresight
-        )
-        return cls(settings, timing.steps, timing.record_every, first, length, apart)
+        times, share = (first * period, length * period, apart * period), (wanted.confidence, wanted.interpretation)
+        settings = Settings(*times, *share, wanted.runs, wanted.boresight and tuple(wanted.boresight))
+        return cls(settings, last * timing.record_every + 1, timing.record_every, first, length, apart)
 
 
 class _Noted(NamedTuple):

@@ -13,14 +13,13 @@ from starhold.errors import InputError
 from starhold.scenario.checking import show
 from starhold.studies.body import study_of
 from starhold.studies.budget import TOGETHER
-from starhold.studies.requirements import Requirement, at_most, read_requirements, tables_of
+from starhold.studies.requirements import Requirement, at_most, read_requirements, tables_of, times_of
 from starhold.studies.verification import (
     RequirementVerdict,
     check_modes,
     compared,
     limits,
     mode_names,
-    times_of,
     undecided,
 )
 

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from starhold.algebra.structure import leaves
+from starhold.analysis.mode_notes import Span, span
 from starhold.laws.modes import Modes
 from starhold.loop.modes import loop_of_mode
 from starhold.parts.epoch import Date, date_after
 from starhold.parts.outage import NEVER
-from starhold.scenario.requirement import BEGINS, column_of
+from starhold.scenario.requirement import BEGINS, column_of, is_of_a_part
 from starhold.studies.body import Issued
 from starhold.studies.flight import Begun
+from starhold.studies.requirements import tables_of, times_of
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -77,6 +79,19 @@ def begins_asked(scenario: Scenario, law: Law) -> dict[str, int]:
     tables = [one for one in scenario.table.requirement if one.metric == BEGINS and one.method == "campaign"]
     names = [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
     return {column_of(one): names.index(str(one.in_mode)) + 1 for one in tables if one.in_mode in names}
+
+
+def parts_asked(scenario: Scenario, law: Law) -> dict[str, tuple[str, Span]]:
+    """The parts of a flight in which campaigns are required to bound an error, with that error, by the columns of those
+    requirements. InputError for times that are none, or not within the flight."""
+    names = [mode.name for mode in law.module.modes] if isinstance(law.module, Modes) else []
+    timing, parts = scenario.table.simulation, dict[str, tuple[str, Span]]()
+    for key, table in tables_of(scenario, "campaign").items():
+        if is_of_a_part(table) and (table.in_mode is None or table.in_mode in names):
+            times = times_of(scenario, key, table, timing.duration)
+            mode = None if table.in_mode is None else names.index(table.in_mode) + 1
+            parts[column_of(table)] = str(table.metric), span(mode, *times, timing.control_period)
+    return parts
 
 
 def first_fault(scenario: Scenario, loop: ClosedLoop) -> tuple[float, ...]:

@@ -7,16 +7,17 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.analysis.mode_notes import PEAKS
 from starhold.analysis.rigid_body import EXTRAS, Cone
 from starhold.errors import InputError, input_at
 from starhold.parts.orbit import period_of
 from starhold.scenario.checking import nearest, show
-from starhold.scenario.requirement import BEGINS, CONE, RequirementTable, column_of
+from starhold.scenario.requirement import BEGINS, CONE, RequirementTable, column_of, is_of_a_part
 from starhold.scenario.units import shown, to_number
 
 if TYPE_CHECKING:
@@ -65,7 +66,10 @@ def cones_of(tables: Iterable[RequirementTable]) -> dict[str, Cone]:
 
 def extras_of(tables: Iterable[RequirementTable], more: Sequence[str]) -> tuple[str, ...]:
     """Return the metrics, or kinds of them, to be measured beyond the usual: those requested, and those required."""
-    wanted = {*more, *(extra for table in tables for extra in EXTRAS if extra in str(table.metric))}
+    wanted = {
+        *more,
+        *(extra for table in tables for extra in EXTRAS if extra in str(table.metric) and not is_of_a_part(table)),
+    }
     return tuple(extra for extra in (*EXTRAS, *sorted(wanted - {*EXTRAS})) if extra in wanted)
 
 
@@ -86,7 +90,13 @@ def read_requirements(
     for key, table in tables.items():
         metric = str(table.metric)
         column = column_of(table)
-        if metric not in (*units, *beside):
+        if is_of_a_part(table) and column not in units:
+            if metric not in PEAKS:
+                raise InputError(
+                    where, f"{key}.metric", show(metric), f"{' or '.join(PEAKS)}, of runs in a mode or a window"
+                )
+            raise InputError(where, f"{key}.in_mode", show(table.in_mode), "a mode of every law that is flown")
+        if metric not in (*units, *beside) and column not in units:
             raise InputError(where, f"{key}.metric", show(metric), nearest(metric, [*units, *beside]))
         if metric == BEGINS and table.method == "campaign" and column not in units:
             raise InputError(where, f"{key}.in_mode", show(table.in_mode), "a mode of every law that is flown")
@@ -102,6 +112,42 @@ def at_most(scenario: Scenario, tables: Mapping[str, RequirementTable], units: M
         if table.at_least is not None:
             raise InputError(scenario.where, f"{key}.at_least", show(table.at_least), f"at_most, with a {table.method}")
     return read_requirements(tables, units, scenario.where)
+
+
+class Times(NamedTuple):
+    """The times (s) between which something is required, since the flight or the mode began."""
+
+    begin: float = 0.0
+    end: float = math.inf
+
+    def __str__(self) -> str:
+        if self == Times():
+            return ""
+        return f" from {self.begin:g} s on" if math.isinf(self.end) else f" from {self.begin:g} s to {self.end:g} s"
+
+
+def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: float = math.inf) -> Times:
+    """Return the times of a requirement. InputError where they are invalid, or outside a flight of this duration (s)."""
+
+    def seconds(name: str, value: Any) -> float:
+        try:
+            time = to_number(value, "s") if isinstance(value, str) else float(value)
+        except (ValueError, TypeError) as error:
+            raise InputError(scenario.where, f"{key}.{name}", show(value), str(error)) from None
+        if not 0.0 <= time <= duration:
+            raise InputError(scenario.where, f"{key}.{name}", show(value), f"between 0 s and the flight's {duration:g} s")
+        return time
+
+    if table.after is not None:
+        return Times(seconds("after", table.after))
+    if table.window is None:
+        return Times()
+    if not isinstance(table.window, list | tuple) or len(table.window) != 2:
+        raise InputError(scenario.where, f"{key}.window", show(table.window), "two times")
+    times = Times(*(seconds("window", value) for value in table.window))
+    if times.begin >= times.end:
+        raise InputError(scenario.where, f"{key}.window", show(table.window), "two times, the later one last")
+    return times
 
 
 def orbit_of(scenario: Scenario) -> float | None:

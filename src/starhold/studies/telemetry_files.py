@@ -102,6 +102,19 @@ def read_mapping(source: str | Path) -> MappingTable:
     return validate(MappingFile, read_toml(text, where), where, "").telemetry
 
 
+def existing(source: Any) -> Any:
+    """The name of telemetry itself. InputError where there is no such file or folder, before anything else is looked at."""
+    if isinstance(source, str) and not Path(source).exists():
+        raise InputError(str(source), "", "no file", "a file of telemetry")
+    return source
+
+
+def existing_mapping(source: Any) -> Any:
+    """The name of a mapping itself. InputError where there is none, or none that can be read."""
+    read_mapping(source)
+    return source
+
+
 def heads_of(name: str, meant: Quantity, size: int) -> tuple[str, ...]:
     """The columns of a quantity in a table that starhold writes: rate_x, attitude_q0, wheel_momentum_1, error_angle."""
     labels = LABELS.get(meant.dimension, tuple(str(k + 1) for k in range(size)))

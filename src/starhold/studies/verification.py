@@ -6,7 +6,7 @@ import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -15,10 +15,19 @@ from starhold.laws.modes import Modes
 from starhold.scenario.building import build
 from starhold.scenario.checking import nearest, show
 from starhold.scenario.requirement import BEGINS
-from starhold.scenario.units import DECIBEL, apart, to_number
+from starhold.scenario.units import DECIBEL, apart
 from starhold.studies.body import study_of
 from starhold.studies.modes import modes_flown, stretches
-from starhold.studies.requirements import LOST, Requirement, cones_of, orbit_of, read_requirements, tables_of
+from starhold.studies.requirements import (
+    LOST,
+    Requirement,
+    Times,
+    cones_of,
+    orbit_of,
+    read_requirements,
+    tables_of,
+    times_of,
+)
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -180,42 +189,6 @@ def check_modes(scenario: Scenario, entry: LawEntry, tables: Mapping[str, Requir
         if table.in_mode is not None and table.in_mode not in names:
             allowed = nearest(table.in_mode, names) if names else f"no mode, because the law {entry.name} has none"
             raise InputError(scenario.where, f"{key}.in_mode", show(table.in_mode), allowed)
-
-
-class Times(NamedTuple):
-    """The times (s) between which something is required, since the flight or the mode began."""
-
-    begin: float = 0.0
-    end: float = math.inf
-
-    def __str__(self) -> str:
-        if self == Times():
-            return ""
-        return f" from {self.begin:g} s on" if math.isinf(self.end) else f" from {self.begin:g} s to {self.end:g} s"
-
-
-def times_of(scenario: Scenario, key: str, table: RequirementTable, duration: float = math.inf) -> Times:
-    """Return the times of a requirement. InputError where they are invalid, or outside a flight of this duration (s)."""
-
-    def seconds(name: str, value: Any) -> float:
-        try:
-            time = to_number(value, "s") if isinstance(value, str) else float(value)
-        except (ValueError, TypeError) as error:
-            raise InputError(scenario.where, f"{key}.{name}", show(value), str(error)) from None
-        if not 0.0 <= time <= duration:
-            raise InputError(scenario.where, f"{key}.{name}", show(value), f"between 0 s and the flight's {duration:g} s")
-        return time
-
-    if table.after is not None:
-        return Times(seconds("after", table.after))
-    if table.window is None:
-        return Times()
-    if not isinstance(table.window, list | tuple) or len(table.window) != 2:
-        raise InputError(scenario.where, f"{key}.window", show(table.window), "two times")
-    times = Times(*(seconds("window", value) for value in table.window))
-    if times.begin >= times.end:
-        raise InputError(scenario.where, f"{key}.window", show(table.window), "two times, the later one last")
-    return times
 
 
 def by_flight(scenario: Scenario, entry: LawEntry, run: Recording) -> dict[str, RequirementVerdict]:

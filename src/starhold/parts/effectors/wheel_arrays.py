@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+MOST = 24
+"""The most wheels that a craft has: the work of allocating the least peak grows with their cube."""
 
 
 def unit_axes(axes: Array) -> Array:
@@ -30,3 +34,34 @@ def axial(axes: Array, inertia: Array) -> Array:
 def most_of_each(rows: Array, kind: str) -> Array:
     """The most (..., N) that each row (..., N, 3) gives of a vector within the unit ball, or the unit box ("axis")."""
     return np.linalg.norm(rows, axis=-1, ord=1 if kind == "axis" else 2)
+
+
+def checked_axes(axes: Sequence[Sequence[float]]) -> Array:
+    """The unit axes (N, 3) of wheels. ValueError where they are none, or too many."""
+    matrix = np.asarray(axes, dtype=float)
+    if matrix.ndim != 2 or matrix.shape[1] != 3:
+        raise ValueError(f"wheel axes must be vectors of three numbers, not an array of shape {matrix.shape}")
+    if len(matrix) > MOST:
+        raise ValueError(f"at most {MOST} wheels are taken, not {len(matrix)}")
+    lengths = np.linalg.norm(matrix, axis=1)
+    for i, length in enumerate(lengths.tolist()):
+        if not 0.0 < length < math.inf:
+            raise ValueError(f"the axis of wheel {i + 1} must have a finite length above zero, not {length:g}")
+    return unit_axes(matrix)
+
+
+def checked_column(name: str, value: Any, count: int, least: float | None, infinite: bool = False) -> tuple[float, ...]:
+    """A number for each wheel, from one for each or one for all; `least` None asks for positive ones. ValueError where one
+    is out of range."""
+    given = np.asarray(value, dtype=float)
+    if given.shape not in ((), (count,)):
+        raise ValueError(f"{name}: one number or {count} are needed, not an array of shape {given.shape}")
+    column: list[float] = np.broadcast_to(given, (count,)).tolist()
+    for i, number in enumerate(column):
+        sound = number > 0.0 if least is None else number >= least
+        if not sound or (math.isinf(number) and not infinite):
+            range_ = "positive" if least is None else "zero or more"
+            raise ValueError(
+                f"the {name} of wheel {i + 1} must be {range_}{'' if infinite else ' and finite'}, not {number:g}"
+            )
+    return tuple(column)

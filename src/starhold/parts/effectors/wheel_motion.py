@@ -19,6 +19,7 @@ from starhold.algebra.elementary import exp
 from starhold.algebra.scalar import Scalar, absolute, less, maximum, minimum, where
 from starhold.algebra.several import each
 from starhold.algebra.vector import ZERO, Vector, add, cross, dot, scale
+from starhold.parts.as_built import in_body, is_given, turn_of
 from starhold.parts.craft import vector
 
 if TYPE_CHECKING:
@@ -63,6 +64,20 @@ def with_more(
         power_limit=tuple(power_limit) if min(power_limit) < math.inf else (),
         unbalanced=unbalanced if shaking else (),
     )
+
+
+def mounted(wheels: Wheels, errors: Sequence[Vector]) -> Wheels:
+    """The wheels with each spin axis turned by a small angle about the body axes (rad), which laws and allocation do not
+    know."""
+    if not is_given(*errors):
+        return wheels
+    axes = tuple(in_body(turn_of(error), axis) for error, axis in zip(errors, wheels.axes, strict=True))
+    return wheels._replace(axes=axes, known_axes=wheels.axes)
+
+
+def as_known(wheels: Wheels) -> Wheels:
+    """The wheels with the axes for which laws and allocation take them."""
+    return wheels._replace(axes=wheels.known_axes, known_axes=()) if wheels.known_axes else wheels
 
 
 def _sides(axis: Vector) -> tuple[Vector, Vector]:

@@ -26,8 +26,17 @@ from starhold.parts.contract import Card, Envelope, Push
 from starhold.parts.craft import vector
 from starhold.parts.effectors.envelope import authority, check_authority, facets_of
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
-from starhold.parts.effectors.wheel_arrays import axial, least_squares, unit_axes
-from starhold.parts.effectors.wheel_motion import at_top_speed, limited, shaken, slopes, speeds, sticking, top_speeds
+from starhold.parts.effectors.wheel_arrays import axial, checked_axes, checked_column, least_squares
+from starhold.parts.effectors.wheel_motion import (
+    as_known,
+    at_top_speed,
+    limited,
+    shaken,
+    slopes,
+    speeds,
+    sticking,
+    top_speeds,
+)
 
 CARD = Card(
     title="Reaction wheels",
@@ -51,8 +60,8 @@ CREEP = 1.0
 """Below this relative speed (rad/s) Coulomb friction grows in proportion to the speed: a friction that jumps with the sign
 would make any integrator of fixed step chatter about standstill."""
 
-ALLOCATIONS, MOST = ("least-squares", "least-peak"), 24
-"""Allocation rules, and the most wheels that a craft has: the work of the second rule grows with their cube."""
+ALLOCATIONS = ("least-squares", "least-peak")
+"""The allocation rules."""
 
 
 class Wheels(NamedTuple):
@@ -79,6 +88,8 @@ class Wheels(NamedTuple):
     stribeck_speed: Numbers = ()
     power_limit: Numbers = ()
     unbalanced: tuple[Rows, ...] = ()
+    known_axes: Rows = ()
+    """The axes for which laws and allocation take wheels that are mounted askew; () for wheels that are not."""
 
 
 Params = Wheels
@@ -110,7 +121,7 @@ def prepare(params: Wheels, period: float) -> Wheels:
 def with_facets(wheels: Wheels) -> Wheels:
     """The wheels with the facets that `allocate_peak` needs. Any wheels of this number have as many facets, so that one
     kernel serves them before a loss and after."""
-    return wheels._replace(facets=facets_of(wheels.axes, wheels.least))
+    return wheels._replace(facets=facets_of(as_known(wheels).axes, wheels.least))
 
 
 def remember(params: Wheels) -> State:
@@ -142,6 +153,11 @@ def momentum(state: State, params: Wheels) -> Vector:
     return wheel_momentum(state.momentum, params)
 
 
+def measured_momentum(state: State, params: Wheels) -> Vector:
+    """This momentum as tachometers and the known axes tell it."""
+    return wheel_momentum(state.momentum, as_known(params))
+
+
 def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
     """The recorded quantities."""
     h = state.momentum
@@ -157,8 +173,8 @@ def applied(state: State, command: Numbers, body: Any, params: Wheels) -> Vector
 
 def error(params: Wheels, envelope: Envelope) -> Push:
     """The largest torque of friction on rotors within their momentum limits, together or against one another, by which the
-    motors' falls short of the command; that of imbalance has no bound on a body that turns."""
-    if params.unbalanced:
+    motors' falls short of the command; imbalance has no bound on a body that turns, wheels mounted askew state none."""
+    if params.unbalanced or params.known_axes:
         return Push(math.inf)
     A, viscous = np.array(params.axes), np.array(params.viscous)
     speeds = np.array(params.momentum_limit) / np.array(params.inertia)
@@ -298,14 +314,14 @@ def make_wheels(
     independent axes (it names the body direction without authority), or they lie so close to a plane that the matrix of the
     axes has a condition number above 1000.
     """
-    matrix = _unit_axes(axes)
+    matrix = checked_axes(axes)
     count = len(matrix)
     columns = (
-        _column("rotor inertia", inertia, count, least=None),
-        _column("torque limit", torque_limit, count, least=0.0, infinite=True),
-        _column("momentum limit", momentum_limit, count, least=None, infinite=True),
-        _column("viscous friction", viscous, count, least=0.0),
-        _column("Coulomb friction", coulomb, count, least=0.0),
+        checked_column("rotor inertia", inertia, count, least=None),
+        checked_column("torque limit", torque_limit, count, least=0.0, infinite=True),
+        checked_column("momentum limit", momentum_limit, count, least=None, infinite=True),
+        checked_column("viscous friction", viscous, count, least=0.0),
+        checked_column("Coulomb friction", coulomb, count, least=0.0),
     )
     working = [i for i in range(count) if columns[1][i] > 0.0]
     check_authority(matrix[working], "the wheels give" if len(working) == count else "the working wheels give")
@@ -324,7 +340,7 @@ def lose(wheels: Wheels, index: int) -> Wheels:
         raise ValueError(f"there is no wheel {index + 1}; the wheels are 1 to {count}")
     limits = tuple(0.0 if i == index else limit for i, limit in enumerate(wheels.torque_limit))
     working = [i for i in range(count) if limits[i] > 0.0]
-    matrix = np.array(wheels.axes)
+    matrix = np.array(as_known(wheels).axes)
     check_authority(matrix[working], f"without wheel {index + 1} the others give")
     return wheels._replace(torque_limit=limits, least=_rows(least_squares(matrix, working)), facets=())
 
@@ -341,7 +357,7 @@ def capacity(state: State, params: Wheels) -> float:
 
 def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
     """The torque (N m) that the wheels surely give as they share it out, in norm or about each body axis at once."""
-    return authority(at_top_speed(params), kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
+    return authority(at_top_speed(as_known(params)), kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
 
 
 def shared_as(params: Wheels, known: Wheels) -> Wheels:
@@ -350,8 +366,8 @@ def shared_as(params: Wheels, known: Wheels) -> Wheels:
 
 
 def axial_inertia(params: Wheels) -> NDArray[np.float64]:
-    """The inertia of the rotors about their own axes (3, 3; kg m2)."""
-    return axial(np.array(params.axes), np.array(params.inertia))
+    """The inertia of the rotors about their own axes as these are known (3, 3; kg m2)."""
+    return axial(np.array(as_known(params).axes), np.array(params.inertia))
 
 
 def gives_allocated_torque(wheels: Wheels) -> bool:
@@ -362,35 +378,6 @@ def gives_allocated_torque(wheels: Wheels) -> bool:
         (np.array(part).reshape(-1, 3) for part in zip(*working, strict=True)) if working else (np.zeros((1, 3)),) * 2
     )
     return bool(np.abs(axes.T @ rows + np.eye(3)).max() < 1e-9)
-
-
-def _unit_axes(axes: Sequence[Sequence[float]]) -> NDArray[np.float64]:
-    matrix = np.asarray(axes, dtype=float)
-    if matrix.ndim != 2 or matrix.shape[1] != 3:
-        raise ValueError(f"wheel axes must be vectors of three numbers, not an array of shape {matrix.shape}")
-    if len(matrix) > MOST:
-        raise ValueError(f"at most {MOST} wheels are taken, not {len(matrix)}")
-    lengths = np.linalg.norm(matrix, axis=1)
-    for i, length in enumerate(lengths.tolist()):
-        if not 0.0 < length < math.inf:
-            raise ValueError(f"the axis of wheel {i + 1} must have a finite length above zero, not {length:g}")
-    return unit_axes(matrix)
-
-
-def _column(name: str, value: Any, count: int, least: float | None, infinite: bool = False) -> Numbers:
-    """`least` None asks for positive ones."""
-    given = np.asarray(value, dtype=float)
-    if given.shape not in ((), (count,)):
-        raise ValueError(f"{name}: one number or {count} are needed, not an array of shape {given.shape}")
-    column: list[float] = np.broadcast_to(given, (count,)).tolist()
-    for i, number in enumerate(column):
-        sound = number > 0.0 if least is None else number >= least
-        if not sound or (math.isinf(number) and not infinite):
-            range_ = "positive" if least is None else "zero or more"
-            raise ValueError(
-                f"the {name} of wheel {i + 1} must be {range_}{'' if infinite else ' and finite'}, not {number:g}"
-            )
-    return tuple(column)
 
 
 def _rows(matrix: NDArray[np.float64]) -> tuple[Vector, ...]:

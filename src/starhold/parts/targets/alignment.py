@@ -14,12 +14,18 @@ from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, multiply, norm, scale, subtract, transpose
 from starhold.parts import sun
 from starhold.parts.contract import Parameter
+from starhold.parts.epoch import DAY, SIDEREAL
 from starhold.parts.roles import Goal
 
 AXIS = Parameter("1", shape=(3,), spread=False, text="body axis that points there")
 OTHER = Parameter("1", shape=(3,), spread=False, text="body axis that points as near as it can to the second direction")
 GRAVITY = Parameter("m^3/s^2", above=0.0, text="gravitational parameter of the body that it orbits")
 """The declaration of the axes, common to all targets."""
+SPIN = math.tau * SIDEREAL / DAY
+"""The rate of the Earth (rad/s)."""
+FLATTENING, RADIUS = 1.0 / 298.257223563, 6378137.0
+POLAR = RADIUS * (1.0 - FLATTENING)
+"""The ellipsoid of WGS 84: its flattening, and its radii at the equator and the poles (m)."""
 
 
 class Moving(NamedTuple):
@@ -101,9 +107,8 @@ def towards_sun(time: Scalar, params: sun.Numbers) -> Moving:
 def geodetic(latitude: float, longitude: float, height: float) -> tuple[Vector, Vector]:
     """The place (m) and the vertical, in axes of the Earth, of a geodetic latitude and longitude (rad) and height (m) on the
     ellipsoid of WGS 84."""
-    flattening, radius = 1.0 / 298.257223563, 6378137.0
     up = (math.cos(latitude) * math.cos(longitude), math.cos(latitude) * math.sin(longitude), math.sin(latitude))
-    eccentric = flattening * (2.0 - flattening)
-    across = radius / math.sqrt(1.0 - eccentric * up[2] ** 2)
+    eccentric = FLATTENING * (2.0 - FLATTENING)
+    across = RADIUS / math.sqrt(1.0 - eccentric * up[2] ** 2)
     place = ((across + height) * up[0], (across + height) * up[1], (across * (1.0 - eccentric) + height) * up[2])
     return place, up

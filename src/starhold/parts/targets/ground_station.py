@@ -12,12 +12,13 @@ from starhold.algebra.vector import ZERO, Matrix, Vector, cross, dot, norm, scal
 from starhold.algebra.words import number_of
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import EARTH
-from starhold.parts.epoch import DAY, EPOCH, SIDEREAL, START, Date, days_of, sidereal, spun, turned
+from starhold.parts.epoch import EPOCH, START, Date, days_of, sidereal, spun, turned
 from starhold.parts.roles import Goal
 from starhold.parts.targets.alignment import (
     AXIS,
     GRAVITY,
     OTHER,
+    SPIN,
     Moving,
     aligned,
     body_axes,
@@ -40,8 +41,6 @@ ROLE = "target"
 NEEDS = ("two-body",)
 ABOUT = "Earth"
 FOLLOWS = True
-SPIN = math.tau * SIDEREAL / DAY
-"""The rate of the Earth (rad/s)."""
 
 
 class Params(NamedTuple):

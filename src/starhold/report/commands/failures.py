@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from starhold.laws.modes import mode_laws
 from starhold.report.commands import Column, Command, Result, Table, later
 
 if TYPE_CHECKING:
@@ -30,6 +31,11 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
     sentences += [
         f"lost {failure.name}: {failure.proof.sentence}" for failure in failures if failure.proof and failure.flown
     ]
+    if mode_laws(entry.law, entry.gains) and any(failure.flown and failure.settling is None for failure in failures):
+        sentences.append(
+            "not settled: at the end of the mission, with the target of the mode that then flies; a [[law]] that is that "
+            "mode's alone, named by --law, settles by itself."
+        )
     if not retuned:
         sentences.append("The gains are the same in all of them.")
     if any(failure.saturation is not None and failure.saturation.known == "extrapolated" for failure in failures):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from starhold.report.commands import Block, Column, Command, Option, Result, Table, as_given, later
+from starhold.report.commands import Block, Column, Command, Option, Result, Table, later
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -12,9 +12,16 @@ if TYPE_CHECKING:
 
 TELEMETRY = {
     "telemetry": Option(
-        "", "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder", content=as_given, argument="TELEMETRY"
+        "",
+        "recorded telemetry: CSV, Parquet, AEM, a run.nc or its folder",
+        content=later("studies.telemetry_files.existing"),
+        argument="TELEMETRY",
     ),
-    "mapping": Option("", "a TOML file that says what its columns hold, or the name of one", content=as_given),
+    "mapping": Option(
+        "",
+        "a TOML file that says what its columns hold, or the name of one",
+        content=later("studies.telemetry_files.existing_mapping"),
+    ),
 }
 """What names recorded telemetry."""
 MOST_PANELS = 6

@@ -22,6 +22,7 @@ from starhold.studies.modes import (
     hand_overs,
     mode_departures,
     named_modes,
+    parts_asked,
     same_numbers,
 )
 
@@ -85,6 +86,7 @@ class RigidBodyStudy(BodyStudy):
         wheels = "wheel_momentum" in recorded_of(loop)
         more: Any = {"begins": begins_asked(scenario, loop.law), "fault": first_fault(scenario, loop)}
         more["estimated"] = says_valid(loop.composition())
+        more["spans"] = parts_asked(scenario, loop.law)
         return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **more)
 
     def metric_set(self, run: Recording) -> MetricSet:

@@ -72,7 +72,7 @@ class RigidBody(Dials):
     def given(self, scenario: Scenario, entry: LawEntry) -> dict[str, Any]:
         body, target, effectors = scenario.table.spacecraft, target_of(scenario), effectors_of(scenario)
         parts = written_out(scenario, target, effectors)
-        parts = (join_targets(entry.targets), *parts[1:]) if entry.targets else parts
+        parts = (join_targets(entry.targets, entry.slews), *parts[1:]) if entry.targets else parts
         return {
             "start": start_of(scenario, target),
             "parts": parts,

@@ -14,7 +14,7 @@ from starhold.errors import input_at
 from starhold.parts.catalogue import find, fit
 from starhold.parts.craft import Craft, bare_inertia, compact, inverse, make_craft
 from starhold.parts.effectors.layouts import nasa_standard, pyramid, three_orthogonal
-from starhold.parts.effectors.wheel_motion import with_more
+from starhold.parts.effectors.wheel_motion import mounted, with_more
 from starhold.parts.effectors.wheel_units import WHEEL_UNITS
 from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels, make_wheels, remember
 from starhold.parts.part import Fitted
@@ -68,6 +68,7 @@ def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
     shared = table.wheels or WheelsTable()
     rotors: list[Rotor] = [*table.wheel] or [shared] * len(axes)
     wheels = make_wheels(axes, **columns)._replace(allocation=ALLOCATIONS.index((table.wheels or WheelsTable()).allocation))
+    wheels = mounted(wheels, [_given("mounting_error", rotor, shared) or (0.0, 0.0, 0.0) for rotor in rotors])
     more = {name: [_given(name, rotor, shared) for rotor in rotors] for name in NONE}
     if any(value is not None for column in more.values() for value in column):
         filled = ([NONE[name] if x is None else x for x in column] for name, column in more.items())

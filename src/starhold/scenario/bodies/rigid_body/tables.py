@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, model_validator
 
 from starhold.laws.interface import Gain
+from starhold.parts.as_built import MOUNTING
 from starhold.parts.craft import check_inertia
 from starhold.parts.epoch import START
 from starhold.parts.stated_attitude import check_attitude
@@ -28,6 +29,9 @@ class BudgetTable(Table):
 
     start: Annotated[
         float | None, *quantity(Gain("s", at_least=0.0, text="errors count from this time; half of the run if absent"))
+    ] = None
+    end: Annotated[
+        float | None, *quantity(Gain("s", above=0.0, text="errors count until this time; the end of the run if absent"))
     ] = None
     window: Annotated[
         float | None, *quantity(Gain("s", above=0.0, text="length of windows; a tenth of that time if absent"))
@@ -182,6 +186,9 @@ class Tolerances(Table):
     rate_tolerance: Annotated[float, *quantity(Gain("rad/s", above=0.0, text="rate relative to the target"))] = 1e-3
 
 
+TURNED = "small turn of its axis about the body axes, which law and allocation do not know"
+
+
 class Rotor(Table):
     """A reaction wheel as a unit of the catalogue, or as its numbers; numbers given override the unit's."""
 
@@ -221,6 +228,7 @@ class Rotor(Table):
     position: Annotated[
         Any, *quantity(Gain("m", shape=(3,), spread=False, text="from the centre of mass, for a static imbalance"))
     ] = None
+    mounting_error: Annotated[Any, *quantity(replace(MOUNTING, text=TURNED))] = None
 
     @model_validator(mode="after")
     def _one_of_each(self) -> Rotor:

@@ -1,0 +1,43 @@
+"""The `slew` table of a mode is read: the turn by which its target is reached as it begins."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+from starhold.errors import input_at
+from starhold.laws.interface import Gain
+from starhold.loop.slews import Slew
+from starhold.parts import sun
+from starhold.parts.epoch import EPOCH
+from starhold.parts.targets.eigenaxis import ACCELERATION, AXIS, KEEP_OUT, RATE, cone_of
+from starhold.scenario.quantity import quantity
+from starhold.scenario.tables import Table
+
+if TYPE_CHECKING:
+    from starhold.scenario.reading import Scenario
+
+TORQUE = Gain(
+    "N m", above=0.0, text="largest about each body axis, for which rate and acceleration are lowered; none if absent"
+)
+
+
+class SlewTable(Table):
+    """The turn from the attitude that the craft has as a mode begins onto the mode's target."""
+
+    rate: Annotated[Any, *quantity(RATE)]
+    acceleration: Annotated[Any, *quantity(ACCELERATION)]
+    torque_limit: Annotated[Any, *quantity(TORQUE)] = None
+    axis: Annotated[Any, *quantity(AXIS)] = (0.0, 0.0, 1.0)
+    keep_out: Annotated[Any, *quantity(KEEP_OUT)] = 0.0
+
+
+def slew_of(table: SlewTable | None, scenario: Scenario, key: str) -> Slew | None:
+    """The slew of a table, named `key` in errors; None for none. InputError for a cone that no axis has."""
+    if table is None:
+        return None
+    with input_at(scenario.where, key):
+        cone = cone_of(table.axis, table.keep_out)
+        seen = sun.prepared(scenario.table.shared[EPOCH.shared]) if cone else ()
+    torque = math.inf if table.torque_limit is None else table.torque_limit
+    return Slew(table.rate, table.acceleration, torque, cone, seen)
