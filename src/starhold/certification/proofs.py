@@ -32,7 +32,7 @@ from starhold.kernel.rules import Exceeds
 from starhold.kernel.theorems.refuted import State
 
 HOW = {
-    **dict.fromkeys(("Vanishes", "Solves"), EXACT),
+    "Vanishes": EXACT,
     **dict.fromkeys(("Definite", "Exceeds"), EXACT_SIGN),
     **dict.fromkeys(("Squares", "Sum"), SQUARES),
     **dict.fromkeys(("Contracts", "Persists"), LYAPUNOV),

@@ -95,22 +95,6 @@ class Sum:
 
 
 @dataclass(frozen=True)
-class Solves:
-    """Where the given vanish, and the relations, so do the wanted. Evidence: a matrix that takes the given to the wanted,
-    and for each the cofactors of the relations."""
-
-    given: Sequence[Poly]
-    wanted: Sequence[Poly]
-    modulo: Sequence[Poly] = ()
-
-    def check(self, evidence: Any) -> None:
-        rows, cofactors = read_table(evidence, "matrix", "cofactors")
-        found = apply(matrix(rows, len(self.wanted), len(self.given)), self.given)
-        for taken, p, own in zip(found, self.wanted, read_list(cofactors, len(self.wanted)), strict=True):
-            demand(not (taken - p - combination(own, self.modulo)).terms, "a system is not solved")
-
-
-@dataclass(frozen=True)
 class Contracts:
     """Every eigenvalue of A is smaller than the rate in size, or of a flow x' = Ax has a negative real part. Evidence: P > 0
     with rate^2 P - A'PA > 0, or with -(A'P + PA) > 0 (Lyapunov)."""
@@ -162,7 +146,7 @@ class Exceeds:
         demand(self.large > self.small, "a number is not the larger one")
 
 
-Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Persists | Definite | Exceeds
+Obligation: TypeAlias = Vanishes | Squares | Sum | Contracts | Persists | Definite | Exceeds
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
 """Obligations, each with the name under which its evidence stands."""
 

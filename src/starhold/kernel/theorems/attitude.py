@@ -15,7 +15,7 @@ from ..loops import HANDED, HYSTERESIS, NONE, SHORTEST, AttitudeLoop
 from ..numbers import cosine_below, demand
 from ..polynomials import Poly, apply, dot, horner, minus, poly
 from ..reading import Claim
-from ..rules import Exceeds, Obligation, Shown, Solves, Squares, vanish
+from ..rules import Exceeds, Obligation, Shown, Squares, vanish
 from ..sentences import Statement, above, below, enumerated
 from .limits import within_limits
 
@@ -36,7 +36,7 @@ def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, n
     if not strictly:
         # At rest the law's torque is zero only where q is.
         resting = [p.at(loop.still) for p in loop.balance(loop.quiet.value)]
-        yield "only equilibrium", Solves(resting, loop.q[1:], [loop.sphere])
+        yield from vanish("only equilibrium", loop.q[1:], [*resting, loop.sphere], first=1)
     return (yield from concluded(loop, said, strictly))
 
 

@@ -14,7 +14,7 @@ from ..points import STATE, PointLoop
 from ..polynomials import Poly, dot, horner, minus, multiple, poly, var, variables
 from ..programs import Case
 from ..reading import Claim
-from ..rules import Contracts, Exceeds, Obligation, Shown, Solves, Squares, Vanishes, vanish
+from ..rules import Contracts, Exceeds, Obligation, Shown, Squares, Vanishes, vanish
 from ..sentences import Statement, above, below, enumerated
 from .limits import loads, within
 
@@ -110,7 +110,7 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
             slope, z, known = circle.met(slope), [poly(1)], [circle.met(p) for p in side.known]
         yield f"V decreases {k}", Squares(slope, z, len(z), known)
     stays = [loop.slopes_along(p, loop.acceleration(near[0])).at(circle.running) for p in wrong]
-    yield "only the circle", Solves(stays, [circle.errors[0] * p for p in loop.x[1:]])
+    yield from vanish("only the circle", [circle.errors[0] * p for p in loop.x[1:]], stays, first=1)
     yield "x returns", Contracts([[Fraction(0), Fraction(1)], [a, b]], flow=True)
 
 
