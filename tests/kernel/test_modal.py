@@ -19,7 +19,7 @@ from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import WORK, Account, RefusedError
 from starhold.kernel.polynomials import poly, var
 from starhold.kernel.programs import Asking, Exactly, Program, known
-from starhold.kernel.theorems.isotropic import reduced
+from starhold.kernel.theorems.attitude import reduced
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from tests.kernel.certificates import contents, text

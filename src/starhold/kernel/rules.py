@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from .numbers import Rows, definite, demand, matrix, plus, rational, read_list, read_table, times, transpose
 from .polynomials import Poly, apply, dot, read_poly
+from .sentences import Statement
 
 
 def combination(cofactors: Any, relations: Sequence[Poly]) -> Poly:
@@ -149,6 +150,10 @@ class Exceeds:
 Obligation: TypeAlias = Vanishes | Squares | Sum | Contracts | Persists | Definite | Exceeds
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
 """Obligations, each with the name under which its evidence stands."""
+_T = TypeVar("_T")
+Part: TypeAlias = Generator[tuple[str, Obligation], None, _T]
+"""Obligations, and what follows from them."""
+Proof: TypeAlias = Part[Statement]
 
 
 def vanish(name: str, parts: Iterable[Poly], modulo: Sequence[Poly] = (), first: int = 0) -> Shown:

@@ -4,7 +4,7 @@ All are about the loop of `points`. Assumed of every one: two bodies on circles,
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -14,11 +14,9 @@ from ..points import STATE, PointLoop
 from ..polynomials import Poly, dot, horner, minus, multiple, poly, var, variables
 from ..programs import Case
 from ..reading import Claim
-from ..rules import Contracts, Exceeds, Obligation, Shown, Squares, Vanishes, vanish
+from ..rules import Contracts, Exceeds, Part, Proof, Shown, Squares, Vanishes, vanish
 from ..sentences import Statement, above, below, enumerated
 from .limits import loads, within
-
-Proof = Generator[tuple[str, Obligation], None, Statement]
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ def ends_on_circle(claim: Claim) -> Proof:
     return Statement(text, (*loop.assumed, beside), label)
 
 
-def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]:
+def declared(loop: PointLoop) -> Part[Circle]:
     """The law's errors are those of a circle that is run through, and V is a positive sum of their squares."""
     errors, (V,) = loop.single("errors", 3), loop.single("lyapunov", 1)
     square, rate = -errors[0].at({"x2": 0, "x3": 0}).number, errors[1].slope("x3").number
@@ -128,7 +126,7 @@ def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
         demand(b.names <= roots.keys() and min(b.terms.values()) > 0, "a divisor may be zero")
 
 
-def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[tuple[str, Obligation], None, str]:
+def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Part[str]:
     """On {V <= level} with x = x' = 0, which is not left, the norm of the control is at most `limit.norm`, each axis of it
     `limit.axis`. The errors f are variables; where |(f2, f3)| = 1/s, s (f2, f3) is a unit vector."""
     norm, axis = loop.claim.numbers.get("limit.norm"), loop.claim.numbers.get("limit.axis")
