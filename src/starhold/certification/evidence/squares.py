@@ -13,8 +13,10 @@ from itertools import combinations_with_replacement
 from typing import Any, TypeVar
 
 import numpy as np
-from flint import fmpq, fmpq_mat
+from flint import fmpq_mat
 
+from starhold.algebra.polynomial import exact
+from starhold.certification.matrices import fraction
 from starhold.kernel.numbers import RefusedError, times, transpose
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
@@ -274,19 +276,35 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
     found = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
     if found is not None:
         return found
-    rest = problem.p - dot(x, problem.columns)
-    rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *problem.columns) for m in q.terms}))}
-    A, b = fmpq_mat(len(rows), len(x)), fmpq_mat(len(rows), 1)
-    for k, q in enumerate(problem.columns):
-        for m, c in q.terms.items():
-            A[rows[m], k] = fmpq(c.numerator, c.denominator)
-    for m, c in rest.terms.items():
-        b[rows[m], 0] = fmpq(c.numerator, c.denominator)
-    echelon, rank = A.transpose().rref()
-    kept = [next(c for c in range(len(rows)) if echelon[r, c] != 0) for r in range(rank)]
-    own = fmpq_mat(rank, len(x), [A[r, k] for r in kept for k in range(len(x))])
-    step = own.transpose() * (own * own.transpose()).solve(fmpq_mat(rank, 1, [b[r, 0] for r in kept]))
-    return [v + Fraction(int(step[k, 0].p), int(step[k, 0].q)) for k, v in enumerate(x)]
+    rest, count = problem.p - dot(x, problem.columns), len(x)
+    A = matrix_of([*problem.columns, rest])
+    echelon, rank = fmpq_mat(count, A.nrows(), [A[r, k] for k in range(count) for r in range(A.nrows())]).rref()
+    kept = [next(c for c in range(A.nrows()) if echelon[r, c] != 0) for r in range(rank)]
+    own = fmpq_mat(rank, count, [A[r, k] for r in kept for k in range(count)])
+    step = own.transpose() * (own * own.transpose()).solve(fmpq_mat(rank, 1, [A[r, count] for r in kept]))
+    return [v + fraction(step[k, 0]) for k, v in enumerate(x)]
+
+
+def coefficients(polys: Sequence[Poly]) -> tuple[tuple[int, int], list[tuple[int, int, Fraction]]]:
+    """Return the size and the entries of the matrix of coefficients, a row for each monomial, a column for each polynomial."""
+    rows = {m: k for k, m in enumerate(sorted({m for q in polys for m in q.terms}))}
+    return (len(rows), len(polys)), [(rows[m], k, c) for k, q in enumerate(polys) for m, c in q.terms.items()]
+
+
+def matrix_of(polys: Sequence[Poly]) -> Any:
+    """Return the exact matrix of coefficients."""
+    (height, width), entries = coefficients(polys)
+    found = fmpq_mat(max(height, 1), max(width, 1))
+    for r, k, c in entries:
+        found[r, k] = exact(c)
+    return found
+
+
+def sparse_of(polys: Sequence[Poly]) -> Any:
+    """Return the matrix of coefficients in floats."""
+    size, entries = coefficients(polys)
+    rows, columns, values = zip(*entries, strict=True)
+    return sparse.csc_matrix((list(map(float, values)), (rows, columns)), size)
 
 
 def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from starhold.certification.evidence.squares import degree, optimum, text
+from starhold.certification.evidence.squares import degree, optimum, sparse_of, text
 from starhold.certification.evidence.terms import (
     identity,
     independent,
@@ -149,15 +149,8 @@ class Guess:
         every = [*single, *grams]
         if len(grams) > MOST:
             return None
-        rows = {m: k for k, m in enumerate(sorted({m for q in (self.p, *every) for m in q.terms}))}
-        entries = [(rows[m], k, float(c)) for k, q in enumerate(every) for m, c in q.terms.items()]
-        equal = sparse.csc_matrix(
-            ([c for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])),
-            (len(rows), len(every) + 1),
-        )
-        b = np.zeros(len(rows))
-        for m, c in self.p.terms.items():
-            b[rows[m]] = float(c)
+        whole = sparse_of([*every, Poly({}), self.p])
+        equal, b = whole[:, :-1], whole[:, -1].toarray().ravel()
         if self.basis is not None:
             # Equations that follow from others would stop the interior point.
             _, triangle, order = pivoted(equal.toarray().T, mode="economic", pivoting=True)
