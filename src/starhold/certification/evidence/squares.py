@@ -286,7 +286,7 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
 
 
 def coefficients(polys: Sequence[Poly]) -> tuple[tuple[int, int], list[tuple[int, int, Fraction]]]:
-    """Return the size and the entries of the matrix of coefficients, a row for each monomial, a column for each polynomial."""
+    """Return size and entries of the matrix of coefficients, a row for each monomial, a column for each polynomial."""
     rows = {m: k for k, m in enumerate(sorted({m for q in polys for m in q.terms}))}
     return (len(rows), len(polys)), [(rows[m], k, c) for k, q in enumerate(polys) for m, c in q.terms.items()]
 
