@@ -303,8 +303,8 @@ def matrix_of(polys: Sequence[Poly]) -> Any:
 def sparse_of(polys: Sequence[Poly]) -> Any:
     """Return the matrix of coefficients in floats."""
     size, entries = coefficients(polys)
-    rows, columns, values = zip(*entries, strict=True)
-    return sparse.csc_matrix((list(map(float, values)), (rows, columns)), size)
+    values, places = [float(c) for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])
+    return sparse.csc_matrix((values, places), size)
 
 
 def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
