@@ -19,9 +19,8 @@ from tests.tiers import leading
 
 def test_unknown_keys_fail_everywhere(made):
     content = made("pd-0")
-    places = [(), ("certificates", 0), ("certificates", 0, "subject")]
+    places = [(), ("certificates", 0), ("certificates", 0, "claims", 0)]
     places += [("claims", 0), *(("claims", 0, part) for part in ("subject", "numbers", "evidence"))]
-    places += [("certificates", 0, "claims", 0), ("certificates", 0, "subject", "orbit")]
     for path in places:
         changed = copy.deepcopy(content)
         content_at(changed, path)["more"] = 1.0

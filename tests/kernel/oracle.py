@@ -173,12 +173,16 @@ class Oracle(Driven):
         for _ in range(3):
             *others, H = self.environment()
             u, T, h = self.law(q, w, *others, H)
-            torques.append((T, T + np.cross(w, H)))
+            torques.append((T, np.cross(w, H)))
             size = max(size, np.abs(u).max() + np.abs(T).max())
             if not self.limits(u, h):
                 return False
-        # With nothing from outside a momentum that does no work is constant in the target's axes, if no law undoes that.
-        ways = list(zip(*torques, strict=True))[: 1 if {"outside torque", "moving target"} & set(self.words) else 2]
+        plain, idle = map(np.array, zip(*torques, strict=True))
+        ways = [plain]
+        if not {"outside torque", "moving target"} & set(self.words):
+            # With nothing from outside momentum is constant in the target's axes; a law may undo a share of what it does.
+            moved, turned = plain[1] - plain[0], idle[1] - idle[0]
+            ways.append(plain - idle * (moved @ turned) / max(turned @ turned, 1e-300))
         alike = [own[0] for own in ways if np.allclose(own, own[0], rtol=1e-6, atol=1e-9 * size)]
         if not alike:
             return False

@@ -7,6 +7,7 @@ import numpy as np
 
 import starhold as sh
 from starhold.algebra.vector import ZERO
+from starhold.certification.evidence.finding import certificate as contents
 from starhold.certification.station import certify_station
 from starhold.laws import l2_circle, l2_equilibrium
 from starhold.laws.catalogue import catalogue
@@ -40,10 +41,8 @@ def flown(scenario, law):
 
 def proof(certificate, *kept):
     """What the kernel is given, with the claims at these places."""
-    content = certificate.proof
-    claims = [content["claims"][k] for k in kept] if kept else content["claims"]
-    used = {name for claim in claims for name in claim["programs"].values()}
-    return content | {"claims": claims, "programs": {n: p for n, p in content["programs"].items() if n in used}}
+    proofs = [certificate.proofs[k] for k in kept] if kept else certificate.proofs
+    return contents([program for one in proofs for program in one.programs.values()], [one.claim for one in proofs])
 
 
 class StationOracle:

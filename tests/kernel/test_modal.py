@@ -12,14 +12,15 @@ from starhold.analysis.trial import fly_claims
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.evidence.claims import find_claims
 from starhold.certification.evidence.finding import certificate, obligations, read
-from starhold.certification.evidence.isotropic import ISOTROPIC, Shape, values
+from starhold.certification.evidence.isotropic import ISOTROPIC, Shape
+from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import make_subject
 from starhold.kernel.check import check
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import WORK, Account, RefusedError
 from starhold.kernel.polynomials import poly, var
 from starhold.kernel.programs import Asking, Exactly, Program, known
-from starhold.kernel.theorems.isotropic import reduced
+from starhold.kernel.theorems.attitude import reduced
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from tests.kernel.certificates import contents, text
@@ -69,7 +70,7 @@ def test_the_set_is_nearly_the_largest():
     asked = obligations(claim, loop.by_digest)[0]["V falls"]
     u, x, v = np.meshgrid(np.linspace(0.0, 1.9, 80)[1:], np.linspace(-1.0, 1.0, 60), np.linspace(0.0, 4.0, 80))
     at = {"u": u, "v": v, "t": x * np.sqrt(u * (2.0 - u))}
-    room, fall = values(asked.known[0], at), values(asked.p, at)
+    room, fall = valued(asked.known[0], at), valued(asked.p, at)
     assert fall[room >= 0.0].min() > 0.0
     assert fall[room >= -0.03 * number(claim["numbers"]["level"])].min() < 0.0
 

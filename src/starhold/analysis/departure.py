@@ -16,8 +16,6 @@ from starhold.analysis.meter import ALMOST, on_limit
 from starhold.analysis.rigid_body import error_angle
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.certificate import Certificate, Claim
-from starhold.certification.evidence.attitude import Loop
-from starhold.certification.subject import make_subject
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
@@ -115,7 +113,7 @@ def departures(
         common.append(Departure(run.attrs["diverged_at"], LOST))
     found: dict[str, tuple[Departure, ...]] = {}
     for claim in _left(certificate):
-        programs = proved_by(certificate, claim, loop)
+        programs = claim.programs
         own = [] if "held-torque" in claim.assumptions else held_too_long
         found[claim.kind] = tuple(sorted({*common, *own, *span.unmet(claim), *_set(claim, programs, span)}))
     return found
@@ -198,7 +196,7 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     shown = shown_at(loop, loop.start)
     momentum = momentum_of(loop, shown)
     for claim in _left(certificate):
-        value = value_of(proved_by(certificate, claim, loop), loop, shown)
+        value = value_of(claim.programs, loop, shown)
         if value is not None and "start" in claim.numbers:
             level = claim.numbers["start"]
             inside = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
@@ -213,17 +211,6 @@ def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
     error = np.array(shown.attitude)
     attitude: Any = tuple(fed_back(loop, np.atleast_2d(error.T)).T.reshape(error.shape))
     return shown._replace(attitude=attitude)
-
-
-def proved_by(certificate: Certificate, claim: Claim, loop: ClosedLoop) -> Mapping[str, Any]:
-    """Return the programs in a claim's proof, by their roles."""
-    found = certificate.programs(claim)
-    if not found and "stiffness" in claim.witness:
-        # A claim without a proof identifies its V by a number.
-        own = Loop(make_subject(loop))
-        V = own.lyapunov(claim.witness["stiffness"])
-        return {"lyapunov": own.by_digest[V]}
-    return found
 
 
 def value_of(programs: Mapping[str, Any], loop: ClosedLoop, shown: Measurement) -> Any:

@@ -51,7 +51,7 @@ def outside(
     states."""
     numbers, beyond = claim.numbers, np.zeros(position.shape[1], dtype=bool)
     if "level" in numbers:
-        value = value_of(certificate.programs(claim), loop, position, velocity)
+        value = value_of(claim.programs, loop, position, velocity)
         beyond |= value > numbers["level"] * (1.0 + slack)
     if IN_THE_PLANE in claim.assumptions:
         beyond |= np.maximum(np.abs(position[0]), np.abs(velocity[0])) > slack
@@ -78,7 +78,7 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     claim = next((c for c in reversed(_proved(certificate)) if "level" in c.numbers), None)
     if claim is None:
         return None
-    programs = certificate.programs(claim)
+    programs = claim.programs
 
     def value(states: NDArray[np.float64]) -> NDArray[np.float64]:
         return value_of(programs, loop, states[ROWS.position], states[ROWS.velocity])

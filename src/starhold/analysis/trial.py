@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO
-from starhold.analysis.departure import proved_by, shown_at, value_of
+from starhold.analysis.departure import shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.evidence.claims import settles
 from starhold.certification.evidence.recorded import TURNS
@@ -59,9 +59,8 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     """Fly from the largest set in which a limit is claimed to be kept, else from the first one with a claimed ultimate
     bound, or towards a sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises
     BrokenClaimError."""
-    found = [(c, proved_by(certificate, c, loop)) for c in certificate.claims if c.outcome == "proved"]
-    # A V with a cross term is known only from proofs.
-    found = [(c, p) for c, p in found if p.keys() & {"lyapunov", "surface"} and (c.proof or not c.witness["epsilon"])]
+    proved = [(c, c.programs) for c in certificate.claims if c.outcome == "proved"]
+    found = [(c, programs) for c, programs in proved if programs.keys() & {"lyapunov", "surface"}]
     claim, programs = next((one for one in found if _limited(one[0])), next(iter(found), (None, None)))
     if claim is None or programs is None:
         return None
@@ -113,7 +112,7 @@ def falling(
 
 def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
     """Fly from random states with s.Js/2 <= level, long enough to reach the surface without torque from outside."""
-    J, programs = tensor(loop.craft.inertia), proved_by(certificate, claim, loop)
+    J, programs = tensor(loop.craft.inertia), claim.programs
     least, greatest = (float(x) for x in np.linalg.eigvalsh(J)[[0, -1]])
     free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
 

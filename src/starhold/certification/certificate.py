@@ -80,6 +80,11 @@ class Claim:
         return "proved" if found == {"proved"} else "undecided"
 
     @property
+    def programs(self) -> dict[str, Any]:
+        """The programs of its proof, by their roles; none without a proof."""
+        return {} if self.proof is None else self.proof.roles
+
+    @property
     def left_out(self) -> list[str]:
         """The parts of the loop that it leaves out, each as role and name."""
         return [name.removeprefix(WITHOUT) for name in self.assumptions if name.startswith(WITHOUT)]
@@ -98,13 +103,11 @@ BESIDE = ("sampling", "control-limit", "saturated-axis")
 
 @dataclass(frozen=True, repr=False)
 class Certificate:
-    """Claims about one closed loop; `subject` holds the loop, as plain numbers and names. `proof`: the kernel's input, for
-    claims that it decides."""
+    """Claims about one closed loop; `subject` holds the loop, as plain numbers and names."""
 
     name: str
     subject: dict[str, Any]
     claims: tuple[Claim, ...]
-    proof: dict[str, Any] | None = None
 
     def __repr__(self) -> str:
         claims = ", ".join(f"{claim.kind} {claim.outcome}" for claim in self.claims)
@@ -124,25 +127,13 @@ class Certificate:
 
     @property
     def proofs(self) -> list[Proof]:
-        """Return the proofs in the order of the file: those of the claims, and those common to all of them."""
-        whole = self.proof or {"claims": [], "programs": {}}
-        found = [claim.proof for claim in self.claims if claim.proof is not None]
-        roles = [(claim, claim["programs"].values()) for claim in whole["claims"]]
-        return found + [Proof(claim, {name: whole["programs"][name] for name in names}) for claim, names in roles]
+        """Return the proofs in the order of the file."""
+        return [claim.proof for claim in self.claims if claim.proof is not None]
 
     @property
     def law(self) -> str:
         """Return the digest of the law's program that the proofs are about; empty where there are none."""
         return next((proof.claim["programs"]["law"] for proof in self.proofs if "law" in proof.claim["programs"]), "")
-
-    def programs(self, claim: Claim) -> dict[str, Any]:
-        """Return the programs of a claim's proof, by their roles; none for a claim without a proof."""
-        proof = claim.proof
-        if proof is None and self.proof is not None and claim.outcome != "undecided":
-            # The common proof has the decided claims, in order.
-            place = [one for one in self.claims if one.outcome != "undecided"].index(claim)
-            proof = Proof(self.proof["claims"][place], self.proof["programs"])
-        return {} if proof is None else proof.roles
 
     def claim(self, kind: str) -> Claim | None:
         """Return the claim of this kind, or None."""
@@ -178,8 +169,7 @@ def _plain(certificate: Certificate, places: Iterator[int]) -> dict[str, Any]:
             claims.append(shown | {part: value for part, value in asdict(claim).items() if part != "proof"})
     kinds = [claim["kind"] for claim in claims]
     about = {"outcome": certificate.outcome, "subject": certificate.subject, "kinds": kinds}
-    proof = {} if certificate.proof is None else {"proof": [next(places) for _ in certificate.proof["claims"]]}
-    return {"name": certificate.name, **about, "claims": claims, **proof}
+    return {"name": certificate.name, **about, "claims": claims}
 
 
 _RUN = "import sys\nfrom kernel.check import main\nsys.exit(main(sys.argv[1:]))\n"

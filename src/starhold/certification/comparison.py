@@ -12,6 +12,7 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
+from starhold.certification.matrices import fraction
 from starhold.certification.subject import above, make_subject
 from starhold.certification.unmodelled import Pushes, driven_errors, pushes, samples_of
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
@@ -72,7 +73,7 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     for name, x in told.items():
         if name in exactly and x != Fraction(exactly[name]):
             yield f"the {name} differs"
-        if name in least and side > 0 and x < Fraction(int(least[name].p), int(least[name].q)):
+        if name in least and side > 0 and x < fraction(least[name]):
             yield f"{name} is exceeded"
         if name in most and isfinite(most[name]) and side * x > side * Fraction(most[name]):
             yield f"{name} is lower"

@@ -1,6 +1,7 @@
 """Definite matrices without rounding: floats only guess, rationals decide. A matrix is a list of rows of these (`fmpq`)."""
 
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,6 +16,12 @@ Rows: TypeAlias = list[list[Any]]
 def rows(array: Any) -> Rows:
     """A matrix of floats at their exact values."""
     return [[exact(x) for x in row] for row in array]
+
+
+def fraction(x: Any) -> Fraction:
+    """A number of FLINT as the kernel has it, and others at their exact value."""
+    found = exact(x)
+    return Fraction(int(found.p), int(found.q))
 
 
 def floats(matrix: Sequence[Sequence[Any]]) -> NDArray[np.float64]:

@@ -32,7 +32,7 @@ from starhold.kernel.rules import Exceeds
 from starhold.kernel.theorems.refuted import State
 
 HOW = {
-    **dict.fromkeys(("Vanishes", "Solves"), EXACT),
+    "Vanishes": EXACT,
     **dict.fromkeys(("Definite", "Exceeds"), EXACT_SIGN),
     **dict.fromkeys(("Squares", "Sum"), SQUARES),
     **dict.fromkeys(("Contracts", "Persists"), LYAPUNOV),
@@ -114,15 +114,20 @@ def met(claims: list[Claim]) -> list[Claim]:
     ]
 
 
+def steps_of(proved: Proved) -> list[Obligation]:
+    """Return the obligations that the kernel checked, those of one name once."""
+    steps = dict.fromkeys((name.rstrip("+-0123456789 "), HOW[rule]) for name, rule in proved.shown)
+    return [Obligation(name, how, "proved") for name, how in steps]
+
+
 def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
     """Return a claim with the numbers, assumptions and obligations that the kernel reports."""
     label, numbers = proved.statement.label, proved.claim.numbers.content
     witness = loop.written_by.get(given["programs"].get("lyapunov", ""), {})
-    steps = {(name.rstrip("+-0123456789 "), HOW[rule]): None for name, rule in proved.shown}
-    shown = [Obligation(name, how, "proved") for name, how in steps]
+    shown = steps_of(proved)
     if proved.statement.refutes:
         name, told, against = refutation(proved, given, loop)
-        shown = [Obligation(name, next(how for own, how in steps if own == name), "refuted", against)]
+        shown = [Obligation(name, next(step.how for step in shown if step.name == name), "refuted", against)]
     else:
         told = _NUMBERS[label](numbers, loop)
         if proved.statement.within:

@@ -44,9 +44,7 @@ class Lemma(NamedTuple):
     parts: Sequence[Part] = ()
 
 
-Polynomial: TypeAlias = (
-    rules.Vanishes | rules.Squares | rules.Sum | rules.Solves | rules.Contracts | rules.Persists | rules.Definite
-)
+Polynomial: TypeAlias = rules.Vanishes | rules.Squares | rules.Sum | rules.Contracts | rules.Persists | rules.Definite
 """Obligations about polynomials; the other compares two numbers."""
 
 
@@ -76,10 +74,6 @@ def lemmas(o: Polynomial, evidence: Any) -> Iterator[Lemma]:
     """Yield what an obligation says, with its evidence."""
     if isinstance(o, rules.Vanishes):
         yield Lemma(o.p, None, _polys(evidence or []), o.modulo)
-    elif isinstance(o, rules.Solves):
-        rows = matrix(evidence["matrix"], len(o.wanted), len(o.given))
-        for p, row, own in zip(o.wanted, rows, evidence["cofactors"], strict=True):
-            yield Lemma(p, None, [*map(poly, row), *(-c for c in _polys(own))], [*o.given, *o.modulo])
     elif isinstance(o, rules.Squares):
         known, count = [*o.strict, *o.known], len(evidence["gram"])
         weights = [rational(x) for x in evidence["multipliers"]]

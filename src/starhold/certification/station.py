@@ -3,18 +3,18 @@ make attractive: errors that vanish there, with their V, or an equilibrium."""
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from starhold.certification.certificate import BALLS, EXACT, Certificate, Claim, Obligation
+from starhold.certification.certificate import BALLS, EXACT, EXACT_SIGN, Certificate, Claim, Obligation, Proof
 from starhold.certification.evidence.finding import certificate
-from starhold.certification.evidence.station import UNSHOWN, Station, full_problem
+from starhold.certification.evidence.station import HELD, MORE, UNSHOWN, Station, full_problem
+from starhold.certification.proofs import steps_of
 from starhold.certification.subject import described_gains
 from starhold.certification.unmodelled import assumed_away, named
-from starhold.kernel.check import check
-from starhold.laws.point_programs import claim_of
+from starhold.kernel.check import Proved, check
 from starhold.loop.closed_loop import ClosedLoop
 
 SURE = ("circling-bodies", "exact-place", "continuous-control")
@@ -33,10 +33,10 @@ def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
             claims = _circle(station)
         elif law.hook("rest") is not None and not loop.remembers:
             claims = _rest(station)
-    proof = certificate(list(station.programs.values()), station.claims) if station.claims else None
-    shown = iter(check(json.dumps(proof)) if proof else ())
-    found = [_as_told(claim_of(next(shown), circle)) if claim is None else claim for claim in claims]
-    return Certificate(name or law.name, described_station(loop), named(found, loop), proof)
+    content = certificate(list(station.programs.values()), station.claims)
+    shown = zip(check(json.dumps(content)) if station.claims else (), station.claims, strict=True)
+    found = [_made(*next(shown), station) if claim is None else claim for claim in claims]
+    return Certificate(name or law.name, described_station(loop), named(found, loop))
 
 
 def _circle(station: Station) -> list[Claim | None]:
@@ -95,13 +95,30 @@ def _mismatch(loop: ClosedLoop) -> str:
     return "the law cancels the linear model, but the full problem is flown"
 
 
-def _as_told(told: Any) -> Claim:
-    obligations = tuple(Obligation(**one) for one in told["obligations"])
-    return Claim(told["kind"], told["numbers"], {}, tuple(told["assumptions"]), obligations)
+STATED = ("level", "inner", "outer", "velocity", "limit", "width", "reach", "boundary")
+"""The numbers that a claim states."""
+AGAINST = {MORE: ("control", "control", "y", "z"), HELD: ("only the circle", "radius", "needs", "of")}
+"""The obligation that fails by each theorem that refutes, and the numbers that show it."""
+
+
+def _made(proved: Proved, given: Mapping[str, Any], station: Station) -> Claim:
+    """Return a claim with the numbers, assumptions and obligations that the kernel reports."""
+    statement = proved.statement
+    numbers = {name: float(x) for name, x in proved.claim.numbers.content.items()}
+    limit = next((name for name in ("norm", "axis") if f"limit.{name}" in numbers), None)
+    told: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
+    told |= {name: x for name, x in numbers.items() if name in STATED and not statement.refutes}
+    shown = steps_of(proved)
+    if statement.refutes:
+        returns = "x returns" if statement.label == "circle" else "each axis returns"
+        name, *against = AGAINST.get(given["theorem"], (returns,))
+        shown = [Obligation(name, EXACT_SIGN, "refuted", {key: numbers[key] for key in against})]
+    programs = {name: station.by_digest[name] for name in given["programs"].values()}
+    return Claim(statement.label, told, {}, statement.assumptions, tuple(shown), Proof(dict(given), programs))
 
 
 def described_station(loop: ClosedLoop) -> dict[str, Any]:
-    """Return the loop as plain numbers and names, all that a checker needs to record its programs again."""
+    """Return the loop as plain numbers and names, with which its programs are recorded again."""
     lag = loop.find("lag")
     return {
         "law": loop.law.name,

@@ -1,5 +1,5 @@
-"""The independent checker of certificates. It shares with the certifier the equations of laws and parts, which claims are
-about, and the arithmetic of `algebra`; what it derives, bounds and proves is its own. A test of its imports keeps it so.
+"""The independent checker of certificates: the kernel decides every proof, and what stands beside the proofs must not say
+more. It shares nothing with the certifier; a test of its imports keeps it so.
 """
 
 from starhold.checker.check import Finding, check, check_file, passed

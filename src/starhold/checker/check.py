@@ -2,30 +2,12 @@
 proofs."""
 
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, TypeAlias, cast
 
-from starhold.checker.shapes import (
-    CLAIM,
-    FILE,
-    OBLIGATION,
-    PROVED,
-    STATION,
-    SUBJECT,
-    UNKNOWN_BODY,
-    CheckError,
-    StationSubject,
-    Verdict,
-    certificate_shaped,
-    demand,
-    outcome_of,
-    read_station,
-    shaped,
-    station_findings,
-)
 from starhold.errors import InputError
 from starhold.kernel.check import Proved
 from starhold.kernel.check import check as prove_all
@@ -35,6 +17,40 @@ from starhold.kernel.sentences import ASSUMPTIONS
 
 BYTES, DEEPEST, DIGITS = 2**26, 32, 1_000
 """The largest file (bytes); the deepest nesting of its objects and lists; the most digits of a number."""
+FORMER = tuple(f"starhold {kind}certificate {version}" for kind in ("", "invariant ") for version in (1, 2))
+"""Formats of earlier versions, whose keys had other names."""
+ENDS = (
+    "convergence", "region", "torque-limit", "wheels", "inertia", "pointing", "sliding", "circle", "equilibrium",
+    "hand-over",
+)  # fmt: skip
+"""Kinds of claims with an ultimate bound, one of which a certificate must contain to count as proved."""
+BY_THE_KERNEL = "proved by the kernel"
+"""The reason of findings about claims with a proof."""
+Test: TypeAlias = Callable[[Any], bool]
+Verdict: TypeAlias = Literal["holds", "fails", "not claimed"]
+
+
+class CheckError(Exception):
+    """Something in a certificate does not hold, or cannot be verified."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A verdict on one obligation of a claim; without an obligation, on the claim, certificate or file."""
+
+    certificate: str
+    claim: str
+    obligation: str
+    verdict: Verdict
+    reason: str
+
+
+def passed(findings: Sequence[Finding]) -> bool:
+    """Whether all that is claimed to be proved was verified. A file without claims is not proved."""
+    return all(finding.verdict != "fails" for finding in findings)
+
+
+# --- files ------------------------------------------------------------------------------------------------------------
 
 
 def read_file(path: Path | str) -> tuple[Any, list[str]]:
@@ -69,62 +85,6 @@ def read_file(path: Path | str) -> tuple[Any, list[str]]:
         raise InputError(str(path), "", "", f"is not JSON: {error}") from None
 
 
-def shallow(content: Any) -> None:
-    """Raise a CheckError where objects and lists are nested too deeply."""
-    inner: list[Any] = [content]
-    for _ in range(DEEPEST):
-        inner = [x for part in inner for x in _within(part)]
-        if not inner:
-            return
-    raise CheckError(f"the file is nested more than {DEEPEST} deep")
-
-
-def _within(part: Any) -> Iterable[Any]:
-    if isinstance(part, dict):
-        return cast("dict[Any, Any]", part).values()
-    return cast("list[Any]", part) if isinstance(part, list) else ()
-
-
-FORMER = (
-    "starhold certificate 1",
-    "starhold certificate 2",
-    "starhold invariant certificate 1",
-    "starhold invariant certificate 2",
-)
-"""Formats of earlier versions, whose keys had other names."""
-ENDS = (
-    "convergence",
-    "region",
-    "torque-limit",
-    "wheels",
-    "inertia",
-    "pointing",
-    "sliding",
-    "circle",
-    "equilibrium",
-    "hand-over",
-)
-"""Kinds of claims with an ultimate bound, one of which a certificate must contain to count as proved."""
-BY_THE_KERNEL = "proved by the kernel"
-"""The reason of findings about claims with a proof."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A verdict on one obligation of a claim; without an obligation, on the claim, certificate or file."""
-
-    certificate: str
-    claim: str
-    obligation: str
-    verdict: Verdict
-    reason: str
-
-
-def passed(findings: Sequence[Finding]) -> bool:
-    """Whether all that is claimed to be proved was verified. A file without claims is not proved."""
-    return all(finding.verdict != "fails" for finding in findings)
-
-
 def check_file(path: Path | str) -> list[Finding]:
     """Return the findings about a certificate file; InputError where it cannot be read."""
     content, faults = read_file(path)
@@ -148,6 +108,22 @@ def check(content: Any) -> list[Finding]:
     return [finding for given in content["certificates"] for finding in _certificate(given, proofs)]
 
 
+def shallow(content: Any) -> None:
+    """Raise a CheckError where objects and lists are nested too deeply."""
+    inner: list[Any] = [content]
+    for _ in range(DEEPEST):
+        inner = [x for part in inner for x in _within(part)]
+        if not inner:
+            return
+    raise CheckError(f"the file is nested more than {DEEPEST} deep")
+
+
+def _within(part: Any) -> Iterable[Any]:
+    if isinstance(part, dict):
+        return cast("dict[Any, Any]", part).values()
+    return cast("list[Any]", part) if isinstance(part, list) else ()
+
+
 def _known(content: Any) -> None:
     """Refuse a file of another format, or one that lacks what a file of this format has."""
     table = cast("dict[str, Any]", content if isinstance(content, dict) else {})
@@ -160,11 +136,9 @@ def _known(content: Any) -> None:
 
 def _proofs(content: Any) -> list[Proved]:
     """Return what the kernel proves of a file, in which each claim must occur once, in order."""
-    told: list[Any] = []
-    for given in content["certificates"]:
-        parts: list[Any] = [given.get(key) if isinstance(given.get(key), list) else [] for key in ("claims", "proof")]
-        claims, own = parts
-        told += [claim["proof"] for claim in claims if isinstance(claim, dict) and "proof" in claim] + own
+    lists: list[Any] = [given.get("claims") for given in content["certificates"]]
+    claims: Any = [claim for own in lists if isinstance(own, list) for claim in own]  # pyright: ignore
+    told: list[Any] = [claim["proof"] for claim in claims if isinstance(claim, dict) and "proof" in claim]
     demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
     if not told:
         demand(not content["programs"], "there are programs without a proof")
@@ -175,81 +149,41 @@ def _proofs(content: Any) -> list[Proved]:
         raise CheckError(f"refused by the kernel: {fault}") from None
 
 
-def _certificate(given: Mapping[str, Any], proofs: Sequence[Proved]) -> Iterator[Finding]:
+# --- certificates -----------------------------------------------------------------------------------------------------
+
+
+def _certificate(given: Any, proofs: Sequence[Proved]) -> Iterator[Finding]:
     name = str(given.get("name", ""))
-    about = given.get("subject")
-    if isinstance(about, Mapping) and "body" in about:
-        _, fault = _guarded(partial(_of_unknown_body, given))
-        yield Finding(name, "", "", "fails" if fault else "not claimed", fault or "nothing is known of this body")
-        return
-    subject, fault = _guarded(partial(_subject, given))
-    if subject is None:
-        yield Finding(name, "", "", "fails", fault)
-        return
-    if isinstance(subject, StationSubject):
-        found, fault = _guarded(partial(_of_station, name, subject, given, proofs))
-        yield from found or []
-        if fault:
-            yield Finding(name, "", "", "fails", fault)
-        elif not found:
-            yield Finding(name, "", "", "not claimed", "there are no claims")
+    try:
+        _whole(given)
+    except CheckError as fault:
+        yield Finding(name, "", "", "fails", str(fault))
         return
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
-        work = partial(_proved, proofs, claim) if "proof" in claim else partial(_unproved, given["subject"], claim)
-        found, fault = _guarded(work)
-        if found is None:
-            yield Finding(name, kind, "", "fails", fault)
-            continue
-        for obligation, verdict, reason in found:
-            yield Finding(name, kind, obligation, verdict, reason)
+        try:
+            found = _proved(proofs, claim) if "proof" in claim else _unproved(given["subject"], claim)
+        except CheckError as fault:
+            found: list[tuple[str, Verdict, str]] = [("", "fails", str(fault))]
+        yield from (Finding(name, kind, *one) for one in found)
     if not given["claims"]:
         yield Finding(name, "", "", "not claimed", "there are no claims")
 
 
-def _guarded(work: Callable[[], Any]) -> tuple[Any, str]:
-    """Run a piece of work: return its result, or None and why it fails, because any error in a check fails it."""
-    try:
-        return work(), ""
-    except CheckError as fault:
-        return None, str(fault)
-    except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
-        return None, f"cannot be verified: {error}"
-
-
-def _of_unknown_body(given: Any) -> None:
-    certificate_shaped(given)
-    shaped(given["subject"], UNKNOWN_BODY, "the subject")
-    demand(not given["claims"] and given["outcome"] == "undecided", "it makes claims that are not available for this body")
-
-
-def _of_station(name: str, subject: StationSubject, given: Any, proofs: Sequence[Proved]) -> list[Finding]:
-    for claim in given["claims"]:
-        shaped(claim, CLAIM, "the claim")
-        for obligation in claim["obligations"]:
-            shaped(obligation, OBLIGATION, "an obligation")
-    absent = [f"without:{name}" for name in given["subject"]["assumed_away"]]
-    demand(not any("proof" in claim for claim in given["claims"]), "a claim of a station tells of a proof")
-    places: list[int] = given.get("proof", [])
-    own = [proofs[place] for place in places]
-    return [Finding(name, *one) for one in station_findings(subject, given, absent, own)]
-
-
-def _subject(given: Any) -> StationSubject | Mapping[str, Any]:
-    certificate_shaped(given)
-    station = "plant" in given["subject"]
-    shaped(given["subject"], STATION if station else SUBJECT, "the subject")
-    outcomes = [claim.get("outcome") for claim in given["claims"]]
-    kinds = [str(claim.get("kind")) for claim in given["claims"]]
+def _whole(given: Any) -> None:
+    """Check that a certificate has its keys, the claims whose kinds it lists, and the outcome that follows from them. Its
+    subject, which nothing is proved from, is for readers."""
+    shaped(given, CERTIFICATE, "the certificate")
+    kinds, outcomes = ([claim.get(key) for claim in given["claims"]] for key in ("kind", "outcome"))
+    demand(given["kinds"] == kinds, f"the claims are not those listed: {', '.join(given['kinds']) or '(none)'}")
+    demand(len(set(map(str, kinds))) == len(kinds), "two claims are of the same kind")
+    demand("body" not in given["subject"] or not kinds, "it makes claims that are not available for this body")
     if ("pointing", "proved") in zip(kinds, outcomes, strict=True):
         # Undecided claims about an ideal loop do not count beside the loop that flies.
         outcomes = [outcome for outcome in outcomes if outcome != "undecided"]
-    follows = outcome_of(outcomes)
-    if follows == "proved" and not set(kinds) & set(ENDS):
-        follows = "undecided"
+    proved = bool(set(kinds) & set(ENDS)) and all(outcome == "proved" for outcome in outcomes)
+    follows = "refuted" if "refuted" in outcomes else "proved" if proved else "undecided"
     demand(given["outcome"] == follows, "the outcome does not follow from the claims")
-    demand(len(set(kinds)) == len(kinds), "two claims are of the same kind")
-    return read_station(given["subject"]) if station else given["subject"]
 
 
 def _proved(proofs: Sequence[Proved], claim: Any) -> list[tuple[str, Verdict, str]]:
@@ -273,8 +207,85 @@ def _unproved(about: Mapping[str, Any], claim: Any) -> list[tuple[str, Verdict, 
     demand(claim["outcome"] == "undecided", "such a claim needs a proof, or is undecided")
     outcomes = {obligation["outcome"] for obligation in claim["obligations"]}
     demand(outcomes == {"undecided"} and not claim["witness"], "an undecided claim needs a reason, and has no proof")
-    absent = [f"without:{name}" for name in about["assumed_away"]]
+    absent = [f"without:{name}" for name in about.get("assumed_away") or ()]
     demand({*absent} <= {*claim["assumptions"]}, "a part that the claim leaves out is not named")
     named = [name for name in claim["assumptions"] if not name.startswith("without:")]
     demand({*named} <= {*ASSUMPTIONS, "unknown-outside-torque"}, "there is no such assumption")
     return [(o["name"], "not claimed", "undecided, the claim is not proved") for o in claim["obligations"]]
+
+
+# --- shapes -----------------------------------------------------------------------------------------------------------
+
+
+def demand(holds: bool, otherwise: str) -> None:
+    """Raise a CheckError unless something holds."""
+    if not holds:
+        raise CheckError(otherwise)
+
+
+def shaped(given: Any, shape: Mapping[str, Test], where: str) -> None:
+    """Check that an object has exactly the keys of a shape, and values that their tests allow."""
+    demand(isinstance(given, Mapping), f"{where} is not an object")
+    demand(set(given) == set(shape), f"{where} must have the keys {', '.join(shape) or '(none)'}")
+    for key, test in shape.items():
+        demand(test(given[key]), f"{where} has a value that is not allowed under {key}")
+
+
+def _text(x: Any) -> bool:
+    """Return whether a text is printable: no lone surrogates, no terminal control characters."""
+    return isinstance(x, str) and x.isprintable()
+
+
+def _plain(x: Any) -> bool:
+    """Return whether a value consists of finite numbers, printable texts, lists and objects."""
+    if isinstance(x, Mapping):
+        return all(isinstance(key, str) and _plain(value) for key, value in x.items())  # pyright: ignore
+    if isinstance(x, list):
+        return all(map(_plain, x))  # pyright: ignore
+    return x is None or _text(x) or isinstance(x, int) or (isinstance(x, float) and math.isfinite(x))
+
+
+def _object(x: Any) -> bool:
+    return isinstance(x, dict) and _plain(x)
+
+
+def _list(test: Test) -> Test:
+    return lambda x: isinstance(x, list) and all(map(test, x))  # pyright: ignore
+
+
+def _table(x: Any) -> bool:
+    return isinstance(x, dict)
+
+
+def _outcome(x: Any) -> bool:
+    return x in ("proved", "refuted", "undecided")
+
+
+def _subject(x: Any) -> bool:
+    return _object(x) and _list(_text)(x.get("assumed_away", []))
+
+
+FILE: dict[str, Test] = {
+    **dict.fromkeys(("format", "scenario", "note"), _text),
+    "versions": lambda x: _table(x) and all(map(_text, x.values())),
+    "programs": _table,
+    **dict.fromkeys(("claims", "certificates"), _list(_table)),
+}
+PROVED: dict[str, Test] = {"kind": _text, "outcome": _outcome, "proof": lambda x: type(x) is int and x >= 0}
+"""A claim that the file has a proof of, by its place."""
+CERTIFICATE: dict[str, Test] = {
+    "name": lambda x: _text(x) and len(x) <= 1_000,
+    "outcome": _outcome,
+    "subject": _subject,
+    "kinds": _list(_text),
+    "claims": _list(_table),
+}
+CLAIM: dict[str, Test] = {
+    "kind": _text,
+    "outcome": _outcome,
+    "numbers": _object,
+    "witness": _object,
+    "assumptions": _list(_text),
+    "obligations": _list(_table),
+}
+OBLIGATION: dict[str, Test] = {"name": _text, "how": _text, "outcome": _outcome, "evidence": _object}

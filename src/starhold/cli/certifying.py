@@ -66,7 +66,7 @@ def check(
     ] = None,
 ) -> None:
     """Check a certificate independently of the program that made it: it takes from the file only what is claimed. The
-    kernel, which is also in kernel.pyz beside the file, checks the proofs; other claims are derived again.
+    kernel, which is also in kernel.pyz beside the file, checks the proofs; other claims are undecided.
     """
     import hashlib
     from contextlib import ExitStack

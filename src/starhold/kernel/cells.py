@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -14,11 +14,9 @@ from .numbers import demand, read_list
 from .polynomials import Poly, minus, poly, total, var
 from .programs import Condition, Exactly, Guards, joined, known
 from .reading import Claim
-from .rules import Obligation, Shown, Sum
-from .sentences import Statement
+from .rules import Shown, Sum
 
 CELLS, VARIABLES, POWER, TAYLOR = 64, 9, 6, 8
-Shows = Generator[tuple[str, Obligation], None, Statement]
 State = dict[str, Fraction]
 
 

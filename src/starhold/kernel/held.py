@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from .loops import AXES, NONE, AttitudeLoop, slopes
 from .numbers import Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
-from .polynomials import Poly, apply, dot, minus, most, poly, var, variables
+from .polynomials import Poly, apply, dot, minus, most, var, variables
 from .regions import (
     ANGLE,
     RATE,
@@ -113,7 +113,7 @@ class Held:
         # What does not, by the first that it has of what comes from outside.
         self.rigid = {x: [first(p, x) for p in left] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
-        self.N: Rows = [[poly(p).number for p in row] for row in loop.J_inverse]
+        self.N = inverse(loop.given)
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
         self.bend = apply(self.N, self.gyroscopic)
@@ -176,10 +176,9 @@ class Held:
         if not self.turned + self.rated + self.led + self.hurried:
             return Fraction(0), Fraction(0)
         e, r, a, _ = (self.size(letter) for letter in "erah")
-        J = [[poly(x).number for x in row] for row in self.loop.J]
         turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
         wrong = {"q": self.turned / 2, "w": self.rated + turn["r"]} | turn
-        wrong |= {"h": stretch(J) * self.rated, "e": 2 * e}
+        wrong |= {"h": stretch(self.loop.given) * self.rated, "e": 2 * e}
         sizes = {name: x + wrong[name[-1] if name in (SPEED, ANGLE) else name[0]] for name, x in region.sizes.items()}
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
@@ -329,8 +328,7 @@ class Held:
 def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
     """Return the linear loop with its torque held for h, where nothing comes from outside."""
     at = loop.on_target | loop.still | {f"{letter}{k + 1}": 0 for letter in "erah" for k in AXES}
-    torque = beside(*(slopes(loop.u, letter, at) for letter in "wq"))
-    N = [[poly(p).number for p in row] for row in loop.J_inverse]
+    torque, N = slopes(loop.u, STATE, at), inverse(loop.given)
     rates = times(N, torque)
     A = over_period([[-x for x in row] for row in rates], h)
     return Near(torque, rates, A, [[h * x for x in row] for row in N] + [[h * h / 4 * x for x in row] for row in N])

@@ -23,6 +23,7 @@ from .reading import Claim
 from .rules import Definite, Shown, vanish
 
 AXES = range(3)
+RATES, TURNS = ("w1", "w2", "w3"), ("q1", "q2", "q3")
 OUTSIDE, MOVING, WHEELS = "outside torque", "moving target", "wheels"
 """A loop has these only where the claim takes it with them."""
 SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
@@ -83,7 +84,7 @@ class AttitudeLoop(Loop):
     such a J near the given one, J0: no entry is off by more than `tolerance` sqrt(J0_ii J0_kk). `quotients`: programs may
     divide by the state, but not by quotients, and take no roots of it."""
 
-    driven = ("w1", "w2", "w3")
+    driven = RATES
 
     def __init__(self, claim: Claim, any_inertia: bool = False, near: bool = False, quotients: bool = False) -> None:
         super().__init__(claim, Asking(nested=False) if quotients else Exactly())
@@ -240,6 +241,6 @@ def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
     return cases[holds.index(True)]
 
 
-def slopes(parts: Sequence[Poly], letter: str, at: Mapping[str, Poly | Fraction | int]) -> Rows:
-    """Return the derivatives with respect to three variables at a point."""
-    return [[p.slope(f"{letter}{k}").at(at).number for k in (1, 2, 3)] for p in parts]
+def slopes(parts: Sequence[Poly], names: Sequence[str], at: Mapping[str, Poly | Fraction | int] | None = None) -> Rows:
+    """Return the derivatives with respect to variables, at a point where one is told."""
+    return [[p.slope(name).at(at or {}).number for name in names] for p in parts]

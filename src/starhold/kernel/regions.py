@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import prod
 
-from .loops import AXES
+from .loops import AXES, RATES, TURNS
 from .numbers import RefusedError, Rows, demand, norm, reach, root, scalar, transpose, up
 from .polynomials import Poly, most, var
 
-STATE = ("w1", "w2", "w3", "q1", "q2", "q3")
+STATE = (*RATES, *TURNS)
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE = "|w", "|q"
 """Under which the sizes have those of |w| and |q|."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from .numbers import Rows, definite, demand, matrix, plus, rational, read_list, read_table, times, transpose
 from .polynomials import Poly, apply, dot, read_poly
+from .sentences import Statement
 
 
 def combination(cofactors: Any, relations: Sequence[Poly]) -> Poly:
@@ -95,22 +96,6 @@ class Sum:
 
 
 @dataclass(frozen=True)
-class Solves:
-    """Where the given vanish, and the relations, so do the wanted. Evidence: a matrix that takes the given to the wanted,
-    and for each the cofactors of the relations."""
-
-    given: Sequence[Poly]
-    wanted: Sequence[Poly]
-    modulo: Sequence[Poly] = ()
-
-    def check(self, evidence: Any) -> None:
-        rows, cofactors = read_table(evidence, "matrix", "cofactors")
-        found = apply(matrix(rows, len(self.wanted), len(self.given)), self.given)
-        for taken, p, own in zip(found, self.wanted, read_list(cofactors, len(self.wanted)), strict=True):
-            demand(not (taken - p - combination(own, self.modulo)).terms, "a system is not solved")
-
-
-@dataclass(frozen=True)
 class Contracts:
     """Every eigenvalue of A is smaller than the rate in size, or of a flow x' = Ax has a negative real part. Evidence: P > 0
     with rate^2 P - A'PA > 0, or with -(A'P + PA) > 0 (Lyapunov)."""
@@ -162,9 +147,13 @@ class Exceeds:
         demand(self.large > self.small, "a number is not the larger one")
 
 
-Obligation: TypeAlias = Vanishes | Squares | Sum | Solves | Contracts | Persists | Definite | Exceeds
+Obligation: TypeAlias = Vanishes | Squares | Sum | Contracts | Persists | Definite | Exceeds
 Shown: TypeAlias = Iterator[tuple[str, Obligation]]
 """Obligations, each with the name under which its evidence stands."""
+_T = TypeVar("_T")
+Part: TypeAlias = Generator[tuple[str, Obligation], None, _T]
+"""Obligations, and what follows from them."""
+Proof: TypeAlias = Part[Statement]
 
 
 def vanish(name: str, parts: Iterable[Poly], modulo: Sequence[Poly] = (), first: int = 0) -> Shown:

@@ -47,15 +47,15 @@ def compare_programs(path: Path, scenario: Scenario) -> list[str]:
         ends |= handed_over(entry, loop) if scenario.body == "rigid-body" else {}
     differing: list[str] = []
     for given in content["certificates"]:
-        station = "proof" in given
-        places = given["proof"] if station else [claim["proof"] for claim in given["claims"] if "proof" in claim]
+        places = [claim["proof"] for claim in given["claims"] if "proof" in claim]
         if places and given["name"] not in loops:
             differing.append(f"{given['name']}: the scenario has no such law")
             continue
         if not places:
             continue
         loop = loops[given["name"]]
-        if station != (loop.body.name == "libration-point"):
+        station = loop.body.name == "libration-point"
+        if any(station != ("field" in content["claims"][place]["programs"]) for place in places):
             differing.append(f"{given['name']}: the scenario is about another body")
             continue
         compare = station_differences if station else partial(differences, ends=ends.get(given["name"]))

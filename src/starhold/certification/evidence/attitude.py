@@ -17,7 +17,7 @@ from starhold.certification.evidence.squares import cofactors, largest_number, o
 from starhold.kernel.loops import HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
-from starhold.kernel.rules import Obligation, Solves, Squares
+from starhold.kernel.rules import Obligation, Squares, Vanishes
 from starhold.parts.craft import tensor
 
 CONVERGES, EVENLY, STRICTLY = "converges", "converges from both quaternions", "converges strictly"
@@ -82,9 +82,9 @@ class Loop(RecordedLoop):
         every = f"{theorem} whatever the inertia"
         if self.try_to_show(self.claim(every, words, V, **more), self.scales(V)) or theorem != CONVERGES:
             return
-        rest = obligations(self.claim(theorem, words, V, **more), self.by_digest)[0]["only equilibrium"]
-        assert isinstance(rest, Solves)
-        energy = self.lyapunov(-float(rest.given[0].terms.get(("q1",), 0)))
+        rest = obligations(self.claim(theorem, words, V, **more), self.by_digest)[0]["only equilibrium 1"]
+        assert isinstance(rest, Vanishes)
+        energy = self.lyapunov(-float(rest.modulo[0].terms.get(("q1",), 0)))
         self.try_to_show(self.claim(every, words, energy, **more), self.scales(energy))
 
     def show_strictly(self, turn: float | None = None) -> bool:

@@ -24,6 +24,7 @@ from starhold.certification.evidence.isotropic import find_isotropic
 from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.refuted import against_sampling
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, settled, solved
+from starhold.certification.matrices import fraction
 from starhold.certification.subject import Subject
 from starhold.kernel.loops import HANDED, HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError, plus
@@ -178,11 +179,6 @@ def largest_ratio(a: Any, b: Any) -> float:
     """Return the largest eigenvalue of b^-1 a."""
     found: Any = np.linalg.eigvals(np.linalg.solve(floats(b), floats(a)))
     return float(found.real.max())
-
-
-def fraction(x: Any) -> Fraction:
-    """Return a rational number of FLINT."""
-    return Fraction(int(x.p), int(x.q))
 
 
 KNOWN = 18

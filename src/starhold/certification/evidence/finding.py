@@ -3,7 +3,6 @@
 import json
 import warnings
 from collections.abc import Mapping
-from fractions import Fraction
 from importlib import import_module
 from typing import Any
 
@@ -12,9 +11,10 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import once, plainly, rounded, squares, text
+from starhold.certification.evidence.terms import solved
 from starhold.kernel import rules
-from starhold.kernel.numbers import Account, RefusedError, Rows, inverse, rational
-from starhold.kernel.polynomials import Poly, multiple
+from starhold.kernel.numbers import Account, RefusedError, Rows, rational
+from starhold.kernel.polynomials import Poly, poly
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.reading import Claim, Numbers, Told
 from starhold.kernel.theorems import THEOREMS
@@ -91,10 +91,8 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
         return found
     if isinstance(o, rules.Sum):
         found = Reduced(o, scales).evidence()
-    elif isinstance(o, rules.Solves):
-        found = in_proportion(o) or solves(o)
     elif isinstance(o, rules.Vanishes) and o.modulo:
-        found = [text(c) for c in euler(name, wanted)]
+        found = list(map(text, euler(name, wanted) if name.startswith("Euler") else combined(name, o)))
     elif isinstance(o, rules.Contracts):
         found = contracts(o)
     elif isinstance(o, rules.Persists):
@@ -111,27 +109,12 @@ def floats(rows: Rows) -> NDArray[np.float64]:
     return np.array([[float(x) for x in row] for row in rows], dtype=np.float64)
 
 
-def in_proportion(o: rules.Solves) -> dict[str, Any] | None:
-    """Return the matrix that takes each of what is given to what is wanted in its place; None for no multiples."""
-    if o.modulo or len(o.given) != len(o.wanted) or not all(p.terms for p in o.given):
-        return None
-    shares = [multiple(wanted, given) for given, wanted in zip(o.given, o.wanted, strict=True)]
-    if any(factor == 0 or offset != 0 for factor, offset in shares):
-        return None
-    rows = [[str(share[0]) if i == k else "0" for k in range(len(shares))] for i, share in enumerate(shares)]
-    return {"matrix": rows, "cofactors": [[] for _ in o.wanted]}
-
-
-def solves(o: rules.Solves) -> dict[str, Any]:
-    """Return the matrix that takes what is given, linear, to what is wanted."""
-    names = sorted({name for p in o.wanted for name in p.names})
-    rows = [[p.terms.get((name,), Fraction(0)) for name in names] for p in o.given]
-    try:
-        taken = inverse(rows)
-    except RefusedError:
-        raise NotFoundError("the torque at rest vanishes elsewhere too") from None
-    none = [[text(Poly({})) for _ in o.modulo] for _ in o.wanted]
-    return {"matrix": [[str(x) for x in row] for row in taken], "cofactors": none}
+def combined(name: str, o: rules.Vanishes) -> list[Poly]:
+    """Return numbers for cofactors: those with which the relations make a polynomial."""
+    found = solved(o.p, list(o.modulo))
+    if found is None:
+        raise NotFoundError("the torque at rest vanishes elsewhere too" if name.startswith("only") else name)
+    return list(map(poly, found))
 
 
 def euler(name: str, wanted: Mapping[str, rules.Obligation]) -> list[Poly]:

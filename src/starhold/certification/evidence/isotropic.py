@@ -16,9 +16,9 @@ from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import rounded
+from starhold.certification.evidence.terms import valued
 from starhold.kernel.loops import HYSTERESIS, SHORTEST
 from starhold.kernel.numbers import RefusedError
-from starhold.kernel.polynomials import Poly
 from starhold.kernel.rules import Sum
 
 
@@ -149,14 +149,8 @@ def reach(loop: Loop, shape: Shape) -> Reach:
     fastest = max(abs(shape.g), abs(shape.g + 2.0 * shape.m)) + sqrt(2.0 * top + shape.g**2)
     u, x, v = np.meshgrid(np.linspace(0.0, 2.0, 61)[1:], np.linspace(-1.0, 1.0, 31), np.linspace(0.0, fastest, 61)[1:])
     at = {"u": u, "v": v, "t": x * np.sqrt(u * (2.0 - u))}
-    heights, slopes = 1.0 - values(asked.known[0], at), values(asked.p, at)
+    heights, slopes = 1.0 - valued(asked.known[0], at), valued(asked.p, at)
     return Reach(shape, V, asked, min(top * (1.0 - 1e-6), float(heights[slopes <= 0.0].min(initial=np.inf))))
-
-
-def values(p: Poly, at: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return a polynomial's values in floats."""
-    parts = [float(c) * np.prod([at[name] for name in m], axis=0) for m, c in p.terms.items()]
-    return np.sum(np.broadcast_arrays(*parts), axis=0)
 
 
 def contents(loop: Loop, shape: Shape, level: float) -> dict[str, Any]:

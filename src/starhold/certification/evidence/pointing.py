@@ -21,6 +21,7 @@ from starhold.certification.evidence.finding import NotFoundError, evidence, flo
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.squares import rounded
+from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import Pushes, driven_errors, pushes
 from starhold.kernel.held import Held, Tube, near_target
@@ -177,10 +178,7 @@ class Chain:
         far = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
         names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
         x = dict(zip(names, (np.cos(half), *q, *(far * along)), strict=True))
-        u = [
-            sum(float(k) * np.prod([x[name] for name in m], axis=0) for m, k in p.terms.items()) + 0.0 * half
-            for p in self.held.u
-        ]
+        u = [valued(p, x) for p in self.held.u]
         size = np.linalg.norm(u, axis=0) if "limit.norm" in limits else np.abs(u).max(axis=0)
         return bool(size[inside].max(initial=0.0) > most)
 

@@ -62,14 +62,18 @@ class RecordedLoop:
         """The loop that the claims are about."""
         return self.known.loop
 
+    @property
+    def plant(self) -> Any:
+        """The craft with a full inertia."""
+        return self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
+
     @cached_property
     def roles(self) -> dict[str, str]:
         """The digests of the programs that every claim is about."""
         loop, driven = self.loop, driven_errors(self.loop)
-        plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
         found = {
             "law": self.keep(program.law_program(loop.law, loop.gains, loop.known, loop.period)),
-            "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=plant),
+            "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=self.plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
         if driven is not None:
@@ -90,16 +94,15 @@ class RecordedLoop:
     def lyapunov(self, stiffness: float | None = None) -> str:
         """Record V: the law's own, or the kinetic energy and 2 stiffness (1 - q0)."""
         loop = self.loop
-        plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
         if stiffness is None:
-            own = self.add(loop.law.lyapunov, measurement=ASKED, gains=loop.gains, craft=plant)  # pyright: ignore
+            own = self.add(loop.law.lyapunov, measurement=ASKED, gains=loop.gains, craft=self.plant)  # pyright: ignore
             self.written_by[own] = WRITTEN
             return own
 
         def energy(measurement: Measurement, craft: Any) -> Any:
             return rigid_body.kinetic_energy(measurement.rate, craft) + 2.0 * stiffness * (1.0 - measurement.attitude[0])
 
-        found = self.add(energy, measurement=ASKED, craft=plant)
+        found = self.add(energy, measurement=ASKED, craft=self.plant)
         self.written_by[found] = WRITTEN | {"stiffness": stiffness}
         return found
 
@@ -114,7 +117,7 @@ class RecordedLoop:
                 + epsilon * lean
             )
 
-        found = self.add(energy, measurement=ASKED, craft=self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL))
+        found = self.add(energy, measurement=ASKED, craft=self.plant)
         self.written_by[found] = WRITTEN | {"stiffness": s, "epsilon": epsilon}
         return found
 
@@ -129,8 +132,7 @@ class RecordedLoop:
             lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
             return loop.law.lyapunov(measurement, gains, craft) + epsilon * lean  # pyright: ignore
 
-        plant = loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
-        found = self.add(energy, measurement=ASKED, gains=loop.gains, craft=plant)
+        found = self.add(energy, measurement=ASKED, gains=loop.gains, craft=self.plant)
         self.written_by[found] = WRITTEN | {"epsilon": epsilon}
         return found
 

@@ -1,6 +1,6 @@
 """Finds, in floats, states at which a condition of a claim about an attitude loop fails, for the kernel to refute."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import product
 from math import isfinite, isinf, pi, tan
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from starhold.certification.evidence.attitude import CONVERGES, SAMPLED, SLIDING, Loop
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.recorded import ASKED
+from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import number
 from starhold.certification.subject import perigee
 from starhold.kernel.loops import AttitudeLoop, around
@@ -140,14 +141,6 @@ def named(t: Floats, w: Floats) -> dict[str, Floats]:
     square = (t * t).sum(axis=0)
     q = np.vstack([1.0 - square, 2.0 * t]) / (1.0 + square)
     return dict(zip(("q0", "q1", "q2", "q3", "w1", "w2", "w3"), (*q, *w), strict=True))
-
-
-def valued(p: Poly, values: Mapping[str, Floats]) -> Floats:
-    """Return a polynomial in floats, of many states at once."""
-    found = np.zeros_like(values["q0"])
-    for m, c in p.terms.items():
-        found += float(c) * np.prod([values[name] for name in m], axis=0)
-    return found
 
 
 # --- limits -----------------------------------------------------------------------------------------------------------

@@ -13,8 +13,10 @@ from itertools import combinations_with_replacement
 from typing import Any, TypeVar
 
 import numpy as np
-from flint import fmpq, fmpq_mat
+from flint import fmpq_mat
 
+from starhold.algebra.polynomial import exact
+from starhold.certification.matrices import fraction
 from starhold.kernel.numbers import RefusedError, times, transpose
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
@@ -213,23 +215,37 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
     return once((numbers, matrix.shape, equal, signed, *sides), solve)
 
 
+def optimum(
+    A: Any, b: Any, signed: Sequence[bool], blocks: Sequence[Sequence[tuple[int, int]]], twice: float, margin: bool = True
+) -> Any | None:
+    """Return x with Ax = b and the largest last number; None without one. The first numbers are not negative, and before the
+    last stand the upper triangles of matrices that are nowhere negative, `twice` what is beside the diagonal. margin: the
+    last is no more than 1, the signed ones that say so, and the eigenvalues of the matrices."""
+    count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
+    right = [b, np.zeros(len(signed))]
+    if margin:
+        entries += [(k, count, 1.0) for k, own in enumerate([*signed, True]) if own]
+        right.append(np.ones(1))
+    height, at = len(signed) + margin, count - sum(map(len, blocks))
+    for pairs in blocks:
+        for i, k in pairs:
+            entries.append((height, at, -1.0 if i == k else -np.sqrt(2.0) / twice))
+            entries += [(height, count, 1.0)] if margin and i == k else []
+            height, at = height + 1, at + 1
+        right.append(np.zeros(len(pairs)))
+    rows, columns, values = zip(*entries, strict=True)
+    whole = sparse.vstack([A, sparse.csc_matrix((values, (rows, columns)), (height, count + 1))])
+    sides = [max((k for _, k in pairs), default=-1) + 1 for pairs in blocks]
+    cost = np.r_[np.zeros(count), -1.0]
+    return interior_point(cost, whole, np.concatenate(right), A.shape[0], len(signed) + margin, sides)
+
+
 def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
     """Return the factors in floats that make the Gram matrix most definite; None where it is not."""
     A, b, largest = equations(problem, scales)
     unit = float(np.abs(b).max()) or 1.0
-    count, size, head = A.shape[1], len(problem.z), A.shape[1] - len(problem.pairs)
-    # The Gram matrix in scaled units: an entry's column has its largest coefficient for a scale.
-    half = np.array([1.0 if i == k else np.sqrt(2.0) / 2.0 for i, k in problem.pairs])
-    least = sparse.csc_matrix([[float(i == k)] for i, k in problem.pairs])
-    cone = sparse.hstack([sparse.csc_matrix((len(half), head)), -sparse.diags(half), least])
-    positive = sparse.csc_matrix([[float(k < problem.strict)] for k in range(problem.signed)] or (0, 1))
-    signs = sparse.hstack(
-        [-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed)), positive]
-    )
-    top = sparse.csc_matrix(([1.0], ([0], [count])), (1, count + 1))
-    whole = sparse.vstack([sparse.hstack([A, sparse.csc_matrix((A.shape[0], 1))]), signs, top, cone])
-    right = np.r_[b / unit, np.zeros(problem.signed), 1.0, np.zeros(len(half))]
-    x = interior_point(np.r_[np.zeros(count), -1.0], whole, right, A.shape[0], problem.signed + 1, [size])
+    whole = sparse.hstack([A, sparse.csc_matrix((A.shape[0], 1))])
+    x = optimum(whole, b / unit, [k < problem.strict for k in range(problem.signed)], [problem.pairs], 2.0)
     if x is None or x[-1] < DEFINITE:
         return None
     x = x[:-1]
@@ -241,19 +257,7 @@ def largest_number(problem: Problem, scales: Mapping[str, float], wanted: Poly) 
     """Return the largest x for which p - x wanted is a sum as the problem says; None where there is none."""
     A, b, largest = equations(problem, scales, [wanted])
     unit = float(np.abs(b).max()) or 1.0
-    count, head = A.shape[1], A.shape[1] - 1 - len(problem.pairs)
-    half = np.array([1.0 if i == k else np.sqrt(2.0) / 2.0 for i, k in problem.pairs])
-    cone = sparse.hstack([sparse.csc_matrix((len(half), head)), -sparse.diags(half), sparse.csc_matrix((len(half), 1))])
-    signs = sparse.hstack([-sparse.eye(problem.signed), sparse.csc_matrix((problem.signed, count - problem.signed))])
-    right = np.r_[b / unit, np.zeros(problem.signed + len(half))]
-    x = interior_point(
-        np.r_[np.zeros(count - 1), -1.0],
-        sparse.vstack([A, signs, cone]),
-        right,
-        A.shape[0],
-        problem.signed,
-        [len(problem.z)],
-    )
+    x = optimum(A, b / unit, [False] * problem.signed, [problem.pairs], 2.0, margin=False)
     return None if x is None else float(x[-1] * unit / largest[-1])
 
 
@@ -272,19 +276,35 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
     found = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
     if found is not None:
         return found
-    rest = problem.p - dot(x, problem.columns)
-    rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *problem.columns) for m in q.terms}))}
-    A, b = fmpq_mat(len(rows), len(x)), fmpq_mat(len(rows), 1)
-    for k, q in enumerate(problem.columns):
-        for m, c in q.terms.items():
-            A[rows[m], k] = fmpq(c.numerator, c.denominator)
-    for m, c in rest.terms.items():
-        b[rows[m], 0] = fmpq(c.numerator, c.denominator)
-    echelon, rank = A.transpose().rref()
-    kept = [next(c for c in range(len(rows)) if echelon[r, c] != 0) for r in range(rank)]
-    own = fmpq_mat(rank, len(x), [A[r, k] for r in kept for k in range(len(x))])
-    step = own.transpose() * (own * own.transpose()).solve(fmpq_mat(rank, 1, [b[r, 0] for r in kept]))
-    return [v + Fraction(int(step[k, 0].p), int(step[k, 0].q)) for k, v in enumerate(x)]
+    rest, count = problem.p - dot(x, problem.columns), len(x)
+    A = matrix_of([*problem.columns, rest])
+    echelon, rank = fmpq_mat(count, A.nrows(), [A[r, k] for k in range(count) for r in range(A.nrows())]).rref()
+    kept = [next(c for c in range(A.nrows()) if echelon[r, c] != 0) for r in range(rank)]
+    own = fmpq_mat(rank, count, [A[r, k] for r in kept for k in range(count)])
+    step = own.transpose() * (own * own.transpose()).solve(fmpq_mat(rank, 1, [A[r, count] for r in kept]))
+    return [v + fraction(step[k, 0]) for k, v in enumerate(x)]
+
+
+def coefficients(polys: Sequence[Poly]) -> tuple[tuple[int, int], list[tuple[int, int, Fraction]]]:
+    """Return size and entries of the matrix of coefficients, a row for each monomial, a column for each polynomial."""
+    rows = {m: k for k, m in enumerate(sorted({m for q in polys for m in q.terms}))}
+    return (len(rows), len(polys)), [(rows[m], k, c) for k, q in enumerate(polys) for m, c in q.terms.items()]
+
+
+def matrix_of(polys: Sequence[Poly]) -> Any:
+    """Return the exact matrix of coefficients."""
+    (height, width), entries = coefficients(polys)
+    found = fmpq_mat(max(height, 1), max(width, 1))
+    for r, k, c in entries:
+        found[r, k] = exact(c)
+    return found
+
+
+def sparse_of(polys: Sequence[Poly]) -> Any:
+    """Return the matrix of coefficients in floats."""
+    size, entries = coefficients(polys)
+    values, places = [float(c) for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])
+    return sparse.csc_matrix((values, places), size)
 
 
 def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:

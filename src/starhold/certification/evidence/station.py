@@ -26,7 +26,7 @@ ROLES = {
     MORE: ("field", "law", "errors", "lyapunov"),
     HELD: ("field", "law", "errors", "lyapunov"),
     REST: ("field", "law", "rest"),
-    ASTRAY: ("field", "law"),
+    ASTRAY: ("field", "law", "errors"),
     LIMITED: ("field", "law", "rest", "limited"),
 }
 ALMOST = Fraction(1) - Fraction(1, 2**20)
@@ -70,7 +70,7 @@ class Station:
         return {
             "theorem": theorem,
             "taken": [],
-            "programs": {role: digest(self.programs[role]) for role in ROLES[theorem]},
+            "programs": {role: digest(self.programs[role]) for role in ROLES[theorem] if role in self.programs},
             "subject": point_subject(self.loop.gains, self.loop.craft, self.loop.known),
             "numbers": {name.replace("_", "."): str(Fraction(x)) for name, x in numbers.items()},
             "evidence": {},

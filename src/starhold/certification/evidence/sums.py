@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from starhold.certification.evidence.squares import degree, interior_point, text
+from starhold.certification.evidence.squares import degree, optimum, sparse_of, text
 from starhold.certification.evidence.terms import (
     identity,
     independent,
@@ -146,59 +146,19 @@ class Guess:
     def floats(self) -> Any | None:
         """Return the numbers in floats that make the matrices most definite; None where they are not."""
         single, grams = self.columns
-        every, signed = [*single, *grams], len(self.strict)
+        every = [*single, *grams]
         if len(grams) > MOST:
             return None
-        rows = {m: k for k, m in enumerate(sorted({m for q in (self.p, *every) for m in q.terms}))}
-        entries = [(rows[m], k, float(c)) for k, q in enumerate(every) for m, c in q.terms.items()]
-        equal = sparse.csc_matrix(
-            ([c for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])),
-            (len(rows), len(every) + 1),
-        )
-        b = np.zeros(len(rows))
-        for m, c in self.p.terms.items():
-            b[rows[m]] = float(c)
+        whole = sparse_of([*every, Poly({}), self.p])
+        equal, b = whole[:, :-1], whole[:, -1].toarray().ravel()
         if self.basis is not None:
             # Equations that follow from others would stop the interior point.
             _, triangle, order = pivoted(equal.toarray().T, mode="economic", pivoting=True)
             sizes = np.abs(np.diag(triangle))
             kept = np.sort(order[: int((sizes > 1e-10 * sizes[0]).sum())])
             equal, b = equal[kept], b[kept]
-        parts, right, at = [equal], [b], len(single)
-        top = len(every)
-        signs = sparse.csc_matrix(
-            (
-                [*([-1.0] * signed), *([1.0] * signed), 1.0],
-                ([*range(signed)] * 2 + [signed], [*range(signed), *([top] * signed), top]),
-            ),
-            (signed + 1, top + 1),
-        )
-        parts.append(signs)
-        right.append(np.r_[np.zeros(signed), 1.0])
-        for block in self.blocks:
-            count = len(block.pairs)
-            half = [1.0 if i == k else np.sqrt(2.0) for i, k in block.pairs]
-            spots = range(count)
-            cone = sparse.csc_matrix(
-                (
-                    [-h for h in half] + [float(i == k) for i, k in block.pairs],
-                    ([*spots, *spots], [*range(at, at + count), *([top] * count)]),
-                ),
-                (count, top + 1),
-            )
-            parts.append(cone)
-            right.append(np.zeros(count))
-            at += count
-        cost = np.r_[np.zeros(top), -1.0]
         try:
-            x = interior_point(
-                cost,
-                sparse.vstack(parts),
-                np.concatenate(right),
-                len(b),
-                signed + 1,
-                [len(block.z) for block in self.blocks],
-            )
+            x = optimum(equal, b, [True] * len(self.strict), [block.pairs for block in self.blocks], 1.0)
         except BaseException as fault:  # a panic of the solver is one
             if isinstance(fault, (KeyboardInterrupt, SystemExit)):
                 raise

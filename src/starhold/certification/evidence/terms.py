@@ -1,16 +1,19 @@
 """Helpers about polynomials for those who look for sums of squares."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from importlib import import_module
 from itertools import combinations, combinations_with_replacement
 from typing import Any
 
 import numpy as np
-from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx
+from flint import Ordering, fmpq_mpoly_ctx
+from numpy.typing import NDArray
 
-from starhold.certification.evidence.squares import degree, text
+from starhold.algebra.polynomial import exact
+from starhold.certification.evidence.squares import degree, matrix_of, sparse_of, text
+from starhold.certification.matrices import fraction
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Sum
@@ -41,12 +44,7 @@ def unit(x: float) -> Fraction:
 
 def independent(given: list[Poly]) -> list[Poly]:
     """Return polynomials without those that others before them make."""
-    rows = {m: k for k, m in enumerate({m for q in given for m in q.terms})}
-    A = fmpq_mat(max(len(rows), 1), max(len(given), 1))
-    for k, q in enumerate(given):
-        for m, c in q.terms.items():
-            A[rows[m], k] = fmpq(c.numerator, c.denominator)
-    echelon, rank = A.rref()
+    echelon, rank = matrix_of(given).rref()
     return [given[next(k for k in range(len(given)) if echelon[r, k] != 0)] for r in range(rank)]
 
 
@@ -54,6 +52,14 @@ def multiples(basis: Sequence[Poly], p: Poly) -> list[Poly]:
     """Return the multiples of some polynomials that are of no higher degree than another."""
     names = sorted(p.names)
     return [times(q, m) for q in basis for m in monomials(names, degree(p) - degree(q))]
+
+
+def valued(p: Poly, at: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return a polynomial in floats, of many states at once."""
+    found = np.zeros(np.broadcast_shapes(*(x.shape for x in at.values())))
+    for m, c in p.terms.items():
+        found = found + float(c) * np.prod([at[name] for name in m], axis=0)
+    return found
 
 
 def largest(q: Poly) -> float:
@@ -99,16 +105,10 @@ def product_of(known: Sequence[Poly], places: Iterable[int]) -> Poly:
 
 def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list[tuple[int, ...]] | None:
     """Return the places of products that p is made of with positive factors, and of free polynomials, in floats."""
-    every = [*free, *made.values()]
-    rows = {m: k for k, m in enumerate({m for q in (p, *every) for m in q.terms})}
-    A, b = np.zeros((len(rows), len(every))), np.zeros(len(rows))
-    for k, q in enumerate(every):
-        for m, c in q.terms.items():
-            A[rows[m], k] = float(c)
-    for m, c in p.terms.items():
-        b[rows[m]] = float(c)
     if not p.terms:
         return []
+    whole = sparse_of([*free, *made.values(), p]).toarray()
+    A, b = whole[:, :-1], whole[:, -1]
     cost = np.r_[np.zeros(len(free)), np.ones(len(made))]
     linprog: Any = import_module("scipy.optimize").linprog
     found = linprog(cost, A_eq=A, b_eq=b, bounds=[(None, None)] * len(free) + [(0, None)] * len(made))
@@ -117,18 +117,13 @@ def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list
 
 def solved(p: Poly, every: list[Poly]) -> list[Fraction] | None:
     """Return numbers that make p of these polynomials, as few as elimination finds; None where there are none."""
-    rows = {m: k for k, m in enumerate(sorted({m for q in (p, *every) for m in q.terms}))}
-    A = fmpq_mat(max(len(rows), 1), len(every) + 1)
-    for k, q in enumerate([*every, p]):
-        for m, c in q.terms.items():
-            A[rows[m], k] = fmpq(c.numerator, c.denominator)
-    echelon, rank = A.rref()
+    echelon, rank = matrix_of([*every, p]).rref()
     y = [Fraction(0)] * len(every)
     for r in range(rank):
         lead = next(k for k in range(len(every) + 1) if echelon[r, k] != 0)
         if lead == len(every):
             return None
-        y[lead] = Fraction(int(echelon[r, len(every)].p), int(echelon[r, len(every)].q))
+        y[lead] = fraction(echelon[r, len(every)])
     return y
 
 
@@ -139,11 +134,11 @@ def quotient(p: Poly, q: Poly) -> Poly | None:
 
     def within(a: Poly) -> Any:
         items = a.terms.items()
-        return ring.from_dict({tuple(m.count(x) for x in names): fmpq(c.numerator, c.denominator) for m, c in items})
+        return ring.from_dict({tuple(m.count(x) for x in names): exact(c) for m, c in items})
 
     found, rest = divmod(within(p), within(q))
     if rest != 0:
         return None
     items = found.to_dict().items()
     powers = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in items}
-    return Poly({m: Fraction(int(c.p), int(c.q)) for m, c in powers.items()})
+    return Poly({m: fraction(c) for m, c in powers.items()})

@@ -10,12 +10,13 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
+from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.squares import text
 from starhold.certification.evidence.sums import Guess, find, monomials
-from starhold.kernel.numbers import Account, RefusedError, rational
+from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.polynomials import Poly
-from starhold.kernel.programs import Program, digest
-from starhold.kernel.reading import Claim, Numbers, Told
+from starhold.kernel.programs import digest
+from starhold.kernel.reading import Claim
 from starhold.kernel.rules import Sum
 from starhold.kernel.theorems import THEOREMS
 from starhold.kernel.theorems.invariant import Function, System
@@ -56,12 +57,7 @@ class Attempt:
 
     def read(self) -> Claim:
         """Return the claim as the kernel has it, without a limit on work."""
-        Account.left = 10**12
-        subject, numbers = ({x: rational(v) for x, v in own.items()} for own in (self.subject, self.numbers))
-        programs = {role: Program.read(program) for role, program in self.programs.items()}
-        words = dict.fromkeys(self.taken, True)
-        told = Told("programs", programs), Told("subject", subject), Numbers("numbers", numbers)
-        return Claim(self.theorem, Told("words", words), *told, Told("evidence", deepcopy(self.hints)))
+        return read(deepcopy(self.claim()), {digest(program): program for program in self.programs.values()})
 
     @cached_property
     def system(self) -> System:

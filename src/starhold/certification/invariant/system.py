@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from starhold.algebra.polynomial import Case, Polynomial, jointly, pieces
+from starhold.certification.matrices import fraction
 
 MOST_CELLS, MOST_TERMS = 64, 50_000
 """Cells, and terms that V' may have: beyond these a proof would not end."""
@@ -102,7 +102,7 @@ class Line:
         """Return the place of a polynomial's value."""
         total: int | None = None
         for monomial, c in sorted(p.terms.items()):
-            text = str(Fraction(int(c.p), int(c.q)))
+            text = str(fraction(c))
             term = None if text == "1" and monomial else self.step("constant", text)
             for name in monomial:
                 place = self.names.index(name)

@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import reduce
 from typing import Any
 
-from starhold.algebra.polynomial import exact, pieces
+from starhold.algebra.polynomial import pieces
 from starhold.algebra.scalar import maximum, minimum
 from starhold.certification.certificate import Claim, Obligation
 from starhold.certification.evidence.finding import certificate
@@ -26,6 +26,7 @@ from starhold.certification.invariant import search
 from starhold.certification.invariant.prover import Attempt, proved, scales
 from starhold.certification.invariant.search import Candidate
 from starhold.certification.invariant.system import System, program, turned
+from starhold.certification.matrices import fraction
 from starhold.kernel.check import prove as kernel_proves
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import Poly as Exact
@@ -318,9 +319,3 @@ def claim_of(claim: dict[str, Any], programs: dict[str, dict[str, Any]]) -> Kern
     """Return a claim as the kernel reads it in a certificate."""
     Account.open()
     return read_certificate(json.dumps(certificate([*programs.values()], [claim])))[0]
-
-
-def fraction(x: Any) -> Fraction:
-    """Return an exact number, of flint too, as the kernel has it."""
-    number = exact(x)
-    return Fraction(int(number.p), int(number.q))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from functools import partial
 from typing import TypeAlias
 
 from ..reading import Claim
-from ..rules import Obligation
-from ..sentences import Statement
-from . import attitude, invariant, isotropic, pointing, refuted, sampling, sliding, station
+from ..rules import Proof
+from . import attitude, invariant, pointing, refuted, sampling, sliding, station
 
-Theorem: TypeAlias = Callable[[Claim], Generator[tuple[str, Obligation], None, Statement]]
+Theorem: TypeAlias = Callable[[Claim], Proof]
 
 THEOREMS: dict[str, Theorem] = {
     "converges": attitude.converges,
@@ -20,7 +19,7 @@ THEOREMS: dict[str, Theorem] = {
     "converges whatever the inertia": partial(attitude.converges, any_inertia=True),
     "converges from both quaternions": attitude.converges_evenly,
     "converges from both quaternions whatever the inertia": partial(attitude.converges_evenly, any_inertia=True),
-    "converges without a preferred axis": isotropic.converges_without_axes,
+    "converges without a preferred axis": attitude.converges_without_axes,
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
     "points": pointing.points,

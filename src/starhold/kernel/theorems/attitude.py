@@ -7,20 +7,17 @@ claim may have: `level`, of V, at which motions start; `fastest`, a rate that th
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
-from typing import TypeAlias
 
 from ..loops import HANDED, HYSTERESIS, NONE, SHORTEST, AttitudeLoop
 from ..numbers import cosine_below, demand
-from ..polynomials import Poly, apply, dot, horner, minus, poly
+from ..polynomials import Poly, apply, cross, dot, horner, minus, poly, total, var
 from ..reading import Claim
-from ..rules import Exceeds, Obligation, Shown, Solves, Squares, vanish
+from ..rules import Exceeds, Part, Proof, Shown, Squares, Sum, vanish
 from ..sentences import Statement, above, below, enumerated
 from .limits import within_limits
-
-Proof: TypeAlias = Generator[tuple[str, Obligation], None, Statement]
-Part: TypeAlias = Generator[tuple[str, Obligation], None, list[str]]
 
 
 def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, near: bool = False) -> Proof:
@@ -36,7 +33,7 @@ def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, n
     if not strictly:
         # At rest the law's torque is zero only where q is.
         resting = [p.at(loop.still) for p in loop.balance(loop.quiet.value)]
-        yield "only equilibrium", Solves(resting, loop.q[1:], [loop.sphere])
+        yield from vanish("only equilibrium", loop.q[1:], [*resting, loop.sphere], first=1)
     return (yield from concluded(loop, said, strictly))
 
 
@@ -78,7 +75,7 @@ def kinetic(loop: AttitudeLoop, more: Fraction | int = 0) -> list[Poly]:
     return [dot(v, apply(loop.J, v))] if loop.any_inertia else []
 
 
-def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part:
+def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part[list[str]]:
     """V' <= -c times the squares of the first of z, everywhere or, with a level, on {V <= level}, which is then not left; if
     `fastest` is told, there the rate is at most that. Where the law has cases, V' <= -c in all that hold around no rest."""
     numbers, V, w = loop.claim.numbers, loop.lyapunov, loop.w
@@ -159,7 +156,7 @@ def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:
     return Statement(text, (*loop.assumed, "continuous-torque", *limited.assumptions, *assumed), label)
 
 
-def contents(loop: AttitudeLoop, V: Poly) -> Part:
+def contents(loop: AttitudeLoop, V: Poly) -> Part[list[str]]:
     """{V <= level} holds every attitude at rest turned by up to `angle`; on target every rate up to `rate`; and every state
     turned by up to `start.angle` at up to `start.rate`."""
     numbers, q, w, one = loop.claim.numbers, loop.q, loop.w, poly(1)
@@ -187,3 +184,48 @@ def contents(loop: AttitudeLoop, V: Poly) -> Part:
         yield "states", Squares(inside, [one, *q, *w], 0, starts, [loop.sphere])
         said.append(f"every state turned by up to {below(angle)} rad at up to {below(rate)} rad/s")
     return said
+
+
+# --- without a preferred axis: V and V' depend on 1 - q0, |w| and the part of q along w alone ---------------------------
+
+
+def converges_without_axes(claim: Claim) -> Proof:
+    """Every motion from {V <= level} stays there and comes to rest on target: V is least on target, and on the set
+    V' <= -c (|w|^2 + |q|^2). Both are shown where w = (v, 0, 0) and q = (t, n, 0)."""
+    loop = AttitudeLoop(claim, quotients=True)
+    yield from loop.sound()
+    V, level = loop.lyapunov, claim.numbers["level"]
+    slope = without_quotients(loop, loop.slopes_along(V, loop.acceleration))
+    loop.autonomous([slope, *loop.divisors.values()])
+    for name, divisor in loop.divisors.items():
+        yield f"divisor {name}", Squares(divisor, [poly(1), *loop.q, *loop.w], 1, modulo=[loop.sphere])
+    for name, p in (("V", V), ("V'", slope)):
+        yield from vanish(f"{name} turned about axis", [turned(loop, p, axis) for axis in range(3)])
+    u, v, t = map(var, "uvt")
+    height, fall, q2 = reduced(V), -reduced(slope), u * (2 - u)
+    yield "V is least on target", Sum(height, [q2 - t * t], (), [v * v, u * u, q2])
+    yield "V falls", Sum(fall, [level - height, q2 - t * t], (), [v * v, q2])
+    statement = yield from concluded(loop, [f"every motion from {{V <= {below(level)}}} stays there and"], strictly=True)
+    return replace(statement, label="region")
+
+
+def without_quotients(loop: AttitudeLoop, p: Poly) -> Poly:
+    """Return p times its divisors, each as often as p has its inverse: a product that has the sign of p."""
+    for name, divisor in loop.divisors.items():
+        p = horner(p.powers(name)[::-1], divisor)
+    return p
+
+
+def turned(loop: AttitudeLoop, p: Poly, axis: int) -> Poly:
+    """Return the derivative of p where q and w are turned together about an axis."""
+    along = [poly(i == axis) for i in range(3)]
+    vectors = [("q", loop.q[1:]), ("w", loop.w)]
+    return total(p.slope(f"{x}{i}") * rate for x, own in vectors for i, rate in enumerate(cross(along, own), 1))
+
+
+def reduced(p: Poly) -> Poly:
+    """Return p at w = (v, 0, 0), q = (t, n, 0) and q0 = 1 - u, even in n, of which the square is u (2 - u) - t^2."""
+    u, v, t = map(var, "uvt")
+    parts = p.at({"q0": 1 - u, "q1": t, "q3": 0, "w1": v, "w2": 0, "w3": 0}).powers("q2")
+    demand(not any(part.terms for part in parts[1::2]), "a function of a direction has one side")
+    return horner(parts[::2], u * (2 - u) - t * t)

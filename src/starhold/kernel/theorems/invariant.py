@@ -12,11 +12,11 @@ from fractions import Fraction
 from itertools import combinations
 from typing import Any
 
-from ..cells import Shows, System, power
+from ..cells import System, power
 from ..numbers import RefusedError, demand, read_list
 from ..polynomials import Poly, minus, poly, read_poly, var
 from ..reading import Claim
-from ..rules import Shown
+from ..rules import Proof, Shown
 from ..sentences import Statement, below
 
 
@@ -135,7 +135,7 @@ def stated(text: str, system: System) -> Statement:
     return Statement(text + whatever, ("equations-as-given", *(["filippov"] if jumps else [])))
 
 
-def attracts(claim: Claim) -> Shows:
+def attracts(claim: Claim) -> Proof:
     """All motions from {V < level} stay there and come to M, which is stable (Lyapunov, LaSalle). With a `core`, a function
     with a level of its own that shows this of {core < core.level}, and with {V <= 0} inside of that, they come to its M."""
     core = "core" in claim.programs
@@ -152,7 +152,7 @@ def attracts(claim: Claim) -> Shows:
     return stated(f"all motions that start in {functions[0].where()} stay there and come to {functions[-1].limit()}", system)
 
 
-def stays(claim: Claim) -> Shows:
+def stays(claim: Claim) -> Proof:
     """M is stable: no motion leaves {V <= l}, for any l < level (Lyapunov)."""
     system = System(claim, "V")
     yield from system.sound()
@@ -162,7 +162,7 @@ def stays(claim: Claim) -> Shows:
     return stated(f"{V.limit()} is stable: no motion leaves {V.where()}, nor any smaller such set", system)
 
 
-def leaves(claim: Claim) -> Shows:
+def leaves(claim: Claim) -> Proof:
     """M is unstable: V is positive at states as near to it as one likes, and grows wherever it is positive, so that motions
     from these leave the box, in which it is bounded (Chetaev)."""
     system = System(claim, "V")
@@ -192,7 +192,7 @@ def leaves(claim: Claim) -> Shows:
     return stated(f"{V.limit()} is unstable: every motion that starts in the box where V > 0 leaves the box", system)
 
 
-def avoids(claim: Claim) -> Shows:
+def avoids(claim: Claim) -> Proof:
     """No motion from {start >= 0} comes to {unsafe >= 0} (a barrier V): V <= 0 on the one and V > 0 on the other, neither of
     them empty, and V' <= c V with a polynomial c, so that V <= 0 for ever (Gronwall)."""
     system = System(claim, "start", "unsafe", "V")
@@ -211,7 +211,7 @@ def avoids(claim: Claim) -> Shows:
     return stated(f"no motion that starts in {{start >= 0}} comes to {{unsafe >= 0}}{within}", system)
 
 
-def fails(claim: Claim) -> Shows:
+def fails(claim: Claim) -> Proof:
     """V is not as one of the theorems needs it, at a state. What of it is the word that the claim is taken with."""
     system = System(claim, "V")
     cell, state = system.state("state")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
@@ -10,7 +10,7 @@ from ..loops import AXES, NONE, AttitudeLoop
 from ..numbers import Rows, definite, demand, inverse, times, transpose
 from ..polynomials import Poly, apply, dot, poly, var, variables
 from ..programs import joined
-from ..rules import Obligation, Squares
+from ..rules import Proof, Squares
 from ..sentences import Statement, above, below, enumerated
 
 Row: TypeAlias = Sequence[Poly | Fraction | int]
@@ -18,7 +18,7 @@ Most: TypeAlias = list[Fraction | None]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
-def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Generator[tuple[str, Obligation], None, Statement]:
+def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
     """On {V <= level}, or everywhere, with everything from outside at most as told: each component of the torque is at most
     `limit` in size (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k, of
     those that are told. less: what the torque is below its limit, for what it is not told exactly."""

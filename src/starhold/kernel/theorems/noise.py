@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from fractions import Fraction
 from itertools import pairwise
 
 from ..held import Near
+from ..loops import slopes
 from ..numbers import Rows, beside, demand, matrix, plus, rational, read_list, scalar, times, transpose, up
-from ..polynomials import Poly, var
+from ..polynomials import var
 from ..programs import Exactly, known, single
 from ..reading import Claim
 from ..regions import RATE, STATE, TURN, Radii
-from ..rules import Definite, Exceeds, Obligation
+from ..rules import Definite, Exceeds, Part
 from ..sentences import Statement, below
 
 SHARE, BESIDE = "share", "noise.beside"
@@ -24,7 +24,7 @@ MOST, TERMS = 64, 80
 """How many samples there may be from one measurement to the next; terms of the exponential series."""
 
 
-def within_radii(claim: Claim, near: Near) -> Generator[tuple[str, Obligation], None, tuple[Statement, Radii]]:
+def within_radii(claim: Claim, near: Near) -> Part[tuple[Statement, Radii]]:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
     than noise.attitude and noise.rate, other standard normal vectors no longer than noise.beside, and the rate and the turn
     that the errors cause in the linear loop no larger than those returned, but with a probability of `share` at most."""
@@ -36,12 +36,8 @@ def within_radii(claim: Claim, near: Near) -> Generator[tuple[str, Obligation], 
     size = len(steps[0][0][0])
     demand(len(steps[-1][0][0]) == size, "the errors are not those of one estimate")
     shapes = [matrix(shape, size, size) for shape in read_list(claim.evidence["covariances"], int(every))]
-    parts = {
-        "attitude": slice(size, size + 3),
-        "rate": slice(size + 3, size + 6),
-        "motion's rate": RATE,
-        "motion's turn": TURN,
-    }
+    parts = {"attitude": slice(size, size + 3), "rate": slice(size + 3, size + 6)}
+    parts |= {"motion's rate": RATE, "motion's turn": TURN}
     widths = [rational(x) for x in read_list(claim.evidence["deviations"], len(parts))]
     wide, turned = (rational(x) for x in read_list(claim.evidence["swayed"], 2))
     radii = numbers["noise.attitude"], numbers["noise.rate"], wide, turned
@@ -60,8 +56,7 @@ def within_radii(claim: Claim, near: Near) -> Generator[tuple[str, Obligation], 
     yield "share", Exceeds(share, missed)
     text = (
         f", of these errors up to {below(numbers['noise.attitude'])} rad and {below(numbers['noise.rate'])} rad/s driven by"
-        f" noise{beside}: all this at {samples} samples on end with a probability of at least"
-        f" {below(1 - share)}"
+        f" noise{beside}: all this at {samples} samples on end with a probability of at least {below(1 - share)}"
     )
     return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate")), (wide, turned)
 
@@ -91,11 +86,6 @@ def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
     outputs = [single(cases) for cases in program.run(given, Exactly(), len(program.outputs))]
     demand(not any(() in p.terms for p in outputs), f"the {role} do not vanish without noise")
     return slopes(outputs, errors), slopes(outputs, noise)
-
-
-def slopes(parts: list[Poly], names: list[str]) -> Rows:
-    """Return the derivatives of linear functions."""
-    return [[p.slope(name).number for name in names] for p in parts]
 
 
 def covariance(X: Rows, A: Rows, B: Rows) -> Rows:

@@ -11,9 +11,9 @@ from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
 from ..regions import ANGLE, AT_REST, RATE, TURN, widened
-from ..rules import Definite, Exceeds
+from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
-from .attitude import Proof, contents
+from .attitude import contents
 from .limits import within_limits
 from .noise import SHARE, within_radii
 
@@ -33,8 +33,8 @@ def points(claim: Claim) -> Proof:
     start = yield from contents(loop, loop.lyapunov)
     region = held.region(c)
     limited = yield from within_limits(loop, held.misread(region)[0])
-    signs = {SHORTEST, HYSTERESIS} & claim.taken.content.keys()
-    if any(claim.taken.get(word) for word in (SHORTEST, HYSTERESIS)):
+    signs = [word for word in (SHORTEST, HYSTERESIS) if claim.taken.get(word)]
+    if signs:
         yield "the sign never changes", Exceeds(region.least, held.turned / 2)
     tube = held.tube(region)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(tube))
@@ -84,10 +84,9 @@ def points(claim: Claim) -> Proof:
         return f"of up to {below(numbers[name])} N m{more}"
 
     told = [f"errors of the command {most('error')}"]
-    told += [f"of the attitude that it is told of up to {below(held.turned)} rad"] if held.turned else []
-    told += [f"of the rate of up to {below(held.rated)} rad/s"] if held.rated else []
-    told += [f"of the target's rate of up to {below(held.led)} rad/s"] if held.led else []
-    told += [f"of the target's acceleration of up to {below(held.hurried)} rad/s2"] if held.hurried else []
+    kinds = [("attitude that it is told", held.turned, "rad"), ("rate", held.rated, "rad/s")]
+    kinds += [("target's rate", held.led, "rad/s"), ("target's acceleration", held.hurried, "rad/s2")]
+    told += [f"of the {name} of up to {below(x)} {unit}" for name, x, unit in kinds if x]
     text = (
         f"every motion from {{V <= {below(numbers['level'])}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
@@ -95,23 +94,11 @@ def points(claim: Claim) -> Proof:
         f" {most('outside')} and {enumerated(told)}"
     )
     text += "".join(f", {name} of up to {below(x)}" for name, x in held.told.items()) + noise.text
-    taken = (
-        *(["bounded-outside-torque"] if loop.outside else []),
-        "bounded-target" if loop.moving else "target-at-rest",
-        "bounded-momentum" if loop.wheels else "no-wheels",
-    )
-    assumptions = (
-        "rigid-body",
-        "inertia-as-given",
-        "bounded-push",
-        "held-torque",
-        *noise.assumptions,
-        *limited.assumptions,
-        *taken,
-    )
-    sign = "sign-at-once" if signs else "quaternion-as-fed"
+    assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
+    assumed += ["bounded-outside-torque"] * loop.outside + ["bounded-target" if loop.moving else "target-at-rest"]
+    assumed += ["bounded-momentum" if loop.wheels else "no-wheels", "sign-at-once" if signs else "quaternion-as-fed"]
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
-    return Statement(text + said, tuple(dict.fromkeys((*assumptions, sign))), "pointing", within=tuple(within))
+    return Statement(text + said, tuple(dict.fromkeys(assumed)), "pointing", within=tuple(within))
 
 
 def image(X: Rows, shares: Sequence[Fraction], A: Rows, pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:

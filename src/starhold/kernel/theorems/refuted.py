@@ -15,9 +15,8 @@ from ..loops import AXES, AttitudeLoop, around
 from ..numbers import cosine_above, demand
 from ..polynomials import Poly, apply, dot, poly, var
 from ..reading import Claim
-from ..rules import Exceeds, Persists
+from ..rules import Exceeds, Persists, Proof
 from ..sentences import Statement, above, below
-from .attitude import Proof
 from .limits import TORQUE
 from .sampling import linear_loop
 from .sliding import declared, taken_apart

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from fractions import Fraction
 
 from ..held import over_period
-from ..loops import AttitudeLoop, around, slopes
-from ..numbers import Rows, beside, demand, plus, times
-from ..polynomials import poly
+from ..loops import RATES, TURNS, AttitudeLoop, around, slopes
+from ..numbers import Rows, beside, demand, inverse, plus, times
 from ..reading import Claim
-from ..rules import Contracts, Definite, Exceeds, Obligation, vanish
+from ..rules import Contracts, Definite, Exceeds, Part, Proof, vanish
 from ..sentences import Statement, above, below
 
 
-def linear_loop(
-    claim: Claim,
-) -> Generator[tuple[str, Obligation], None, tuple[AttitudeLoop, tuple[Rows, Rows], Callable[[Fraction], Rows]]]:
+def linear_loop(claim: Claim) -> Part[tuple[AttitudeLoop, tuple[Rows, Rows], Callable[[Fraction], Rows]]]:
     """Return the loop near rest on target, with u = -Cw - Kq: it, C and K, and the matrix of a step of a period."""
     loop = AttitudeLoop(claim, quotients=True)
     demand(not claim.taken.content, "the loop is taken with nothing")
@@ -25,16 +22,16 @@ def linear_loop(
     u = [loop.expanded(around(cases, rest).value, rest) for cases in loop.law]
     loop.autonomous(u)
     yield from vanish("rest on target", [p.at(rest) for p in u])
-    C, K = (slopes([-p for p in u], letter, rest) for letter in "wq")
-    held = times([[poly(x).number for x in row] for row in loop.J_inverse], beside(C, K))
+    C, K = (slopes([-p for p in u], names, rest) for names in (RATES, TURNS))
+    held = times(inverse(loop.given), beside(C, K))
     return loop, (C, K), lambda h: over_period(held, h)
 
 
-def sampled(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
+def sampled(claim: Claim) -> Proof:
     """Near rest on target the loop with the torque held for the period is stable, with all eigenvalues no larger than the
     radius; with `longest` it is stable for every period up to that, with `other` for that period too."""
     loop, (C, K), step = yield from linear_loop(claim)
-    numbers, J = claim.numbers, [[poly(x).number for x in row] for row in loop.J]
+    numbers, J = claim.numbers, loop.given
     h, radius, longest, other = numbers["period"], numbers["radius"], numbers.get("longest"), numbers.get("other")
     yield "step", Contracts(step(h), radius)
     yield "radius", Exceeds(Fraction(1), radius)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from fractions import Fraction
 from typing import NamedTuple
 
-from ..loops import AXES, HYSTERESIS, NONE, SHORTEST, AttitudeLoop, slopes
+from ..loops import AXES, HYSTERESIS, NONE, SHORTEST, TURNS, AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times, transpose
-from ..polynomials import Poly, apply, dot, minus, multiple, poly
+from ..polynomials import Poly, apply, dot, minus, multiple
 from ..programs import Case
 from ..reading import Claim
-from ..rules import Definite, Exceeds, Obligation, Squares, vanish
+from ..rules import Definite, Exceeds, Part, Proof, Squares, vanish
 from ..sentences import Statement, above, below
 from .attitude import contents
 
@@ -23,11 +22,11 @@ class Axis(NamedTuple):
     slope: Fraction | None
 
 
-def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Statement]:
+def reaches_surface(claim: Claim) -> Proof:
     """The motion reaches s = w + Kq = 0 in a finite time, against any torque from outside that is at most as told, and
     slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target."""
     loop, numbers = AttitudeLoop(claim), claim.numbers
-    own, J = loop.q[1:], [[poly(x).number for x in row] for row in loop.J]
+    own, J = loop.q[1:], loop.given
     s, K, moved = yield from declared(loop)
     yield "q0 grows on the surface", Squares(dot(own, apply(K, own)), own, 3)
     outside = [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
@@ -56,11 +55,11 @@ def reaches_surface(claim: Claim) -> Generator[tuple[str, Obligation], None, Sta
     return Statement(f"from {begun} the motion {said} the law's surface and {ending}", tuple(assumed), "sliding")
 
 
-def declared(loop: AttitudeLoop) -> Generator[tuple[str, Obligation], None, tuple[list[Poly], Rows, list[Poly]]]:
+def declared(loop: AttitudeLoop) -> Part[tuple[list[Poly], Rows, list[Poly]]]:
     """Show that the law's surface is s = w + Kq, and return s, K, and J s' less the torques of the law and from outside."""
     yield from loop.sound()
     s = loop.single("surface", 3)
-    K = slopes(s, "q", {})
+    K = slopes(s, TURNS)
     yield from vanish("surface", minus(minus(s, loop.w), apply(K, loop.q[1:])))
     # J s' = J w' + J K q'.
     without = minus(loop.balance(NONE), loop.e)
@@ -96,9 +95,7 @@ def on_surface(case: Case, s: Poly) -> bool:
     return all(any(sign * factor > 0 and offset == 0 for factor, offset in found) for sign in (1, -1))
 
 
-def losses(
-    loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]
-) -> Generator[tuple[str, Obligation], None, Fraction]:
+def losses(loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]) -> Part[Fraction]:
     """Show that s.Js/2 falls outside of the box |s_i| <= far_i, and return what s.Js is at most in it."""
     numbers, squares = loop.claim.numbers, Fraction(0)
     gain = sum((m * m / (4 * slope) for (_, slope), m in zip(axes, outside, strict=True) if slope is not None), Fraction(0))
@@ -111,9 +108,7 @@ def losses(
     return numbers["inertia.high"] * squares
 
 
-def ending_in_the_layer(
-    loop: AttitudeLoop, most: Fraction, J: Rows, K: Rows
-) -> Generator[tuple[str, Obligation], None, str]:
+def ending_in_the_layer(loop: AttitudeLoop, most: Fraction, J: Rows, K: Rows) -> Part[str]:
     """Show where motions end in a boundary layer, in which s.Js is at most so much."""
     numbers = loop.claim.numbers
     k, steep, size, angle = (numbers[name] for name in ("surface.low", "surface.high", "surface", "end.angle"))

@@ -4,7 +4,7 @@ All are about the loop of `points`. Assumed of every one: two bodies on circles,
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -14,11 +14,9 @@ from ..points import STATE, PointLoop
 from ..polynomials import Poly, dot, horner, minus, multiple, poly, var, variables
 from ..programs import Case
 from ..reading import Claim
-from ..rules import Contracts, Exceeds, Obligation, Shown, Solves, Squares, Vanishes, vanish
+from ..rules import Contracts, Exceeds, Part, Proof, Shown, Squares, Vanishes, vanish
 from ..sentences import Statement, above, below, enumerated
 from .limits import loads, within
-
-Proof = Generator[tuple[str, Obligation], None, Statement]
 
 
 @dataclass(frozen=True)
@@ -71,10 +69,11 @@ def ends_on_circle(claim: Claim) -> Proof:
     limited = yield from within_limit(loop, circle, level)
     text = f"from {{V <= {below(level)}}}, which holds circles of radius {above(inner)} to {below(outer)} at the same rate "
     text += f"and, on the circle, velocities off by {below(velocity)}, the motion ends on the circle{limited}"
-    return Statement(text, (*loop.assumed, "in-the-plane" if limited else "unlimited-control"))
+    beside, label = ("in-the-plane", "control-limit") if limited else ("unlimited-control", "circle")
+    return Statement(text, (*loop.assumed, beside), label)
 
 
-def declared(loop: PointLoop) -> Generator[tuple[str, Obligation], None, Circle]:
+def declared(loop: PointLoop) -> Part[Circle]:
     """The law's errors are those of a circle that is run through, and V is a positive sum of their squares."""
     errors, (V,) = loop.single("errors", 3), loop.single("lyapunov", 1)
     square, rate = -errors[0].at({"x2": 0, "x3": 0}).number, errors[1].slope("x3").number
@@ -109,7 +108,7 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
             slope, z, known = circle.met(slope), [poly(1)], [circle.met(p) for p in side.known]
         yield f"V decreases {k}", Squares(slope, z, len(z), known)
     stays = [loop.slopes_along(p, loop.acceleration(near[0])).at(circle.running) for p in wrong]
-    yield "only the circle", Solves(stays, [circle.errors[0] * p for p in loop.x[1:]])
+    yield from vanish("only the circle", [circle.errors[0] * p for p in loop.x[1:]], stays, first=1)
     yield "x returns", Contracts([[Fraction(0), Fraction(1)], [a, b]], flow=True)
 
 
@@ -127,7 +126,7 @@ def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
         demand(b.names <= roots.keys() and min(b.terms.values()) > 0, "a divisor may be zero")
 
 
-def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Generator[tuple[str, Obligation], None, str]:
+def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Part[str]:
     """On {V <= level} with x = x' = 0, which is not left, the norm of the control is at most `limit.norm`, each axis of it
     `limit.axis`. The errors f are variables; where |(f2, f3)| = 1/s, s (f2, f3) is a unit vector."""
     norm, axis = loop.claim.numbers.get("limit.norm"), loop.claim.numbers.get("limit.axis")
@@ -164,7 +163,8 @@ def comes_to_rest(claim: Claim) -> Proof:
     yield from vanish("rest is one", [p.at(at) for p in motion], first=1)
     flow = [[Fraction(k == i + 3) for k in range(6)] for i in range(3)]
     yield "returns", Contracts([*flow, *([p.slope(name).number for name in STATE] for p in motion)], flow=True)
-    return Statement("from everywhere the motion comes to rest", (*loop.assumed, "unlimited-control", *loop.bodies))
+    text = "from everywhere the motion comes to rest"
+    return Statement(text, (*loop.assumed, "unlimited-control", *loop.bodies), "equilibrium")
 
 
 def only_side(loop: PointLoop) -> list[Poly]:
@@ -203,7 +203,7 @@ def returns_with_limited_control(claim: Claim) -> Proof:
     yield "nothing returns from beyond", Exceeds(boundary * p, limit)
     text = f"with the control along X within {below(limit)} x returns from |x + x'/s| up to {below(width)} and |x| up to "
     text += f"{below(reach)}; from |x + x'/s| = {above(boundary)} on nothing returns"
-    return Statement(text, (*loop.assumed, "held-aside"))
+    return Statement(text, (*loop.assumed, "held-aside"), "saturated-axis")
 
 
 def clipped(loop: PointLoop, limit: Fraction) -> Shown:
@@ -233,13 +233,14 @@ def needs_more_control(claim: Claim) -> Proof:
     yield "control", Exceeds(max(squares) if limits[0] is None else sum(squares, Fraction(0)), control * control)
     yield "more than the limit", Exceeds(control, next(x for x in limits if x is not None))
     text = f"the circle itself asks for a control of {below(control)}, more than the limit"
-    return Statement(text, (*loop.assumed, "in-the-plane"))
+    return Statement(text, (*loop.assumed, "in-the-plane"), "control-limit", True)
 
 
 def does_not_return(claim: Claim) -> Proof:
     """An axis moves on its own, as x'' = ax + bx' + c with a >= 0 or b >= 0: some motions along it, as near as one likes to
-    one that is wanted, stay away."""
+    one that is wanted, stay away. A law with the errors of a circle is for that."""
     loop = PointLoop(claim)
+    label = "equilibrium" if claim.programs.get("errors") is None else "circle"
     motions = [loop.acceleration(side) for side in loop.sides]
     for i, (x, v) in enumerate(zip(loop.x, loop.v, strict=True)):
         slopes = [motion[i].slope(name) for motion in motions for name in (f"x{i + 1}", f"v{i + 1}")]
@@ -248,7 +249,7 @@ def does_not_return(claim: Claim) -> Proof:
         own = slopes[0] * x + slopes[1] * v + motions[0][i].terms.get((), 0)
         yield from vanish("an axis on its own", [motion[i] - own for motion in motions])
         text = f"along {'XYZ'[i]} some motions do not return"
-        return Statement(text, (*loop.assumed, "unlimited-control", *loop.bodies))
+        return Statement(text, (*loop.assumed, "unlimited-control", *loop.bodies), label, True)
     raise RefusedError("every axis returns")
 
 
@@ -272,4 +273,5 @@ def holds_another_circle(claim: Claim) -> Proof:
         yield f"the drift {k}", Vanishes(drift - pull * f1 * x)
         demand(size >= of >= needs >= abs(pull * (radius * radius - circle.square)) * radius, "the relay does not hold it")
     yield "another circle", Exceeds(min((radius * radius - circle.square) ** 2, radius))
-    return Statement(f"the relay holds the circle of radius {below(radius)} too", (*loop.assumed, "unlimited-control"))
+    text = f"the relay holds the circle of radius {below(radius)} too"
+    return Statement(text, (*loop.assumed, "unlimited-control"), "circle", True)

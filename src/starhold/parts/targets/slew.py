@@ -76,7 +76,10 @@ def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an attitude that is none, and where the axis begins or ends in the cone about
     the Sun, or no path goes around that."""
     start, end = unit_quaternion(params.start), unit_quaternion(params.attitude)
-    seen, cone = sun.sun(params.begin, sun.prepared(params.epoch, params.ephemeris)).direction, cone_of(params.axis, params.keep_out)
+    seen, cone = (
+        sun.sun(params.begin, sun.prepared(params.epoch, params.ephemeris)).direction,
+        cone_of(params.axis, params.keep_out),
+    )
     turns, nearest = turns_of(start, end, cone, seen)
     if cone:
         for word, attitude in (("begins", start), ("ends", end)):
