@@ -200,14 +200,6 @@ def test_an_interrupt_keeps_what_is_there_and_does_not_wait_for_blocks_under_way
     assert fly(Store.open(store.folder).resume(manifest())) == reference(tmp_path)
 
 
-@pytest.mark.slow
-def test_a_cluster_out_of_reach_is_told(store):
-    with pytest.raises(InputError, match=r"^tcp://127.0.0.1:9: no Dask scheduler answers: "):
-        fly(store, Scheduler("tcp://127.0.0.1:9", patience=0.5))
-    with pytest.raises(InputError, match="no Dask scheduler answers"):
-        fly(store, Scheduler("carrier pigeon", patience=0.5))
-
-
 def test_other_versions_are_told(store, running, monkeypatch):
     monkeypatch.setattr(engines, "__version__", "9.9")
     with pytest.raises(InputError, match=r"tcp://.*: tcp://.*: found starhold \d.*; allowed: 9.9, as here"):

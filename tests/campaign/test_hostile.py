@@ -150,14 +150,12 @@ WRONG = [
     ({"over": {"simulation.seed": uniform(1, 4)}}, "a key that all runs share"),
     ({"over": {"initial.rate": NORMAL | {"sigma": math.nan}}}, "sigma: found nan"),
     ({"over": {"initial.rate": uniform(0, math.inf)}}, "high: found inf"),
-    ({"over": {"initial.rate[1]": {"distribution": "choice", "values": [0.01, 0.01]}}}, "two values that differ"),
     ({"over": {"wheel[2].torque_limit": uniform(1, 2)}}, "wheel"),
     ({"over": {"orbit.altitude": uniform("600 km", "700 km")}}, "no [orbit] table"),
     ({"requirement": [{"metric": "effort", "at_most": math.nan}]}, "at_most: found nan"),
     ({"runs": 10**10}, "campaign.runs"),
     ({"law": "../pd"}, "law"),
     ({"over": {"initial.rate": NORMAL, "law.pd.k_rate": NORMAL}, "scenario": small(), "law": "lyapunov"}, "changes nothing"),
-    ({"runs": 0}, "campaign.runs"),
     ({"over": {"settling.rate_tolerance": uniform(0.01, 0.02)}}, "settling.rate_tolerance"),
     ({"over": {"spacecraft.inertia": NORMAL | {"sigma": 1.0}}, "runs": 90}, "moments"),
     ({"requirement": [{"metric": "settling_time"}]}, "at_most or at_least"),
@@ -169,7 +167,6 @@ WRONG = [
     ({"requirement": [{"metric": "effort", "at_most": 3, "at_least": 2}]}, "either at_most or at_least"),
     ({"requirement": [{"metric": "lost"}, {"metric": "lost"}]}, "requirement[2].id"),
     ({"sampling": "halton"}, "campaign.sampling"),
-    ({"workers": 2}, "beside threads"),
     ({"threads": 0}, "at least 1"),
 ]
 

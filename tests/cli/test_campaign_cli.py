@@ -270,7 +270,8 @@ def test_a_scheduler_that_does_not_answer_is_complains(tmp_path, monkeypatch):
     complains(done, address, "no Dask scheduler answers")
     # Nothing is left that stands in the way of the next attempt, and nothing is lost that --force would write over.
     assert not (tmp_path / "out").exists()
-    complains(starhold("campaign", "small.toml", "--scheduler", "nonsense", "-o", "new", cwd=tmp_path), "nonsense")
+    done = starhold("campaign", "small.toml", "--scheduler", "nonsense", "-o", "new", cwd=tmp_path)
+    complains(done, "nonsense: no Dask scheduler answers")
 
 
 def test_a_folder_that_cannot_be_written_is_complains(tmp_path):

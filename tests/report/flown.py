@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from starhold.analysis.rigid_body import METRICS, measure
 from starhold.report.body import report_of
 from starhold.report.figures import paint
+from starhold.report.plots import colour
 from starhold.scenario.building import build
 from starhold.scenario.reading import Scenario, builtin_text, parse
 from starhold.simulation.lane import Recording, fly, label
@@ -70,6 +72,18 @@ def stations(name: str) -> tuple[Flight, ...]:
 def draw(flights: Any, folder: Path, scenario: Any) -> list[Path]:
     """Draw the pictures of some flights into a folder."""
     return paint(report_of(scenario.body).picture(flights, scenario), folder)
+
+
+def pixels(path: Path) -> np.ndarray:
+    """A picture as an array (rows, columns, 3)."""
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+def shows_laws(picture: np.ndarray, count: int) -> bool:
+    """Whether a picture has curves in the colours of the first laws."""
+    wanted = [np.array([int(colour(number)[i : i + 2], 16) for i in (1, 3, 5)]) for number in range(count)]
+    return all((np.abs(picture - one).max(axis=2) < 12).sum() > 20 for one in wanted)
 
 
 def lost(name: str = "wild") -> Flight:

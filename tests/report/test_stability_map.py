@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from starhold.report.figures import save
 from starhold.report.stability_map import LINE, draw_map, stability_map
 from starhold.synthesis.stability_degree import boundary, optimum
+from tests.report.flown import pixels
 from tests.tiers import leading
 
 GIVEN = [
@@ -18,12 +18,6 @@ GIVEN = [
     ((1.0, 1.5, 1.0), 0.0, 0.3, 2.0),
     ((1.0, 1.1, 0.2), 0.5, 1e5, 2.0),
 ]
-
-
-def pixels(path: Path) -> np.ndarray:
-    """The picture as an array (rows, columns, 3)."""
-    with Image.open(path) as image:
-        return np.asarray(image.convert("RGB")).astype(int)
 
 
 @pytest.mark.parametrize("given", leading([(given,) for given in GIVEN]))

@@ -17,7 +17,6 @@ from tests.trace.machines import Job, Subject, on_lanes, same
 from tests.trace.scripts import CELLS, Script, scripts, turns, values
 
 BLOCKS, WIDTH = 2, 8
-COUNTS = {"blocks": BLOCKS, "count": 3, "seed": 0}
 
 
 def in_halves(program: Program, memories: dict[str, Any], counts: dict[str, int]) -> Any:
