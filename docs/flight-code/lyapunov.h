@@ -14,7 +14,7 @@
 
    Program of the law: sha256 d5137098524b4413b6d496ad62634b43647fe728da0c5962b960f411facfefe2
 
-   Certificate: certificate.json, sha256 ee33b10e288ad1c3f9bb50b4c55009ecc49d49654a1c58de0c199c43faa69cec:
+   Certificate: certificate.json, sha256 49780386d63a3866dc0af66a5d7e423cfbb8677e4fad5b4dac64e49215b06a4e:
    proved
    Claims:
      proved: converges: with unlimited torque, from every attitude and rate the body comes to rest on

@@ -15,12 +15,12 @@
 
    Program of the law: sha256 99130acbe6b13c7bcd3c5cbc219c37d087ae6db2517dfd9e6fe729d84998d648
 
-   Certificate: certificate.json, sha256 cad79d88c6f9f37059d8b5abf61d803b8aaf043f8c20934953fd051a245b581c:
+   Certificate: certificate.json, sha256 e249fc424fe02a6b3c864b50ffa62a750a9537a6a88fe40a77fd7204efc7c6f4:
    proved
    Claims:
-     proved: region of attraction: from the level set of V that holds rest at every attitude told by the
-     shorter of its quaternions, and by the longer up to 288.2° of 360° and, on target, 109.5°/s about any
-     axis, the body comes to rest on target without leaving the set
+     proved: region of attraction: from the level set of V that holds rest at every attitude by the shorter
+     rotation, and by the longer one up to 288.2° of 360° and, on target, 109.5°/s about any axis, the body
+     comes to rest on target without leaving the set
      proved: torque held between samples: the linear loop is stable with the torque held for 0.005 s and
      for every period up to 2.334 s
    These claims assume: rigid body; exact measurement and ideal actuators; inertia exactly as given; no

@@ -319,8 +319,8 @@ static vector_t wheel_momentum(doubles4_t momentum, const wheels_t *wheels)
     return weighted(momentum, wheels->axes);
 }
 
-/* The rotors' momentum in body axes (N m s). */
-static vector_t wheels_momentum(const wheels_state_t *state, const wheels_t *params)
+/* This momentum as tachometers and the known axes tell it. */
+static vector_t measured_momentum(const wheels_state_t *state, const wheels_t *params)
 {
     return wheel_momentum(state->momentum, params);
 }
@@ -423,7 +423,7 @@ void wheel_step(wheel_state_t *state, const wheel_input_t *input, wheel_command_
         .velocity = input->velocity};
     const goal_t goal = orbital_goal(&body_state, state->followed);
     const scene_t scene = {.goal = goal, .torque = gravity_gradient_torque(&body_state, &parameters.craft),
-        .momentum = wheels_momentum(&input->wheels, &parameters.setup.effectors.wheels)};
+        .momentum = measured_momentum(&input->wheels, &parameters.setup.effectors.wheels)};
     const measurement_t measurement = observe(&body_state, &scene);
     const quaternion_t followed = goal.attitude;
     command->torque = wheel_torque(&measurement, &parameters.gains, &parameters.craft);
