@@ -162,7 +162,7 @@ def counts_text() -> str:
     others = sum(len(parts(role)) for role in PACKAGES if role != "law")
     known = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     return (
-        f"{len(catalogue())} [laws](docs/laws.md) of attitude and {len(catalogue(POINT))} of station keeping, "
+        f"{len(catalogue())} [laws](docs/laws.md) for attitude and {len(catalogue(POINT))} of station keeping, "
         f"{others} other [parts](docs/parts.md), {len(builtin_names())} scenarios,\n"
         f"{len(known)} [commands](docs/commands.md), and {len(PAPERS)} [publications](docs/publications.md) made again."
     )

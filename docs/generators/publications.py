@@ -11,7 +11,7 @@ from starhold.publications.verdicts import VERDICTS
 HEAD = """# The publications, made again
 
 starhold implements what five publications describe. Each of their figures, tables and statements that can be checked is made
-again by one command and laid beside what is printed:
+again by one command and compared with what is printed:
 
 ```
 starhold reproduce all -o published   # or one of A to E; needs the extra `campaign`
@@ -49,5 +49,5 @@ def page() -> str:
         if row.erratum is not None
     )
     cells = [[str(number), *texts] for number, *texts in errata]
-    lines += ["## Errata", "", table(["no.", "where", "printed", "what is found instead"], cells), TAIL]
+    lines += ["## Errata", "", table(["no.", "where", "printed", "corrected"], cells), TAIL]
     return "\n".join(lines)

@@ -226,7 +226,7 @@ def test_turning_leaves_claims_sooner_the_nearer_the_period_is_to_the_longest():
 
 
 def test_a_craft_too_fast_to_be_followed_leaves_even_a_claim_about_every_state():
-    _, _, flight, left = flown(BASE.replace("rate = [0.04", "rate = [100.04") + LAW)
+    _, _, flight, left = flown(BASE.replace("rate = [0.04", 'rate = ["100.04 rad/s"') + LAW)
     assert flight.lost == 0.0
     assert left["convergence"] == ((0.0, LOST), (0.0, TURNED.format(1.0)))
 
@@ -236,7 +236,7 @@ def test_a_body_that_turns_far_while_its_torque_is_held_leaves_even_a_claim_abou
     text = quiet(
         BASE, **{"[2.0, 3.0, 4.0]": "[1.1, 3.0, 4.0]", "control_period = 0.1": "control_period = 0.5\nsubsteps = 40"}
     )
-    text = text.replace("rate = [0, 0, 0]", "rate = [6, -5, 14]").replace('torque_limit = "0.01 N m"', "")
+    text = text.replace("rate = [0, 0, 0]", 'rate = [6, -5, "14 rad/s"]').replace('torque_limit = "0.01 N m"', "")
     flight = proved_flight(text + LAW.replace("0.09", "0.96").replace("0.009", "0.15"))
     assert {claim.kind: claim.outcome for claim in flight.certificates[0].claims} == dict.fromkeys(
         ("convergence", "inertia", "sampling"), "proved"

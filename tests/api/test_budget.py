@@ -192,7 +192,7 @@ def test_faults_never_come():
         ({"requirement": [{"method": "budget", "metric": "ake", "at_most": 1}]}, "did you mean ape?"),
         ({"requirement": [{"method": "budget", "metric": "ape", "at_least": 1}]}, "requirement[1].at_least"),
         ({"environment": None, "sensor": None}, "nothing that disturbs the loop"),
-        ({"initial.rate": [3e3, 0, 0]}, "the motion diverges at"),
+        ({"initial.rate": ["3000 rad/s", 0, 0]}, "the motion diverges at"),
     ],
 )
 def test_what_cannot_be_is_one_line(changes, line):

@@ -159,15 +159,15 @@ def test_scale_factors_that_no_reading_shows_are_named():
     spinning = TUMBLE.replace('["6 deg/s", "-5 deg/s", "6.2 deg/s"]', "[0.0, 0.0, 0.01]").replace("= true", "= false")
     fit = told_of(scenario(GYRO, text=spinning), "part.gyro.scale_error", "part.gyro.noise", commands="none")
     assert sorted(fit.posterior.sentences) == [
-        "These data do not tell part.gyro.noise: no reading depends on it.",
-        "These data hardly tell part.gyro.scale_error: it may change by its own size.",
+        "These data do not determine part.gyro.noise: no reading depends on it.",
+        "These data barely constrain part.gyro.scale_error: its standard deviation exceeds its size.",
     ]
     assert fit.posterior.barely(fit.free).tolist() == [True, False]
     assert not fit.learnt().table.campaign or not fit.learnt().table.campaign.over
     # The bias of its axis and the scale factor together: named with what they trade.
     fit = told_of(scenario(GYRO, FIELD, text=spinning), f"{BIAS}[3]", "part.gyro.scale_error", commands="none")
     (sentence,) = fit.posterior.sentences
-    assert f"hardly tell {BIAS}[3], part.gyro.scale_error apart" in sentence
+    assert f"barely constrain {BIAS}[3], part.gyro.scale_error apart" in sentence
 
 
 def test_readings_correlated_in_time_are_told(cubesat):
@@ -236,7 +236,8 @@ def test_from_the_command_line_to_a_campaign(tmp_path, cubesat):
 
 
 KEYS = {
-    "spacecraft.mass": "an unknown key",
+    "spacecraft.weight": "an unknown key",
+    "spacecraft.mass": "no finite value",
     "part.gyro.epoch": "an unknown key",
     "spacecraft.limit": "no real number",
     "initial.rate": "always fitted",

@@ -88,7 +88,7 @@ def test_a_gap_is_passed_and_the_filter_finds_back(tmp_path):
 def test_a_swapped_axis_is_found_when_it_begins(tmp_path):
     """Before it nothing differs by a bit."""
     result = replayed(swapped(), tmp_path)
-    assert result.sentence.startswith("They first part at 30 s: mekf_attitude differs by ")
+    assert result.sentence.startswith("They first deviate at 30 s: mekf_attitude differs by ")
     assert {one.parted_at for one in result.comparisons} == {SWAPPED_AT, None}
     rate = next(one for one in result.comparisons if one.name == "mekf_rate")
     assert rate.parted_at == SWAPPED_AT
@@ -152,7 +152,7 @@ def test_the_command_prints_the_parting_and_writes_numbers_and_a_figure(tmp_path
     (tmp_path / "short.toml").write_text(FILE)
     swapped().to_csv(tmp_path / "swapped.csv", index=False)
     done = starhold("replay", "short.toml", "swapped.csv", "-o", "out", cwd=tmp_path, code=3)
-    assert "They first part at 30 s: mekf_attitude" in " ".join(done.stdout.split())
+    assert "They first deviate at 30 s: mekf_attitude" in " ".join(done.stdout.split())
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"replay.csv", "replay.png"}
     heads = (tmp_path / "out" / "replay.csv").read_text().partition("\n")[0]
     assert heads.startswith("time (s),attitude_q0 (1)")

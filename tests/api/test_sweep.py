@@ -43,7 +43,7 @@ SWEPT = {
     ),
     "starts": (
         THREE,
-        {"initial.rate": [[0.04, 0.03, 0.02], [0.0, 0.0, 0.0], [5.0, 0, 0], [70.0, 0, 0], [0.1, 0, 0]]},
+        {"initial.rate": [[0.04, 0.03, 0.02], [0.0, 0.0, 0.0], [5.0, 0, 0], ["70 rad/s", 0, 0], [0.1, 0, 0]]},
         "lyapunov",
     ),
     "faults": (
@@ -107,7 +107,7 @@ def test_batched_flights_have_the_samples_of_single_ones_lost_ones_included():
     # Too fast to follow from the start, or soon, for a gain that the held torque cannot bear.
     rates = {0.0: 0.09, 0.04: 60.0, 70.0: 0.09, 0.02: 100.0, 0.01: 200.0}
     changed = [
-        THREE.with_({"initial.rate": [rate, 0.1, 0.0], "law.lyapunov.k_rate": k, "spacecraft.torque_limit": None})
+        THREE.with_({"initial.rate": [f"{rate} rad/s", 0.1, 0.0], "law.lyapunov.k_rate": k, "spacecraft.torque_limit": None})
         for rate, k in rates.items()
     ]
     loops = [build(one, one.laws[0]) for one in changed]

@@ -98,7 +98,7 @@ def test_a_law_leaves_and_flies_in_a_process(tmp_path):
     done = starhold(
         "run", "three-laws", "--law-process", "./flight", "--pictures", "page", "-o", "out", cwd=tmp_path, code=0
     )
-    assert "The commands came from ./flight: nothing is proved of it." in done.stdout
+    assert "The commands came from ./flight: nothing is proved about it." in done.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "commands from ./flight" in page
     assert f"What is flown again in this page is commanded by the file&#x27;s law {name}, not by ./flight." in page

@@ -46,7 +46,7 @@ def test_everything_that_decides_is_printed(printed: Any) -> None:
     assert "provided that flights are independent draws" in text.replace("\n", " ")
     assert f"digest {made.digest}" in text
     assert "6000 runs flown in 12.5 s, 480 runs/s" in text
-    for cell in ("120.3 mdeg ≤ true", "nothing is proved of it", "5.225 deg/s ≤ true ≤ 6.303 deg/s"):
+    for cell in ("120.3 mdeg ≤ true", "nothing is proved about it", "5.225 deg/s ≤ true ≤ 6.303 deg/s"):
         assert cell in text
 
 

@@ -115,7 +115,7 @@ def test_commands_are_there_to_be_copied(reader: Reader) -> None:
 
 
 def test_brackets_say_when_nothing_is_proved(reader: Reader) -> None:
-    assert reader.words.count("nothing is proved of it") == 2
+    assert reader.words.count("nothing is proved about it") == 2
     assert f"{figure(np.degrees(0.0912))} deg/s ≤ true ≤ {figure(np.degrees(0.11))} deg/s" in reader.words
     assert "no disturbance, exact sensors" in reader.words
 

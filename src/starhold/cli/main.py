@@ -149,7 +149,7 @@ def _fly(
                 flights = [stopwatch.timed(place, flight) for place, flight in enumerate(flights)]
             print_outcome(flights)
             if process is not None:
-                console.print(f"The commands came from {process}: nothing is proved of it.", soft_wrap=True, markup=False)
+                console.print(f"The commands came from {process}: nothing is proved about it.", soft_wrap=True, markup=False)
         finally:
             # The table does not wait for it, and no flight is lost if it fails.
             keep(flights[-1])

@@ -62,7 +62,7 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
         console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]")
     outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
     if outside:
-        console.print(f"  this scenario starts outside the regions of: {', '.join(outside)}")
+        console.print(f"  this scenario starts outside the regions of these claims: {', '.join(outside)}")
     if trial is not None:
         console.print(f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]")
     console.print()

@@ -45,18 +45,18 @@ class Rule(NamedTuple):
 
 RULES = {
     Kind.HELLO: Rule(
-        "asks who is there; may come at any time",
+        "asks for the plant's description; may be sent at any time",
         "answers, and readings follow",
         (0,),
         "of the plant: control period (s), how many numbers readings have, CRC-32 of their layout; then JSON",
     ),
-    Kind.READINGS: Rule("", "tells what is read at the instant of a step", (), "time (s), then the fields that hello lists"),
+    Kind.READINGS: Rule("", "gives the readings at a step's instant", (), "time (s), then the fields that hello lists"),
     Kind.COMMAND: Rule(
         "commands for the period that begins with the step", "", (COMMANDS,), "three, in the body's unit (N m)"
     ),
     Kind.RESET: Rule("begins the flight again; readings of step 0 follow", "", (0, 2), "none, or seed and run"),
     Kind.STOP: Rule("ends the flight", "ends the flight; the text says why", (0,), "none"),
-    Kind.REFUSED: Rule("", "does not heed a message; the text says why", (), "none"),
+    Kind.REFUSED: Rule("", "rejects a message; the text says why", (), "none"),
 }
 """Every kind of message."""
 

@@ -58,7 +58,7 @@ def index_page(made: Sequence[Reproduction]) -> str:
     body = [
         "<h1>Published and reproduced</h1>",
         '<p class="lead">Every figure, table and numerical statement of the publications that starhold implements, made '
-        "again and laid beside what is printed.</p>",
+        "again and compared with what is printed.</p>",
         _changes([judged for one in made for judged in one.changed]),
         table_html(Table(columns, rows), "told titled"),
         fold("Errata", _errata(errata)),
@@ -175,7 +175,7 @@ def _errata(errata: Sequence[tuple[Judged, Paper]]) -> str:
         ]
         for judged, paper in numbered
     ]
-    return table_html(Table([*map(Column, ("no.", "where", "printed", "what is found instead"))], rows))
+    return table_html(Table([*map(Column, ("no.", "where", "printed", "corrected"))], rows))
 
 
 def _files(made: Reproduction) -> str:

@@ -160,7 +160,7 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
     for number, law in enumerate(result.laws):
         for item in law.brackets:
             measure = words.measure(item.metric, item.unit)
-            text, why = worst_text(item, measure), "nothing is proved of it"
+            text, why = worst_text(item, measure), "nothing is proved about it"
             if item.proved is not None:
                 text, why = f"{text} {order(item)} {with_unit(item.proved, measure)}", item.assumption
             tries = f"{counted(item.evaluations, 'flight')} of the search" if item.evaluations else DASH

@@ -109,8 +109,8 @@ def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
     few = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")
     _, known, axes = np.linalg.svd(few[first:, first:])
     hardly = _reduced(axes[: len(axes) - len(untold)][known[: len(axes) - len(untold)] < WIDTH])
-    sentences = [_sentence(row, free, values / sizes, "do not tell") for row in untold]
-    sentences += [_sentence(row, free, values / sizes, "hardly tell") for row in hardly]
+    sentences = [_sentence(row, free, values / sizes, "do not determine") for row in untold]
+    sentences += [_sentence(row, free, values / sizes, "barely constrain") for row in hardly]
     return Posterior(covariance, untold * sizes, tuple(sentences), int(kept.sum()), singular)
 
 
@@ -128,7 +128,7 @@ def _sentence(row: Array, free: Free, values: Array, verb: str) -> str:
     """Name a combination on which readings do not depend, or not beyond their noise; row and values in sizes."""
     named = np.flatnonzero(np.abs(row) > SHARE * np.abs(row).max())
     names, shares, known = [free.names[k] for k in named], row[named], values[named]
-    why = "no reading depends on it" if verb == "do not tell" else "it may change by its own size"
+    why = "no reading depends on it" if verb == "do not determine" else "its standard deviation exceeds its size"
     if len(names) == 1:
         return f"These data {verb} {names[0]}: {why}."
     cosine = abs(shares @ known) / max(1e-300, float(np.linalg.norm(shares) * np.linalg.norm(known)))

@@ -92,12 +92,12 @@ class Replay:
             return "Nothing that the scenario computes was recorded: there is nothing to compare with."
         if first is None:
             bits = ", bit for bit" if all(one.same_bits for one in self.comparisons) else ""
-            return f"What is computed agrees with what was recorded{bits}: {_listed([c.name for c in self.comparisons])}."
+            return f"Computed and recorded values agree{bits}: {_listed([c.name for c in self.comparisons])}."
         place = first.beyond.argmax()
         also = [c.name for c in self.comparisons if c.parted_at == first.parted_at and c is not first]
         return (
-            f"They first part at {first.parted_at:g} s: {first.name} differs by {first.difference[place]:.3g} {first.unit}, "
-            f"{first.rule} {first.allowed[place]:.3g}{f'; so do {_listed(also)}' if also else ''}."
+            f"They first deviate at {first.parted_at:g} s: {first.name} differs by {first.difference[place]:.3g} "
+            f"{first.unit}, {first.rule} {first.allowed[place]:.3g}{f'; so do {_listed(also)}' if also else ''}."
         )
 
 

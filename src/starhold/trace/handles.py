@@ -3,6 +3,7 @@ noted."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from starhold.algebra import scalar as scalar
@@ -172,3 +173,24 @@ def kind_of(value: Any) -> str:
     if isinstance(value, (float, int)):
         return NUMBER
     refuse(f"a value of type {type(value).__name__}", "numbers, and tuples of them")
+
+
+SHORTENED = frozenset(("both", "either", "same_index", "index_plus", "index_minus", "index_product"))
+"""Operations that a known value may decide."""
+
+
+def shortened(name: str, values: tuple[Any, ...], refs: Sequence[Any]) -> Any:
+    """Return what an operation gives where a known value decides it; None where none does."""
+    if name in ("both", "either"):
+        known = next((value for value in values if isinstance(value, bool)), None)
+        if known is None:
+            return None
+        other = values[1] if values[0] is known else values[0]
+        return other if known is (name == "both") else known
+    if name == "same_index":
+        return True if refs[0] == refs[1] else None
+    if name == "index_product":
+        return None if 1 not in refs else values[0] if refs[1] == 1 else values[1]
+    if refs[1] == 0:
+        return values[0]
+    return values[1] if name == "index_plus" and refs[0] == 0 else None

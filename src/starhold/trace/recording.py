@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from starhold.algebra.operations import ABSENT, INDEX, NUMBER, OPERATIONS, STATIC, TRUTH, WORD, Operation, refuse_absent
 from starhold.algebra.structure import leaves, mapped
 from starhold.algebra.structured import RECORDER, Buffer
-from starhold.trace.handles import HANDLES, Handle, Index, Number, kind_of, refuse
+from starhold.trace.handles import HANDLES, SHORTENED, Handle, Index, Number, kind_of, refuse, shortened
 from starhold.trace.program import (
     Branch,
     Call,
@@ -46,27 +46,6 @@ MARK = "\u241e"
 """The delimiter on both sides of a number's index and format in a text that a check makes from recorded numbers."""
 
 _CONSTANTS = {NUMBER: (float, int), TRUTH: (bool,), WORD: (int,), INDEX: (int,), STATIC: (int,)}
-
-
-_SHORTENED = frozenset(("both", "either", "same_index", "index_plus", "index_minus", "index_product"))
-"""Operations that a known value may decide."""
-
-
-def _shortened(name: str, values: tuple[Any, ...], refs: list[Value]) -> Any:
-    """Return what an operation gives where a known value decides it; None where none does."""
-    if name in ("both", "either"):
-        known = next((value for value in values if isinstance(value, bool)), None)
-        if known is None:
-            return None
-        other = values[1] if values[0] is known else values[0]
-        return other if known is (name == "both") else known
-    if name == "same_index":
-        return True if refs[0] == refs[1] else None
-    if name == "index_product":
-        return None if 1 not in refs else values[0] if refs[1] == 1 else values[1]
-    if refs[1] == 0:
-        return values[0]
-    return values[1] if name == "index_plus" and refs[0] == 0 else None
 
 
 def _ref(value: Any) -> Value:
@@ -185,7 +164,7 @@ class Recorder:
             if not fits:
                 self._unfit(operation, value, kind)
             refs.append(float(ref) if kind == NUMBER and type(ref) is not str else ref)
-        if operation.name in _SHORTENED and (known := _shortened(operation.name, values, refs)) is not None:
+        if operation.name in SHORTENED and (known := shortened(operation.name, values, refs)) is not None:
             return known
         # Equal constants of two types, or of two signs, are not the same.
         key: Any = (operation.name, *(r if type(r) is str else (type(r), repr(r)) for r in refs))

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from starhold.laws.modes import mode_laws
 from starhold.report.commands import Column, Command, Result, Table, later
 
 if TYPE_CHECKING:
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
 
 def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) -> Result:
     """Make a row for each loss; gains only where they were redesigned."""
+    from starhold.laws.modes import mode_laws
     from starhold.report.text import number_text
 
     flown = [failure.gains for failure in failures if failure.gains is not None]
@@ -24,7 +24,7 @@ def present(scenario: Scenario, entry: LawEntry, failures: Sequence[Failure]) ->
     retuned = [name for name in retuned if name != "wheels_lost"]
     sentences: list[str] = []
     if any(not failure.controllable for failure in failures):
-        sentences.append("not (x, y, z): no control torque is left about this body direction.")
+        sentences.append("not (x, y, z): no control torque remains about this body direction.")
     sentences += [f"without {failure.name} not flown: {failure.refused}" for failure in failures if failure.refused]
     if any(failure.certified is not None for failure in failures):
         sentences.append("certified: slews from rest for which it is proved that no motor or wheel reaches its limit.")

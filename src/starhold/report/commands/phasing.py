@@ -74,7 +74,7 @@ def _vectors(result: Phasing) -> Iterator[tuple[str, str, str, list[Any]]]:
 
 
 COMMAND = Command(
-    "Tell the signs and axes that each stage shows under stimuli by hand: phasing.html, phasing.csv; judge what was seen.",
+    "Write the sheets of expected signs and axes for a bench test: phasing.html, phasing.csv; judge observations.",
     "phasing",
     later("studies.phasing_verdict.study"),
     present,
