@@ -37,7 +37,7 @@ def test_a_recording_gives_its_own_estimates_and_commands_to_the_bit():
     assert {"command", "wheel_command", "mekf_attitude", "mekf_rate", "mekf_gyro_bias"} <= names
     assert all(one.same_bits for one in result.comparisons)
     assert result.parted is None
-    assert "agrees" in result.sentence
+    assert "agree" in result.sentence
     assert "bit for bit" in result.sentence
 
 
