@@ -323,6 +323,7 @@ def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
     assert np.array_equal(fed_back(loop, errors), np.array(expected))
 
 
+@pytest.mark.slow
 def test_the_set_of_a_claim_is_that_of_the_program_in_its_proof():
     """Of a law whose V falls with a mixed term alone, and of one that is told by its root."""
     craft = BASE.replace("gravity_gradient = true", "gravity_gradient = false")

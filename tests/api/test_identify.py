@@ -67,6 +67,7 @@ def cubesat():
     return scenario(GYRO, FIELD, DIPOLE)
 
 
+@pytest.mark.slow
 def test_the_truth_lies_in_the_region_and_the_covariance_is_that_of_the_scatter(cubesat):
     """Of flights with noise as stated, from wrong numbers: inertia of a tumbling CubeSat by gyro and magnetometer alone."""
     count = fewer(300, 30)

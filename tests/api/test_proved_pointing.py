@@ -124,6 +124,7 @@ def plotted(**initial):
     return flights[0].recording["time"], panel.curves[0], panel.bounds
 
 
+@pytest.mark.slow
 def test_the_page_draws_the_bound_above_a_flight_that_begins_in_the_set_and_no_other():
     times, flown, ((number, since, most),) = plotted(angles=["10 deg", 0, 0])
     bound = most[np.searchsorted(since, times, side="right") - 1]
@@ -134,6 +135,7 @@ def test_the_page_draws_the_bound_above_a_flight_that_begins_in_the_set_and_no_o
     assert plotted(angles=["100 deg", 0, 0])[2] == ()
 
 
+@pytest.mark.slow
 def test_the_command_tells_the_proof_only_where_it_is_asked_for(held, tmp_path):
     path = tmp_path / "held.toml"
     path.write_text(sh.scenario(HELD).text)

@@ -66,6 +66,7 @@ def test_a_gain_margin_is_asked_for_in_decibels():
     assert (typed.number, typed.limit, typed.margin, typed.unit) == (plain.number, plain.limit, plain.margin, "1")
 
 
+@pytest.mark.slow
 def test_each_number_is_that_of_its_own_command():
     phase, error, many, kept, proof = sh.verify(turn(*ALL))[4:]
     assert phase.number == min(one.phase for one in sh.margins(turn()))

@@ -74,6 +74,7 @@ def test_verdicts_and_quantiles_are_those_of_other_libraries(result):
             assert spread.counts.sum() <= len(values)
 
 
+@pytest.mark.slow
 def test_envelopes_are_those_of_recordings(result):
     law = next(law for law in result.laws if law.law == "pd")
     angles = []

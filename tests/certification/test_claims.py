@@ -150,7 +150,7 @@ def by_differences(loop, turned):
     return np.array([torque(-axis) - torque(axis) for axis in 1e-5 * np.eye(3)]).T / 2e-5
 
 
-@pytest.mark.parametrize("name", ["pd-0", "lqr-I", "lqr-III", "matrix-pd-diagonal", "sliding-1"])
+@pytest.mark.parametrize("name", leading(["pd-0", "sliding-1", "lqr-I", "lqr-III", "matrix-pd-diagonal"], 2))
 def test_longest_period_is_where_the_sampled_loop_loses_stability(name):
     loop = LOOPS[name]
     claim = certified(name).claim("sampling")

@@ -105,6 +105,7 @@ def test_level_that_reaches_the_border_is_refuted_there():
     assert s["x"] ** 2 + s["y"] ** 2 <= Fraction(9, 2)
 
 
+@pytest.mark.slow
 def test_false_indicators_are_refuted():
     not_positive = claim(("-x", "-y"), "region", "x**2 - y**2", equilibrium=ORIGIN)
     assert outcomes(not_positive)["positive"] == "refuted"
@@ -154,6 +155,7 @@ def nested(V, core=ROUND, rates=("-x + x**3", "-y"), **more):
     return claim(rates, "region", V, core=expression(core), equilibrium=ORIGIN, **more)
 
 
+@pytest.mark.slow
 def test_v_that_has_no_least_value_at_the_equilibrium_leads_into_a_proved_set():
     V = f"{ROUND} + x/50 - 1/5"
     alone = claim(("-x + x**3", "-y"), "region", V.removesuffix(" - 1/5"), equilibrium=ORIGIN)

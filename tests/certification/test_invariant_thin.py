@@ -153,6 +153,7 @@ def on_lines(random):
     return [*found, (Fraction(3, 5), Fraction(4, 5)), (Fraction(5, 13), Fraction(-12, 13)), (Fraction(-1), Fraction(0))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", leading([1, 2, 4, 6, 0, 3, 5, *range(7, 60)], 2))
 def test_what_is_proved_holds_on_surfaces_too(seed, tmp_path):
     """By exact values of the texts, and by motions that keep to a line while the rates there point along it."""

@@ -29,6 +29,7 @@ from starhold.parts.part import Fitted
 from starhold.scenario.building import build
 from tests.certification.loops import certified
 from tests.kernel.certificates import flying, radii_of
+from tests.tiers import leading
 
 SENSORS = {"sensor gyro", "sensor star-tracker", "estimator mekf"}
 
@@ -60,12 +61,14 @@ def test_a_claim_for_a_share_takes_in_the_parts_that_say_their_noise():
 
 @pytest.mark.parametrize(
     ("name", "params"),
-    [
-        ("gyro", {"scale_error": 0.01}),
-        ("gyro", {"limit": 1.0}),
-        ("star-tracker", {"delay": 0.5}),
-        ("star-tracker", {"outage": (10.0, 20.0)}),
-    ],
+    leading(
+        [
+            ("gyro", {"scale_error": 0.01}),
+            ("gyro", {"limit": 1.0}),
+            ("star-tracker", {"delay": 0.5}),
+            ("star-tracker", {"outage": (10.0, 20.0)}),
+        ]
+    ),
 )
 def test_what_is_not_noise_is_left_out(name, params):
     assert left_out(changed(nadir(), name, **params), 0.9973) == SENSORS

@@ -69,6 +69,7 @@ def test_signs_and_lengths_of_quaternions_do_not_matter(seed, factor):
     assert all(number(a) == pytest.approx(number(b), rel=1e-6) for a, b in pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", leading([2, 5]))
 def test_a_history_of_one_attitude_is_a_target_at_rest(count, tmp_path):
     attitudes = np.tile([0.5, -0.5, 0.1, 0.7], (count, 1))

@@ -249,6 +249,7 @@ def struck(action):
     return parse(BUILTIN[:at] + STRUCK.format(action) + BUILTIN[at:], "here")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("action", "names"), leading([("both", ["wheel", "wheel from 70 s"]), ("none", ["wheel"])]))
 def test_the_certificate_is_issued_again_once_the_fault_is_known(action, names, tmp_path):
     scenario = struck(action)

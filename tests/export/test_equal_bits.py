@@ -69,7 +69,7 @@ def check(name: str, count: int, *builds: tuple[str, ...]) -> None:
         done += part
 
 
-@pytest.mark.parametrize("name", [*STATELESS, *MADE])
+@pytest.mark.parametrize("name", leading([*STATELESS, *MADE], len(STATELESS) + 6))
 def test_random_and_special_states(name):
     check(name, FEW, *BUILDS[: len(BUILDS) if WHOLE or name in ("wheel", "estimator") else 1])
 

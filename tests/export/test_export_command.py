@@ -18,6 +18,7 @@ from starhold.trace.program import Call, statements
 from tests.export.flown import LAWS, build_in, code_of, compiled, need
 from tests.refusals import complains
 from tests.running import starhold
+from tests.tiers import leading
 
 DOCS = Path(__file__).parents[2] / "docs"
 SMALL = "three-laws"
@@ -138,7 +139,7 @@ def test_strict_compilers_have_nothing_to_say():
                  "-Wno-unsafe-buffer-usage", "-Wno-unknown-warning-option")  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["lyapunov", "lqr", "sliding", "modal", "wheel", "mpc"])
+@pytest.mark.parametrize("name", leading(["lyapunov", "lqr", "sliding", "modal", "wheel", "mpc"], 3))
 def test_docs_show_the_code_of_today(name):
     page = runpy.run_path(str(DOCS / "flight_code.py"))
     scenario, law = page["shown"]()[name]

@@ -76,6 +76,7 @@ def after_a_period(fleet, q, w, unit, per_rate=0.0):
     return q, w
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "power"), leading([("moving", 1), ("skew", 3), ("moving", 0.5), ("moving", 3), ("skew", 0.5), ("skew", 1)])
 )

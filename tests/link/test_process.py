@@ -44,18 +44,21 @@ def program(folder, text):
 
 @pytest.mark.parametrize(
     ("text", "found"),
-    [
-        ("sys.exit(3)", "at step 0, a process that ended with 3; allowed: a command for every step"),
-        ("tell(Kind.COMMAND, 0, (0.0, 0.0, float('nan'))); time.sleep(60)", "at step 0, a message that is not finite"),
-        (
-            "tell(Kind.COMMAND, 0, (0.0, 0.0, 0.0)); tell(Kind.COMMAND, 5, (0.0,) * 3); time.sleep(60)",
-            "at step 1, a message that is out of order",
-        ),
-        ("os.write(1, b'hello'); time.sleep(60)", "at step 0, a message that is malformed"),
-        ("tell(Kind.STOP); time.sleep(60)", "a process that stops the flight"),
-        ("os.close(1); time.sleep(1)", "a process that ended with 0"),
-        ("time.sleep(60)", "nothing for 2 s"),
-    ],
+    leading(
+        [
+            ("sys.exit(3)", "at step 0, a process that ended with 3; allowed: a command for every step"),
+            ("tell(Kind.COMMAND, 0, (0.0, 0.0, float('nan'))); time.sleep(60)", "at step 0, a message that is not finite"),
+            (
+                "tell(Kind.COMMAND, 0, (0.0, 0.0, 0.0)); tell(Kind.COMMAND, 5, (0.0,) * 3); time.sleep(60)",
+                "at step 1, a message that is out of order",
+            ),
+            ("os.write(1, b'hello'); time.sleep(60)", "at step 0, a message that is malformed"),
+            ("tell(Kind.STOP); time.sleep(60)", "a process that stops the flight"),
+            ("os.close(1); time.sleep(1)", "a process that ended with 0"),
+            ("time.sleep(60)", "nothing for 2 s"),
+        ],
+        5,
+    ),
 )
 def test_what_misbehaves_is_told_in_a_line(text, found, tmp_path, monkeypatch):
     monkeypatch.setattr(process, "PATIENCE", 2.0 if "nothing" in found else 60.0)

@@ -14,6 +14,7 @@ import starhold as sh
 from starhold.parts import magnetic_field
 from starhold.parts.craft import make_craft
 from starhold.parts.estimators import magnetometer_filter
+from tests.tiers import leading
 
 PERIOD, FIELD, START, RATE = 0.5, 5e-9, 1e-3, 1.5e-4
 INERTIA = np.array([0.035, 0.03, 0.012])
@@ -46,7 +47,7 @@ def turned_freely(x, steps, rate):
     return [Rotation.from_quat(y, scalar_first=True) for y in motion.y[:4].T]
 
 
-@pytest.mark.parametrize("move", [turned_by_gyro, turned_freely])
+@pytest.mark.parametrize("move", leading([turned_by_gyro, turned_freely]))
 def test_estimate_is_the_most_likely_one(move):
     """Of a gyro without noise and of a body without torque, whose motions have no unknowns but those of the start."""
     steps, random, shown = 240, np.random.default_rng(3), np.array([0.01, -0.02, 0.015])

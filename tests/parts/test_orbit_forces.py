@@ -216,6 +216,7 @@ def test_a_layout_must_give_the_torque():
         find("effector", "thrusters").module.prepare(params, 0.5)
 
 
+@pytest.mark.slow
 def test_a_claim_names_the_force_that_it_leaves_out(tmp_path):
     for on in (True, False):
         scenario = read(tmp_path, ('moves_orbit = "yes"\n', "") if not on else ("", ""))

@@ -50,6 +50,7 @@ def test_figures_of_an_attitude_are_drawn_without_what_flies_reads_and_proves(tm
     assert not {"pydantic", "flint", "llvmlite", "scipy", "starhold.loop.step", "starhold.certification"} & {*loaded}
 
 
+@pytest.mark.slow
 def test_equal_flights_give_equal_files(tmp_path: Path) -> None:
     folders = [tmp_path / "a", tmp_path / "b"]
     for folder in folders:

@@ -66,6 +66,7 @@ def test_every_claim_is_told_with_its_obligations_and_assumptions() -> None:
     assert "starhold check certificate.json" in text
 
 
+@pytest.mark.slow
 def test_numbers_of_the_proof_are_shown() -> None:
     certificate = certificates()[0]
     text = plain(told(certificate).text)

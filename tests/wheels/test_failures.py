@@ -76,6 +76,7 @@ def test_less_torque_gives_a_smaller_degree_of_stability_and_a_later_settling(fo
         assert 0.0 < failure.momentum_share < FULL
 
 
+@pytest.mark.slow
 def test_degree_of_stability_and_gains_are_those_of_a_design_for_the_torque_left(scenario, found):
     entry = scenario.laws[0]
     left = entry.spec._replace(torque=entry.spec.torque * found[1].share)

@@ -86,6 +86,7 @@ def flown(params, speed, torque, angle, steps, step):
     return rates, np.array([state.momentum[2] / J for _, state in rows]) - rates[:, 2]
 
 
+@pytest.mark.slow
 def test_stiction_is_basilisk_s():
     static, speed, viscous, torque = 3e-4, 5.0, 1e-5, 6e-4
     numbers = {"fCoulomb": 0.0, "fStatic": static, "betaStatic": speed, "cViscous": viscous}

@@ -102,6 +102,7 @@ def test_campaigns_draw_mountings_that_no_law_is_told():
         sh.campaign(scenario(), over=over, runs=4, search=False)
 
 
+@pytest.mark.slow
 def test_no_claim_is_made_of_wheels_that_are_askew_and_large_turns_are_refused():
     for turns, proved in (([None] * 4, True), (TURNS, False)):
         claims = sh.certify(scenario(turns), "wheel")[0].claims
