@@ -120,6 +120,7 @@ def test_a_loop_without_sensors_says_so():
     assert quiet.notes == ["b-dot: this law asks for nothing at its first instant; the sheet begins with a torque."]
 
 
+@pytest.mark.slow
 def test_a_sheet_is_written_filled_in_and_judged(tmp_path):
     done = starhold("phasing", "cubesat-nadir", "-o", "out", cwd=tmp_path, code=0)
     assert "magnetic-unloading: dipole" in done.stdout

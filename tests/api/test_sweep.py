@@ -84,6 +84,7 @@ LANDING = sh.load("landing")
 ALONE = {"simulation.duration": 5.0} | {f"law.{entry.name}": None for entry in LANDING.laws[1:]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", leading([POINT, LANDING.with_(ALONE), THREE]))
 def test_metrics_of_a_run_are_those_of_its_flight_and_of_its_file(scenario, tmp_path):
     (tmp_path / "s.toml").write_text(scenario.text)

@@ -24,6 +24,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", leading([150_000, 0, 50_000]))
 def test_a_disk_that_is_full_is_told_in_one_line(folder, most):
     """The first holds run.nc and the pictures, but not the page, the second nothing, the third a part of run.nc."""

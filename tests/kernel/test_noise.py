@@ -192,7 +192,7 @@ FALSE = [
 ]
 
 
-@pytest.mark.parametrize(("hypothesis", "change"), leading(FALSE, 2))
+@pytest.mark.parametrize(("hypothesis", "change"), leading(FALSE))
 def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis, change):
     content = contents("flying", "noisy")
     (claim,) = content["claims"]

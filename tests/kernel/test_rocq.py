@@ -49,6 +49,7 @@ def test_every_obligation_is_a_lemma_under_its_name(small):
     assert not re.search(r"Admitted|Axiom|Parameter|admit", lemmas)
 
 
+@pytest.mark.slow
 def test_rocq_accepts_a_small_certificate_and_refuses_a_changed_one(small, tmp_path):
     _, lemmas = small
     assert accepted(lemmas, tmp_path) == ""

@@ -191,6 +191,7 @@ def test_laws_are_compared_measured_and_changed(folder: Path) -> None:
     assert scenario.with_({"body.mass": 4.0, "law.slack.k": 0.7}).craft.inverse == 0.25
 
 
+@pytest.mark.slow
 def test_the_command_line_writes_runs_pictures_and_the_report_and_proves_nothing(folder: Path) -> None:
     starhold("compare", "pull.toml", "-o", "out", cwd=folder, code=0)
     names = {path.relative_to(folder / "out").as_posix() for path in (folder / "out").rglob("*") if path.is_file()}

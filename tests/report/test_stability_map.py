@@ -20,6 +20,7 @@ GIVEN = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", leading([(given,) for given in GIVEN]))
 def test_map_line_and_optimum_are_drawn(tmp_path: Path, given: tuple[tuple[float, ...], float, float, float]) -> None:
     path = save(draw_map(*given), tmp_path / "map.png")

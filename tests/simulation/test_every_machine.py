@@ -163,6 +163,7 @@ def test_c(compiler, level, siblings):
     compare(siblings, on_c([job for _, job in jobs(siblings)], compiler, *level))
 
 
+@pytest.mark.slow
 @PRINTED
 def test_javascript(siblings):
     compare(siblings, on_node([job for _, job in jobs(siblings)]))
