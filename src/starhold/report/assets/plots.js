@@ -142,7 +142,9 @@ function guides(panel, plot, chart) {
       const [from, to] = [Math.max(start, x.min), Math.min(end, x.max)].map((time) => u.valToPos(time, "x", true));
       if (to <= from || plot.split) continue;
       ctx.fillRect(from, bbox.top + bbox.height - 4 * dot, to - from, 4 * dot);
-      ctx.fillText("estimate not valid", from + 3 * dot, bbox.top + bbox.height - 7 * dot);
+      // The words stay inside the plot.
+      ctx.textAlign = from > bbox.left + bbox.width / 2 ? "right" : "left";
+      ctx.fillText("estimate not valid", ctx.textAlign === "left" ? from : to, bbox.top + bbox.height - 7 * dot);
     }
     // What is proved is about the flight of the file.
     for (const [number, times, most] of chart.live ? [] : panel.bounds || []) {
