@@ -160,8 +160,8 @@ def test_scale_factors_that_no_reading_shows_are_named():
     spinning = TUMBLE.replace('["6 deg/s", "-5 deg/s", "6.2 deg/s"]', "[0.0, 0.0, 0.01]").replace("= true", "= false")
     fit = told_of(scenario(GYRO, text=spinning), "part.gyro.scale_error", "part.gyro.noise", commands="none")
     assert sorted(fit.posterior.sentences) == [
-        "These data do not determine part.gyro.noise: no reading depends on it.",
         "These data barely constrain part.gyro.scale_error: its standard deviation exceeds its size.",
+        "These data do not determine part.gyro.noise: no reading depends on it.",
     ]
     assert fit.posterior.barely(fit.free).tolist() == [True, False]
     assert not fit.learnt().table.campaign or not fit.learnt().table.campaign.over
