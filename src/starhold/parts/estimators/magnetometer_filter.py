@@ -37,7 +37,16 @@ from starhold.algebra.vector import multiply as product
 from starhold.parts import magnetic_field
 from starhold.parts.attitudes import turned_by
 from starhold.parts.contract import Card, Parameter
-from starhold.parts.covariance import GYRO_BIAS, GYRO_NOISE, GYRO_WALK, carried, deviations, summed, symmetric
+from starhold.parts.covariance import (
+    GYRO_BIAS,
+    GYRO_NOISE,
+    GYRO_WALK,
+    along_diagonal,
+    carried,
+    deviations,
+    summed,
+    symmetric,
+)
 from starhold.parts.craft import Craft
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.stated_attitude import START as ATTITUDE
@@ -205,7 +214,7 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
     after = chosen(astray, aligned(before, shown, true, params, begin), corrected(before, shown, true, params))
     new = less(0.5, getattr(readings, "magnetic_field_is_new", 1.0))
     now = chosen(new, after, before)._replace(reading=reading, steps=memory.steps + 1.0)
-    spread, of_rate = deviations(now.turn), deviations(combine(1.0, now.walk, drive.reading, IDENTITY))
+    spread, of_rate = deviations(now.turn), deviations(along_diagonal(now.walk, drive.reading))
     sure = both(less_equal(most(spread), params.valid_within), less(now.surprise, TRUST))
     valid = where(both(less(SPREAD, now.spread), sure), 1.0, 0.0)
     rate, bias = (subtract(reading, now.slow), now.slow) if with_gyro else (now.slow, ZERO)
@@ -234,9 +243,9 @@ def propagated(memory: Memory, reading: Vector, drive: Drive, craft: Craft, peri
     return memory._replace(
         attitude=normalise(multiply(memory.attitude, turn)),
         slow=slow,
-        turn=symmetric(combine(1.0, spread, drive.turned, IDENTITY)),
-        mixed=combine(1.0, mixed, drive.mixed, IDENTITY),
-        walk=symmetric(combine(1.0, walk, drive.walked, IDENTITY)),
+        turn=symmetric(along_diagonal(spread, drive.turned)),
+        mixed=along_diagonal(mixed, drive.mixed),
+        walk=symmetric(along_diagonal(walk, drive.walked)),
     )
 
 
@@ -278,7 +287,7 @@ def corrected(now: Memory, shown: Vector, true: Vector, params: Numbers) -> Memo
     off, row = subtract(shown, foretold), skew(foretold)
     # Of the field as it is foretold with the errors of attitude and of bias or rate.
     of_turn, of_slow = product(row, now.turn), product(row, now.mixed)
-    sure = inverse(symmetric(combine(1.0, product(of_turn, transpose(row)), params.seen, IDENTITY)))
+    sure = inverse(symmetric(along_diagonal(product(of_turn, transpose(row)), params.seen)))
     turning, slowing = product(transpose(of_turn), sure), product(transpose(of_slow), sure)
     square = dot(off, apply(sure, off)) / 3.0
     return now._replace(

@@ -23,7 +23,7 @@ TELEMETRY = {
         content=later("studies.telemetry_files.existing_mapping"),
     ),
 }
-"""What names recorded telemetry."""
+"""The options that name recorded telemetry and its mapping."""
 MOST_PANELS = 6
 """Quantities that a figure shows: those that part first."""
 
