@@ -83,9 +83,16 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     for fitted in loop.parts:
         for told, found in zip((torques, errors), _pushes(fitted, envelope), strict=True):
             told += [] if found is None else [found]
-    estimated = _estimated(loop, driven_errors(loop))
-    told = [NO_ERRORS, *(found for f in loop.parts if f not in estimated and (found := _bounded(f)) is not None)]
-    attitude, rate, _ = (sum(own) for own in zip(*told, strict=True))
+    driven = driven_errors(loop)
+    estimated = _estimated(loop, driven)
+
+    def counts(fitted: Fitted) -> bool:
+        # A part that is left out for its noise is left out with its other errors.
+        noisy = driven is not None and fitted in driven.parts
+        return fitted not in estimated and (noisy or not _is_random(_noise(fitted, loop.period)))
+
+    told = [NO_ERRORS, *(found for f in loop.parts if (found := _bounded(f)) is not None and counts(f))]
+    attitude, rate, *_ = (sum(own) for own in zip(*told, strict=True))
     (torque, per_rate), (command, command_per_rate) = ([sum(x) for x in zip(*own, strict=True)] for own in (torques, errors))
     turn = band_of(loop)[2:] if loop.target.part.name == "orbital" else (0.0, 0.0)
     return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *turn)))
@@ -93,13 +100,13 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
     """Return the noise-driven errors of an estimate, or of readings that the law uses directly; None without noise, where
-    parts do not fully declare it, where sensors of one quantity are not read together, and where the target depends on the
-    law's mode.
+    parts do not fully declare it, where an estimator leaves other errors in, where sensors of one quantity are not read
+    together, and where the target depends on the law's mode.
     """
     estimators = loop.used("estimator")
     wanted = {name for f in estimators for name in f.part.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
-    told = all(f.part.hook("noise") is not None and _bounded(f) is not None for f in sensors)
+    told = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
     if not sensors or not told or loop.target.part.flag("BY_MODE"):
         return None
     noise = Noise()
@@ -191,6 +198,12 @@ def _bounded(fitted: Fitted) -> Errors | None:
     tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
     found = NO_ERRORS if tell is None else tell(fitted.params)
     return None if tell is None or not all(map(isfinite, found)) else found
+
+
+def _is_removed(errors: Errors | None, estimated: bool) -> bool:
+    """Return whether bounded errors beside noise do not reach the law: an estimator removes a bias of the rate alone. What
+    it makes of a tracker that is mounted askew, or of a reading in steps, no part states."""
+    return errors is not None and (not estimated or (errors.attitude == 0.0 and errors.rate == errors.bias))
 
 
 def _field_error(fitted: Fitted, period: float, noisy: bool) -> float:

@@ -134,7 +134,8 @@ def error(params: Params) -> Errors:
     built = as_built.is_given(params.scale_error, params.mounting_error, params.axis_errors, params.bias_instability)
     if built or params.limit < math.inf:
         return UNBOUNDED
-    return Errors(rate=math.hypot(*params.bias) + as_built.off_step(params.resolution))
+    bias = math.hypot(*params.bias)
+    return Errors(rate=bias + as_built.off_step(params.resolution), bias=bias)
 
 
 def noise(params: Params, period: float) -> Noise:
