@@ -79,12 +79,19 @@ def _held_aside(span: Any) -> Unmet:
 
 def _wheels_limited(span: Any) -> Unmet:
     wheels = span.loop.wheels
-    working = np.array(wheels.torque_limit) > 0.0
-    torque, momentum = np.abs(span["wheel_torque"]), np.abs(span["wheel_momentum"])
-    strong = span.reaches(torque, np.array(wheels.torque_limit))[:, working].any(axis=1)
-    full = (momentum > np.array(wheels.momentum_limit) * (1.0 - BAND))[:, working].any(axis=1)
+    strong = span.reaches(np.abs(span["wheel_torque"]), np.array(wheels.torque_limit))[:, _working(wheels)].any(axis=1)
     power = [(bool(wheels.power_limit), "the motors have a power limit")]
-    return [*_friction(span), *_limited(span), (strong, "a motor reaches its limit"), (full, "a wheel is full"), *power]
+    return [*_friction(span), *_limited(span), (strong, "a motor reaches its limit"), *_filled(span), *power]
+
+
+def _working(wheels: Any) -> Any:
+    return np.array(wheels.torque_limit) > 0.0
+
+
+def _filled(span: Any) -> Unmet:
+    wheels = span.loop.wheels
+    full = np.abs(span["wheel_momentum"]) > np.array(wheels.momentum_limit) * (1.0 - BAND)
+    return [(full[:, _working(wheels)].any(axis=1), "a wheel is full")]
 
 
 def _friction(span: Any) -> Unmet:
@@ -130,6 +137,7 @@ ASSUMPTIONS = {
     WHEELS: Assumption("neither torque nor wheels limited, wheels without friction", _wheels_limited),
     FRICTIONLESS: Assumption("wheels without friction", _friction),
     "bounded-momentum": Assumption("total momentum at most as told"),
+    "spare-momentum": Assumption("no wheel filled by momentum that friction moves between wheels", _filled),
     "no-wheels": Assumption("no stored momentum"),
     "no-outside-torque": Assumption("no torque from outside", _pulled),
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),

@@ -20,6 +20,7 @@ from starhold.kernel.numbers import rational
 from starhold.kernel.theorems.noise import BESIDE
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS
+from starhold.parts.effectors.wheel_motion import at_top_speed
 from starhold.parts.effectors.wheels import BAND
 
 
@@ -68,7 +69,7 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
         told = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | told
     most = {"limit": float(loop.craft.torque_limit), "limit.norm": float(loop.craft.torque_limit)}
     if wheels is not None:
-        most |= {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit)}
+        most |= {f"motors.{k}": x for k, x in enumerate(at_top_speed(wheels).torque_limit)}
         most |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit)}
     for name, x in told.items():
         if name in exactly and x != Fraction(exactly[name]):
@@ -77,7 +78,13 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
             yield f"{name} is exceeded"
         if name in most and isfinite(most[name]) and side * x > side * Fraction(most[name]):
             yield f"{name} is lower"
+    # A norm within the limit is within it about each axis, and not the other way round.
+    name, kind = ("limit", "norm") if side > 0 else ("limit.norm", "axis")
+    if name in told and loop.limit == kind:
+        yield "the limit is one of another kind"
     if any(name.startswith(("motors", "stored")) for name in told):
+        if loop.limit != "none" and isfinite(most["limit"]) and told.keys().isdisjoint(("limit", "limit.norm")):
+            yield "the limit is not told"
         yield from (
             f"{name} is not told"
             for name, x in most.items()

@@ -30,6 +30,7 @@ ASSUMPTIONS = {
     "no-wheels": "no wheels turn",
     "frictionless-wheels": "wheels have no friction, and share the torque by least squares",
     "unlimited-wheels": "wheels have no limits but those told",
+    "spare-momentum": "no rotor is filled by what wheels store against one another, which friction changes",
     "bounded-momentum": "body and wheels have no more momentum together than told",
     "linear-motion": "the motion is linear, as it is near rest",
     "quaternion-as-fed": "the quaternion that is fed back never jumps",

@@ -26,6 +26,7 @@ from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies import rigid_body
 from starhold.parts.craft import tensor
+from starhold.parts.effectors.wheel_motion import at_top_speed
 from starhold.parts.effectors.wheels import BAND
 from starhold.trace.straight_line import labelled, straight_line
 
@@ -220,11 +221,10 @@ class RecordedLoop:
         limit = loop.craft.torque_limit if loop.limit != "none" else inf
         shared = dict[str, Any]()
         if wheels is not None and wheels.allocation == 0:
-            shared = {f"motors.{k}": x for k, x in enumerate(wheels.torque_limit) if isfinite(x)}
+            shared = {f"motors.{k}": x for k, x in enumerate(at_top_speed(wheels).torque_limit) if isfinite(x)}
             shared |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)}
-        if shared:
-            return shared
-        return {"limit" if loop.limit == "axis" else "limit.norm": limit} if isfinite(limit) else {}
+        # A torque limit of their own may be lower than the wheels give.
+        return shared | ({"limit" if loop.limit == "axis" else "limit.norm": limit} if isfinite(limit) else {})
 
     def is_told(self, name: str) -> bool:
         """Return whether the law's program reads an input."""

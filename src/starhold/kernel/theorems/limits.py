@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from ..loops import AXES, NONE, AttitudeLoop
-from ..numbers import Rows, definite, demand, inverse, times, transpose
+from ..numbers import Rows, definite, demand, inverse, norm, times, transpose
 from ..polynomials import Poly, apply, dot, poly, var, variables
 from ..programs import joined
 from ..rules import Proof, Squares
@@ -21,14 +21,14 @@ TORQUE, UNIT = "torque-limit", variables("d")
 def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
     """On {V <= level}, or everywhere, with everything from outside at most as told: each component of the torque is at most
     `limit` in size (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k, of
-    those that are told. less: what the torque is below its limit, for what it is not told exactly."""
+    those that are told. less: how far the torque is at most from that of the true state, by what is told wrongly."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
-    limit, norm = numbers.get("limit"), numbers.get("limit.norm")
+    limit, longest = numbers.get("limit"), numbers.get("limit.norm")
     count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
     motors, stored = ([numbers.get(f"{name}.{k}") for k in range(count)] for name in ("motors", "stored"))
     told = [x for x in (*motors, *stored) if x is not None]
     unlimited = ["unlimited-wheels"] * (loop.wheels and (not told or len(told) < 2 * count))
-    if limit is None and norm is None and not told:
+    if limit is None and longest is None and not told:
         return Statement("", ("unlimited-torque", *unlimited))
     known, squared, bounded = list[Poly](), list[Poly](), list[list[Poly]]()
     bounds, assumed = list[str](), list[str]()
@@ -47,20 +47,24 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
         bounded.append(vector)
         bounds.append(text.format(below(numbers[name])))
     assumed += ["bounded-target"] * loop.moving + ["bounded-momentum"] * loop.wheels + unlimited
+    if count > len(AXES) and any(x is not None for x in stored):
+        # Friction, an error of the command, moves momentum between more than three rotors.
+        assumed += ["spare-momentum"] * any(numbers.get(name) for name in ("error", "error.per.rate"))
     known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
     said, none = list[str](), poly(0)
-    asked = [None if x is None else x - less for x in (limit, norm)]
+    asked = [None if x is None else x - less for x in (limit, longest)]
     limited = [(*load, none) for load in loads("torque", *asked)]
     if limit is not None:
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
-    if norm is not None:
-        said.append(f"the law asks for a torque of no more than {above(norm)} N m")
+    if longest is not None:
+        said.append(f"the law asks for a torque of no more than {above(longest)} N m")
     if told:
         shares, kept = allocated(loop, motors)
         # The rotors' momenta change by share.(torque), the wheels' together by its negative.
         stores = [own - p for own, p in zip(kept, apply(shares, loop.stored), strict=True)]
         for k, row in enumerate(shares):
-            for name, most, own, rest in (("motor", motors[k], row, none), ("wheel", stored[k], NONE, stores[k])):
+            driven = None if motors[k] is None else motors[k] - norm(row) * less
+            for name, most, own, rest in (("motor", driven, row, none), ("wheel", stored[k], NONE, stores[k])):
                 if most is None:
                     continue
                 for sign in (1, -1):
