@@ -160,7 +160,8 @@ class Fleet:
     def __init__(self, J, law, h, outside, error, slow, seed=1, lanes=400):
         self.J, self.law, self.h, self.outside, self.error = np.asarray(J, dtype=float), law, h, outside, error
         self.inverse, self.rng, self.lanes = np.linalg.inv(self.J), np.random.default_rng(seed), lanes
-        self.push, self.around = pushes(self.rng, lanes, h, slow), None
+        # `growing`: what torque and error are more (N m s) times the body's rate, where there are surroundings.
+        self.push, self.around, self.growing = pushes(self.rng, lanes, h, slow), None, (0.0, 0.0)
 
     def directions(self):
         return along(self.rng.normal(size=(3, self.lanes)))
@@ -170,19 +171,22 @@ class Fleet:
         return q, np.zeros((3, self.lanes))
 
     def fly(self, q, w, periods, parts=2):
-        """Yield the states between and at samples, as long as the momentum is not exceeded."""
+        """Yield the states between and at samples."""
         around = self.around and Around(self.around, self.J, self.inverse, self.rng, self.lanes)
         for n in range(periods):
             unit = self.push(n, q, w)
             if around:
                 part, t = self.h / parts, n * self.h
-                command = around.command(self.law, q, w, t, unit) + self.error * unit
+                fast = np.linalg.norm(w + around.target(q, t)[0], axis=0)
+                pushed, error = (x + c * fast for x, c in zip((self.outside, self.error), self.growing, strict=True))
+                command = around.command(self.law, q, w, t, unit) + error * unit
                 for k in range(parts):
                     # A torque that was told comes the other way at once.
-                    outside = self.outside * unit + around.told * np.sign(unit)
+                    outside = pushed * unit + around.told * np.sign(unit)
                     q, w = around.after(q, w, t + (k + 0.5) * part, command, outside, part)
-                    if np.linalg.norm(around.kept, axis=0).max() > (self.around.momentum or np.inf):
-                        return
+                    # What would exceed the momentum is taken out as it comes in.
+                    stored = np.maximum(np.linalg.norm(around.kept, axis=0), 1e-300)
+                    around.kept = around.kept * np.minimum(1.0, (self.around.momentum or np.inf) / stored)
                     yield n + 1, q, w
                 continue
             command = self.law(q, w) + self.error * unit
