@@ -37,6 +37,8 @@ def test_a_limit_of_the_torque_beside_that_of_the_wheels_is_kept_too():
     assert {name[:6] for name in limits_of(loop)} == {"motors", "stored"}
     limited = replace(loop, limit="axis", craft=loop.craft._replace(torque_limit=1e-3))
     assert limits_of(limited) == limits_of(loop) | {"limit": 1e-3}
+    # What the wheels surely give together is no limit of the command.
+    assert limits_of(replace(limited, command_limit=0.5)) == limits_of(loop) | {"limit": 0.5}
     assert limits_of(replace(limited, limit="norm")) == limits_of(loop) | {"limit.norm": 1e-3}
 
 

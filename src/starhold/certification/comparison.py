@@ -67,7 +67,8 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
         least["outside"] += 0 if OUTSIDE in claim["taken"] else known.modelled_norm
         # What is not stated is zero.
         told = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | told
-    most = {"limit": float(loop.craft.torque_limit), "limit.norm": float(loop.craft.torque_limit)}
+    wheeled = any(name.startswith(("motors", "stored")) for name in told)
+    most = dict.fromkeys(("limit", "limit.norm"), float(loop.saturation_limit() if wheeled else loop.craft.torque_limit))
     if wheels is not None:
         most |= {f"motors.{k}": x for k, x in enumerate(at_top_speed(wheels).torque_limit)}
         most |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit)}
@@ -82,7 +83,7 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
     name, kind = ("limit", "norm") if side > 0 else ("limit.norm", "axis")
     if name in told and loop.limit == kind:
         yield "the limit is one of another kind"
-    if any(name.startswith(("motors", "stored")) for name in told):
+    if wheeled:
         if loop.limit != "none" and isfinite(most["limit"]) and told.keys().isdisjoint(("limit", "limit.norm")):
             yield "the limit is not told"
         yield from (

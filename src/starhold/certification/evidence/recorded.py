@@ -218,12 +218,13 @@ class RecordedLoop:
     def limits(self) -> dict[str, Any]:
         """Return the limits of the torque, or those of the wheels; empty where there are none."""
         loop, wheels = self.loop, self.loop.wheels
-        limit = loop.craft.torque_limit if loop.limit != "none" else inf
         shared = dict[str, Any]()
         if wheels is not None and wheels.allocation == 0:
             shared = {f"motors.{k}": x for k, x in enumerate(at_top_speed(wheels).torque_limit) if isfinite(x)}
             shared |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit) if isfinite(x)}
-        # A torque limit of their own may be lower than the wheels give.
+        # Where wheels have limits, that of the command counts beside them, and not what they surely give together.
+        most = loop.saturation_limit() if shared else loop.craft.torque_limit
+        limit = most if loop.limit != "none" else inf
         return shared | ({"limit" if loop.limit == "axis" else "limit.norm": limit} if isfinite(limit) else {})
 
     def is_told(self, name: str) -> bool:
