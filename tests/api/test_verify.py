@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import starhold as sh
 from starhold.campaign import verify
+from starhold.parts.catalogue import find
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
 from starhold.simulation import lane
@@ -273,3 +275,36 @@ def test_the_command_prints_a_line_each_and_writes_a_matrix_and_junit(tmp_path):
     told = {name: [suite.get(key) for key in ("tests", "failures", "errors")] for name, suite in suites.items()}
     assert told == {"met": ["2", "0", "0"], "open": ["2", "0", "1"], "missed": ["2", "2", "0"]}
     assert [case.find("failure") is not None for case in suites["missed"].iter("testcase")] == [True, True]
+
+
+GATHERING = {
+    "name": "gathering",
+    "spacecraft": {"inertia": [6.0, 8.0, 5.0]},
+    "initial": {"angles": ["5 deg", "-5 deg", "3 deg"]},
+    "wheels": {"layout": "pyramid", "inertia": 1e-3, "torque_limit": "20 mN m", "momentum_limit": "0.4 N m s"},
+    "part": [{"type": "constant-torque", "torque": [1e-4, 0, 0]}],
+    "simulation": {"duration": 10_000, "control_period": 0.1},
+    "requirement": [PROOF | {"at_most": "2 deg", "after": "3000 s"}],
+    "law": [{"type": "wheel", "k_rate": 0.5, "k_attitude": 0.02}],
+}
+"""A torque that never changes fills the wheels within the flight, which ends half a turn from its target."""
+
+
+@pytest.mark.parametrize(("momentum", "enough"), [(0.0, False), (0.99, False), (1.01, True)])
+def test_the_momentum_that_a_claim_assumes_is_compared_with_what_gathers(momentum, enough):
+    given = sh.scenario(GATHERING)
+    loop = build(given, given.laws[0])
+    numbers = {"torque": 1e-4, "torque_per_rate": 0.0, "told": False, "momentum": momentum}
+    claim = SimpleNamespace(numbers=numbers, assumptions=("bounded-momentum",))
+    issued = SimpleNamespace(loop=loop, certificate=SimpleNamespace(subject={"modelled_torque_norm": 0.0}))
+    assert (deciding._grown(given, issued, claim) == "") == enough
+    assert not any(deciding._unloads(f.part) for f in loop.used("effector"))
+    assert deciding._unloads(find("effector", "magnetic-unloading"))
+    assert not deciding._unloads(find("effector", "magnetorquers"))
+
+
+@pytest.mark.slow
+def test_a_torque_that_fills_the_wheels_leaves_a_proof_undecided():
+    (found,) = sh.verify(sh.scenario(GATHERING))
+    assert found.verdict == "not decided"
+    assert "total momentum of up to 1 N m s" in found.evidence

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from starhold.analysis.departure import momentum_of, shown_at
 from starhold.analysis.margins import margins
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.wording import enumerated, sentence
@@ -127,9 +128,14 @@ def _proved(
             why = f"{where} the set of the claim: {sentence(claim, one.certificate.subject)}"
             continue
         why = _late(scenario, key, table, claim) if kind == POINTING else ""
+        grown = _grown(scenario, one, claim)
+        unloaded = bool(grown) and any(_unloads(fitted.part) for fitted in one.loop.used("effector"))
+        why = why or ("" if unloaded else grown)
         if why:
             continue
         absent = [*([enumerated(claim.left_out)] if claim.left_out else []), *changes]
+        if unloaded:
+            absent.append(f"whether unloading keeps the total momentum within {claim.numbers['momentum']:.3g} N m s")
         absent += [text for assumed, text in IDEAL.items() if assumed in claim.assumptions]
         number = claim.numbers.get(name)
         most = max((x for x in number if x is not None), default=None) if isinstance(number, list) else number
@@ -144,6 +150,31 @@ def _proved(
 def _open(table: RequirementTable, required: Requirement, verdict: RequirementVerdict) -> RequirementVerdict:
     """Return the verdict of a bound beyond the limit, which decides nothing about the number itself."""
     return undecided(table, f"only this bound is {verdict.evidence}", number=verdict.number, **limits(table, required))
+
+
+def _unloads(part: Any) -> bool:
+    """Return whether an effector turns a torque from outside against the wheels' momentum, and does not take the command."""
+    return part.flag("OUTSIDE") and not part.flag("ACTS") and "wheels" in part.needs
+
+
+def _grown(scenario: Scenario, one: Issued, claim: Claim) -> str:
+    """Say by how much torques from outside may take the momentum of body and wheels beyond what a claim assumes until the
+    flight ends; empty where they do not."""
+    if "bounded-momentum" not in claim.assumptions:
+        return ""
+    n, subject, duration = claim.numbers, one.certificate.subject, scenario.table.simulation.duration
+    loop = one.loop.without("sensor", "estimator")
+    begun = float(momentum_of(loop, shown_at(loop, loop.start)))
+    # What a law is told comes beside what it is not told.
+    torque = n.get("torque", 0.0) + (subject["modelled_torque_norm"] if n.get("told", True) else 0.0)
+    most = math.inf if n.get("torque_per_rate") else begun + torque * duration
+    if most <= n["momentum"] * (1.0 + 1e-9):
+        return ""
+    said = f"of up to {most:.3g} N m s by {duration:g} s" if math.isfinite(most) else "without a bound"
+    return (
+        f"torques from outside may gather a total momentum {said}, and the claim assumes {n['momentum']:.3g} N m s: "
+        "momentum in [certify] states more"
+    )
 
 
 def _late(scenario: Scenario, key: str, table: RequirementTable, claim: Claim) -> str:
