@@ -11,13 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
+from starhold.algebra.structure import flatten
 from starhold.certification.certify import certify
 from starhold.errors import InputError
+from starhold.parts.craft import tensor
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
+from starhold.simulation.lanes import simulate_many
 from starhold.studies.bodies.rigid_body import wanted_of
 from tests.certification.hunt import EARTH, random_inertia, unit
-from tests.kernel.flights import Fleet, Surroundings, along, turn
+from tests.kernel.flights import Fleet, Surroundings, along, times, turn
 from tests.kernel.oracle import Oracle
 from tests.kernel.programs import run
 
@@ -197,23 +200,48 @@ class Attack(Oracle):
         return found, reached
 
 
-def hunted(seed, folder):
-    """What became of a random loop: the text, why there is no claim or "", what contradicts it or "", and shares."""
-    random = np.random.default_rng(seed)
-    text = random_loop(random)
+def flown(loop, claim, random, lanes=128):
+    """The largest angle of flights of the loop itself, with all its parts and their noise, as a share of the claimed one, at
+    some instants after it has settled; from the border of the start set, towards a target at rest."""
+    n, start = claim.numbers, np.array([*flatten((loop.start,)), *loop.rotors], dtype=float)
+    states = np.tile(start[:, None], lanes)
+    target, half = np.array(loop.target.params.attitude)[:, None], n["slew_angle"] * (1.0 - 1e-9) / 2.0
+    turned = np.concatenate([np.full((1, lanes), math.cos(half)), math.sin(half) * along(random.normal(size=(3, lanes)))])
+    states[:4], states[4:7] = times(target, turned), n["rate_start"] * along(random.normal(size=(3, lanes)))
+    if loop.wheels is not None:
+        stored = np.array(loop.rotors) @ np.array(loop.wheels.axes)
+        total = np.linalg.norm(stored[:, None] + tensor(loop.craft.inertia) @ states[4:7], axis=0)
+        states[4:7, total > n["momentum"]] = 0.0
+    worst = 0.0
+    for later in (1, 8, 41, 300):
+        batch = simulate_many(loop, states, int(n["settling"] / n["period"]) + later)
+        off = times(target * [[1.0], [-1.0], [-1.0], [-1.0]], batch.states[:4])
+        worst = max(worst, float(turn(off).max()) / n["angle"])
+    return worst
+
+
+def proved_loop(seed, folder):
+    """A random loop with its text and its claim; or why there is none, in place of the claim."""
+    text = random_loop(np.random.default_rng(seed))
     try:
         scenario = parse(text, "hunted.toml", folder)
         loop = build(scenario, scenario.laws[0])
     except InputError as reason:
-        return text, f"refused: {reason}", "", None
+        return None, text, f"refused: {reason}"
     certificate = certify(loop, "hunted", replace(wanted_of(scenario, True), alone=True))
     claim = certificate.claim("pointing")
     if claim is None or claim.outcome != "proved":
         why = [o.evidence.get("reason", "") for one in certificate.claims for o in one.obligations]
-        return text, "undecided: " + "; ".join(why), "", None
-    content = {"programs": dict(claim.proof.programs)}
-    attack = Attack(content, claim.proof.claim, seed)
-    found, reached = attack.worst()
+        return loop, text, "undecided: " + "; ".join(why)
+    return loop, text, claim
+
+
+def hunted(seed, folder):
+    """What became of a random loop: the text, why there is no claim or "", what contradicts it or "", and shares."""
+    _, text, claim = proved_loop(seed, folder)
+    if isinstance(claim, str):
+        return text, claim, "", None
+    found, reached = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, seed).worst()
     return text, "", found, (claim, reached)
 
 

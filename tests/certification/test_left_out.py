@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,13 +16,15 @@ from starhold.certification.wording import sentence
 from starhold.checker import check_file, passed
 from starhold.laws import modal, wheel
 from starhold.parts.catalogue import PACKAGES, fit, parts
-from starhold.parts.part import Fitted
+from starhold.parts.contract import NoParams, Push
+from starhold.parts.part import Fitted, Part
 from starhold.scenario.reading import builtin_text, parse
 from tests.certification.loops import certified, is_pointing, loop_of, rotors, says, textbook
 from tests.kernel import stations
 from tests.making import built, on_wheels
 from tests.tiers import leading
 
+NO, PUSH = (lambda *_: None), (lambda *_: Push(1e-6))
 LAWS = ("pd-0", "sliding-0", "wheel-0", "lyapunov-0", "lqr-I", "lqr-II", "lqr-III", "matrix-pd-inertial", "modal")
 TAKEN = {"two-body", "gravity-gradient", "linear-gravity", "three-body-gravity", "wheels", "inertial", "orbital", "history"}
 """The parts that the theorems in docs/certificates.md take in."""
@@ -137,3 +141,27 @@ def test_an_error_without_a_bound_is_refused_and_not_left_out():
     assert pushed(rubbed).command == float("inf")
     assert pushed(on_wheels(free, viscous=(1e-6,) * 4)).command < 1e-2
     assert certify(rubbed, "", Wanted(pointing=True, disturbance=1e-9)).claim("pointing").outcome == "undecided"
+
+
+def half_told(role, **equations):
+    """A part of one's own with some of the hooks of another."""
+    names = {"CARD": None, "ROLE": role, "Params": NoParams, "examples": lambda: [NoParams()]}
+    return Fitted(Part("of-ones-own", SimpleNamespace(**names, **equations), Path("own.py")), NoParams())
+
+
+@pytest.mark.parametrize(
+    ("own", "enters"),
+    [
+        (half_told("effector", ACTS=True, reaction=NO, error=PUSH), False),
+        (half_told("effector", ACTS=True, reaction=NO, error=PUSH, bound=PUSH), True),
+        (half_told("effector", ACTS=True, reaction=NO, bound=PUSH), False),
+        (half_told("effector", reaction=NO, bound=PUSH), True),
+        (half_told("environment", torque=NO, bound=PUSH), True),
+        (half_told("environment", torque=NO, bound=PUSH, acceleration=NO), False),
+    ],
+)
+def test_a_part_that_tells_half_of_what_it_does_is_left_out(own, enters):
+    """An effector's reaction without its bound, a force that moves the orbit."""
+    claim = certified("pd-0", disturbance=1e-4).claim("pointing")
+    (told,) = named([claim], textbook()["pd-0"].with_parts(own), 1.0)
+    assert (f"without:{own.part.role} of-ones-own" in told.assumptions) != enters

@@ -1,8 +1,9 @@
 """Flights that are steered against pointing claims of random loops; `pointing_hunt` flies more of them by hand."""
 
+import numpy as np
 import pytest
 
-from tests.certification.pointing_hunt import hunted
+from tests.certification.pointing_hunt import flown, hunted, proved_loop
 from tests.tiers import leading
 
 PROVED = [2002, 2001, 2000, 2004, 2005, 2007, 2009, 2028, 2029, 2030, 2031]
@@ -23,3 +24,12 @@ def test_no_flight_breaks_the_pointing_claim_of_a_random_loop(seed, tmp_path):
 @pytest.mark.parametrize("first", range(3000, 3060, 20))
 def test_no_random_loop_is_proved_what_it_does_not_keep(first, tmp_path):
     assert [seed for seed in range(first, first + 20) if hunted(seed, tmp_path)[2]] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", leading([8009, 8000, 8006, 8008, 8012]))
+def test_flights_of_the_loop_itself_end_as_near_as_is_proved(seed, tmp_path):
+    """With the parts that disturb and measure, and their noise."""
+    loop, _, claim = proved_loop(seed, tmp_path)
+    assert not [name for name in claim.assumptions if name.startswith("without")]
+    assert 0.01 < flown(loop, claim, np.random.default_rng(seed)) <= 1.0

@@ -166,12 +166,18 @@ def _is_read(fitted: Fitted) -> bool:
 
 def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool) -> bool:
     """Whether all that a part does to a loop has a bound. estimated: an estimator takes its errors out."""
-    if moves(fitted.params):
+    part, banded = fitted.part, fitted in movers(loop) and bool(band_of(loop).share)
+    always = part.hook("acceleration") is not None and not hasattr(fitted.params, "moves_orbit")
+    if moves(fitted.params) or (always and not banded):
         # No claim follows an orbit that such a force changes.
         return False
-    if fitted in movers(loop) and band_of(loop).share and not fitted.part.hook("torque"):
+    if banded and not part.hook("torque"):
         return True
-    if _is_idle(loop, fitted, envelope) or any(push is not None for push in _pushes(fitted, envelope)):
+    torque, error = (push is not None for push in _pushes(fitted, envelope))
+    if part.role == "effector":
+        # Beside the command an effector reacts as its momentum turns with the body.
+        return torque and (error or not part.flag("ACTS"))
+    if _is_idle(loop, fitted, envelope) or torque or error:
         return True
     return not estimated and _bounded(fitted) is not None and not _is_random(_noise(fitted, loop.period))
 
