@@ -297,7 +297,8 @@ def test_the_momentum_that_a_claim_assumes_is_compared_with_what_gathers(momentu
     numbers = {"torque": 1e-4, "torque_per_rate": 0.0, "told": False, "momentum": momentum}
     claim = SimpleNamespace(numbers=numbers, assumptions=("bounded-momentum",))
     issued = SimpleNamespace(loop=loop, certificate=SimpleNamespace(subject={"modelled_torque_norm": 0.0}))
-    assert (deciding._grown(given, issued, claim) == "") == enough
+    assert (deciding._grown(issued, claim, 10_000.0) == "") == enough
+    assert deciding._grown(issued, claim, 1e5)
     assert not any(deciding._unloads(f.part) for f in loop.used("effector"))
     assert deciding._unloads(find("effector", "magnetic-unloading"))
     assert not deciding._unloads(find("effector", "magnetorquers"))

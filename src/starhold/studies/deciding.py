@@ -128,7 +128,10 @@ def _proved(
             why = f"{where} the set of the claim: {sentence(claim, one.certificate.subject)}"
             continue
         why = _late(scenario, key, table, claim) if kind == POINTING else ""
-        grown = _grown(scenario, one, claim)
+        times = times_of(scenario, key, table)
+        # Without an end a requirement is about the flight, and about a time after it where it begins there.
+        until = times.end if math.isfinite(times.end) else max(scenario.table.simulation.duration, times.begin)
+        grown = _grown(one, claim, until)
         unloaded = bool(grown) and any(_unloads(fitted.part) for fitted in one.loop.used("effector"))
         why = why or ("" if unloaded else grown)
         if why:
@@ -157,20 +160,20 @@ def _unloads(part: Any) -> bool:
     return part.flag("OUTSIDE") and not part.flag("ACTS") and "wheels" in part.needs
 
 
-def _grown(scenario: Scenario, one: Issued, claim: Claim) -> str:
-    """Say by how much torques from outside may take the momentum of body and wheels beyond what a claim assumes until the
-    flight ends; empty where they do not."""
+def _grown(one: Issued, claim: Claim, until: float) -> str:
+    """Say how far torques from outside may take the momentum of body and wheels beyond what a claim assumes by a time (s),
+    and return an empty text where they do not."""
     if "bounded-momentum" not in claim.assumptions:
         return ""
-    n, subject, duration = claim.numbers, one.certificate.subject, scenario.table.simulation.duration
+    n, subject = claim.numbers, one.certificate.subject
     loop = one.loop.without("sensor", "estimator")
     begun = float(momentum_of(loop, shown_at(loop, loop.start)))
     # What a law is told comes beside what it is not told.
     torque = n.get("torque", 0.0) + (subject["modelled_torque_norm"] if n.get("told", True) else 0.0)
-    most = math.inf if n.get("torque_per_rate") else begun + torque * duration
+    most = math.inf if n.get("torque_per_rate") else begun + torque * until
     if most <= n["momentum"] * (1.0 + 1e-9):
         return ""
-    said = f"of up to {most:.3g} N m s by {duration:g} s" if math.isfinite(most) else "without a bound"
+    said = f"of up to {most:.3g} N m s by {until:g} s" if math.isfinite(most) else "without a bound"
     return (
         f"torques from outside may gather a total momentum {said}, and the claim assumes {n['momentum']:.3g} N m s: "
         "momentum in [certify] states more"
