@@ -68,7 +68,8 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
         # What is not stated is zero.
         told = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | told
     wheeled = any(name.startswith(("motors", "stored")) for name in told)
-    most = dict.fromkeys(("limit", "limit.norm"), float(loop.saturation_limit() if wheeled else loop.craft.torque_limit))
+    limit = float(loop.saturation_limit() if wheeled else loop.craft.torque_limit)
+    most = {"limit": limit, "limit.norm": limit}
     if wheels is not None:
         most |= {f"motors.{k}": x for k, x in enumerate(at_top_speed(wheels).torque_limit)}
         most |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit)}

@@ -63,7 +63,8 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
         # The rotors' momenta change by share.(torque), the wheels' together by its negative.
         stores = [own - p for own, p in zip(kept, apply(shares, loop.stored), strict=True)]
         for k, row in enumerate(shares):
-            driven = None if motors[k] is None else motors[k] - norm(row) * less
+            given = motors[k]
+            driven = None if given is None else given - norm(row) * less
             for name, most, own, rest in (("motor", driven, row, none), ("wheel", stored[k], NONE, stores[k])):
                 if most is None:
                     continue
