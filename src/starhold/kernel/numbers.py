@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, cast
 Rows: TypeAlias = list[list[Fraction]]
 
 WORK = 8_000_000
-"""Units of work that the check of one claim may do: about half a microsecond each."""
+"""Units of work that the check of one claim may do: about a fifth of a microsecond each."""
 LONGEST = 20_000
 """Bits of the longest number."""
 _FLOAT = re.compile(r"(-?)0x([01])(?:\.([0-9a-f]{1,13}))?p([+-][0-9]{1,4})", re.ASCII)
