@@ -240,7 +240,10 @@ SETS = 'start = ["1 - x**2", "1 - y**2"]\nunsafe = ["x + y - 3"]'
         ("avoids", SETS.replace("x + y - 3", "-1 - x**2"), "unsafe", "found a set without a state"),
         ("avoids", SETS.replace("x + y - 3", "abs(x) - 1"), "unsafe[1]", "one polynomial"),
         ("avoids", f"{SETS}\n{ORIGIN}", "equilibrium", "alone"),
-        ("region", f"{SETS}\n{ORIGIN}", "start", 'theorem = "avoids"'),
+        ("region", f"{SETS}\n{ORIGIN}", "unsafe", "theorem avoids"),
+        ("stable", f'start = ["1 - x**2"]\n{ORIGIN}', "start", "theorem avoids, attracts, region"),
+        ("region", f'start = ["1 - x**2"]\n{ORIGIN}', "level", "a level of V that the start set is shown to be below"),
+        ("region", f'start = ["-1 - x**2"]\nlevel = 1\n{ORIGIN}', "start", "found a set without a state"),
         ("stable", f'core = "x**2"\n{ORIGIN}', "core", "theorem attracts or region"),
     ],
 )

@@ -345,8 +345,8 @@ class Oracle(Driven):
                     return False
         moments = np.linalg.eigvalsh(J)
         k, size = np.linalg.eigvalsh(K + K.T)[0] / 2, math.sqrt(moments[-1] / moments[0] * (layer**2).sum())
-        if "angle" in n and not (
-            math.sin(min(n["angle"], 3.0) / 2) > size / k and n["rate"] > size * (1 + np.linalg.norm(K, 2) / k)
+        if "end.angle" in n and not (
+            math.sin(min(n["end.angle"], 3.0) / 2) > size / k and n["end.rate"] > size * (1 + np.linalg.norm(K, 2) / k)
         ):
             return False
         return "level" not in n or 2 * n["level"] < moments[0] * k * k

@@ -43,6 +43,10 @@ def round_(x, y):
     return x * x + y * y
 
 
+def slanted(x, y):
+    return round_(x, y) + x * y
+
+
 def cycle(x, y):
     return x * x + y * y - 1
 
@@ -86,6 +90,9 @@ SETS = {
                 {"equilibrium.x": 0, "equilibrium.s": 0}, ("x", "s"), others=("r",)), 1.0),
     "damped": lambda: (
         attempt("attracts", lambda x, y: (y, -x - y), {"V": round_}, SQUARE, ORIGIN), 4.0),
+    "from a disc": lambda: (
+        attempt("attracts", lambda x, y: (y, -x - y), {"start": lambda x, y: 1 - round_(x, y), "V": slanted}, SQUARE,
+                ORIGIN | {"level": 2}), float("inf")),
     "sliding": lambda: (
         attempt("attracts", sliding, {"V": round_}, {"x": (-1, 1), "y": (-1, 1)}, ORIGIN), 1.0),
     "pendulum": lambda: (

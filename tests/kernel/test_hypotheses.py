@@ -1,17 +1,19 @@
 """False claims of which all is shown but one thing: that thing is not idle."""
 
+from fractions import Fraction
+
 import pytest
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.scalar import less, sign, where
 from starhold.algebra.vector import add, apply, cross, dot, gyroscopic_torque, scale, subtract
 from starhold.certification.evidence.recorded import ASKED, FULL, Q4, V3
-from starhold.kernel.numbers import RefusedError
+from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import digest
 from starhold.parts.bodies.rigid_body import angular_acceleration, kinetic_energy
 from starhold.parts.craft import Craft
 from starhold.trace.straight_line import straight_line
-from tests.kernel.certificates import failing
+from tests.kernel.certificates import contents, failing
 from tests.kernel.oracle import Oracle
 from tests.tiers import fewer
 
@@ -186,6 +188,18 @@ def test_only_this_hypothesis_fails_and_the_claim_is_false(hypothesis):
     assert failing(claim, programs) == {hypothesis}
     oracle = [Oracle({"programs": programs}, claim, seed).holds() for seed in range(3)]
     assert not all(oracle)
+
+
+@pytest.mark.parametrize(
+    ("number", "factor", "hypothesis"), [("far.0", 10**5, "surface"), ("end.angle", 0.5, "angle"), ("end.rate", 0.5, "rate")]
+)
+def test_only_this_hypothesis_about_a_layer_fails_and_the_claim_is_false(number, factor, hypothesis):
+    content = contents("cubesat-slew", "sliding", 0)
+    (claim,) = content["claims"]
+    assert Oracle(content, claim).holds()
+    claim["numbers"][number] = str(rational(claim["numbers"][number]) * Fraction(factor))
+    assert failing(claim, content["programs"]) == {hypothesis}
+    assert not Oracle(content, claim).holds()
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 from starhold.kernel.check import check
 from starhold.kernel.numbers import WORK, Account, RefusedError, rational
 from starhold.kernel.programs import digest
-from tests.kernel.sets import ORIGIN, SETS, SQUARE, attempt, certificate, round_, switching, text
+from tests.kernel.sets import ORIGIN, SETS, SQUARE, attempt, certificate, round_, slanted, switching, text
 from tests.tiers import leading
 
 LEVELS = {
@@ -98,6 +98,18 @@ def test_what_a_theorem_needs_is_needed(name, change, said):
 def test_false_claims_have_no_evidence(theorem, rates, V, box, numbers, level):
     told = numbers if level is None else numbers | {"level": level}
     assert not certificate(attempt(theorem, rates, {"V": V}, box, told)).startswith("{")
+
+
+@pytest.mark.parametrize(("size", "level"), [(2, 2), (1, 1.49), (3, 2.9), (1, None)])
+def test_a_start_set_that_is_not_below_the_level_has_no_evidence(size, level):
+    functions = {"start": lambda x, y: size - round_(x, y), "V": slanted}
+    told = ORIGIN if level is None else ORIGIN | {"level": level}
+    assert not certificate(attempt("attracts", lambda x, y: (y, -x - y), functions, SQUARE, told)).startswith("{")
+
+
+def test_a_start_set_is_what_a_claim_speaks_of():
+    (proved,) = check(text("from a disc"))
+    assert "start in {start >= 0} of the box stay in {V < 2} of the box and come to the equilibrium" in proved.statement.text
 
 
 @pytest.mark.parametrize(
@@ -232,6 +244,8 @@ def false(content, rng, count=400):
             if here > 1e-9 and slope < -slack:
                 return True
         elif 1e-9 < here < level and slope > slack:
+            return True
+        if "start" in programs and "unsafe" not in programs and height(state, "start") >= 0 and here > level + 1e-9:
             return True
         if claim["theorem"] in ("attracts", "is stable"):
             x = rng.choice(moving)

@@ -3,8 +3,10 @@
 import json
 import random
 from fractions import Fraction
+from itertools import combinations
 
 import pytest
+from flint import fmpq, fmpq_mat
 
 from starhold.kernel.check import check
 from starhold.kernel.numbers import (
@@ -72,6 +74,27 @@ def test_definiteness_is_decided_exactly():
         definite([[ONE, ONE], [Fraction(0), ONE]])
     a = [[Fraction(2), ONE], [ONE, Fraction(3)]]
     assert times(a, inverse(a)) == scalar(1, 2)
+
+
+def test_definiteness_is_that_of_the_minors():
+    """Against FLINT's determinants, of semidefinite matrices too and of entries with long and unlike denominators."""
+    rng, found = random.Random(7), set()
+    for _ in range(300):
+        count, rank = rng.randint(1, 4), rng.randint(0, 4)
+        below = [1, 3, 2 ** rng.randint(0, 60), 10**17 + 3]
+        rows = [[Fraction(rng.randint(-3, 3), rng.choice(below)) for _ in range(count)] for _ in range(rank)]
+        a = [[sum((row[i] * row[k] for row in rows), Fraction(0)) for k in range(count)] for i in range(count)]
+        i, k = rng.randrange(count), rng.randrange(count)
+        a[i][k] = a[k][i] = a[i][k] + Fraction(rng.choice([0, 0, -1, 1]), 10 ** rng.randint(0, 9))
+        minors = {
+            places: fmpq_mat([[fmpq(a[r][c].numerator, a[r][c].denominator) for c in places] for r in places]).det()
+            for size in range(1, count + 1)
+            for places in combinations(range(count), size)
+        }
+        told = definite(a), definite(a, strictly=False)
+        assert told == (all(minors[tuple(range(n))] > 0 for n in range(1, count + 1)), all(x >= 0 for x in minors.values()))
+        found.add(told)
+    assert len(found) == 3
 
 
 def test_cosine_is_from_below():

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from itertools import product
-from math import prod
 from typing import Any, TypeAlias
 
-from .numbers import Account, demand, longest, rational, read_dict, up
+from .numbers import Account, added, demand, longest, rational, read_dict, up, whole
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -29,15 +28,21 @@ class Poly:
         return total((self, poly(other)))
 
     def __mul__(self, other: Poly | Fraction | int) -> Poly:
-        found: dict[Monomial, Fraction] = {}
         other = poly(other)
         bits = longest(self.terms.values()) + longest(other.terms.values())
         Account.spend(len(self.terms) * len(other.terms) + 1, bits)
-        for (m, c), (n, d) in product(self.terms.items(), other.terms.items()):
-            demand(len(m) + len(n) <= DEGREE, "a degree is too high")
+        highest = max(map(len, self.terms), default=0) + max(map(len, other.terms), default=0)
+        demand(highest <= DEGREE, "a degree is too high")
+        if len(other.terms) == 1:
+            ((n, d),) = other.terms.items()
+            return Poly({(tuple(sorted(m + n)) if n else m): c * d for m, c in self.terms.items()})
+        # In whole numbers, reduced once for each monomial.
+        (left, below), (right, under) = whole([*self.terms.values()]), whole([*other.terms.values()])
+        found = dict[Monomial, int]()
+        for (m, c), (n, d) in product(zip(self.terms, left, strict=True), zip(other.terms, right, strict=True)):
             both = tuple(sorted(m + n))
-            found[both] = found.get(both, Fraction(0)) + c * d
-        return Poly(found)
+            found[both] = found.get(both, 0) + c * d
+        return Poly({m: Fraction(c, below * under) for m, c in found.items()})
 
     def __neg__(self) -> Poly:
         Account.spend(len(self.terms))
@@ -107,12 +112,12 @@ def variables(letter: str, first: int = 1, last: int = 3) -> list[Poly]:
 
 def total(parts: Iterable[Poly]) -> Poly:
     """Return a sum."""
-    found: dict[Monomial, Fraction] = {}
+    found = dict[Monomial, list[Fraction]]()
     for part in parts:
         Account.spend(len(part.terms) + 1, longest(part.terms.values()))
         for m, c in part.terms.items():
-            found[m] = found.get(m, Fraction(0)) + c
-    return Poly(found)
+            found.setdefault(m, []).append(c)
+    return Poly({m: own[0] if len(own) == 1 else added(own) for m, own in found.items()})
 
 
 def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) -> Poly:
@@ -145,11 +150,18 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 
 def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     """Return a number that |p| does not exceed where no variable exceeds its size."""
-    found = Fraction(0)
+    ratios = {name: sizes[name].as_integer_ratio() for name in p.names}
+    found, places = 0, 64
     for m, c in p.terms.items():
-        Account.spend(len(m) + 1, longest([c, found]))
-        found += up(abs(c) * prod(sizes[name] for name in m))
-    return up(found)
+        upper, lower = abs(c.numerator), c.denominator
+        for name in m:
+            n, d = ratios[name]
+            upper, lower = upper * n, lower * d
+        Account.spend(len(m) + 1, upper.bit_length() + lower.bit_length())
+        finer = max(0, 64 + lower.bit_length() - upper.bit_length() - places)
+        places += finer
+        found = (found << finer) - ((-upper << places) // lower)
+    return up(Fraction(found, 1 << places))
 
 
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:

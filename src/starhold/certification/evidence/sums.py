@@ -58,10 +58,17 @@ class Block:
 
 class Guess:
     """The search for evidence of a sum. scales: about how large variables become; `basis`: of what squares are made beside
-    monomials; `pairs`: which products of two known polynomials are tried."""
+    monomials; `pairs`: which products of two known polynomials are tried; `curved`: without what is known of first degree.
+    """
 
     def __init__(
-        self, o: Sum, scales: Mapping[str, float], top: int, pairs: Iterable[tuple[int, int]], basis: Sequence[Poly] | None
+        self,
+        o: Sum,
+        scales: Mapping[str, float],
+        top: int,
+        pairs: Iterable[tuple[int, int]],
+        basis: Sequence[Poly] | None,
+        curved: bool = False,
     ) -> None:
         Account.left = 10**12
         self.o, self.basis = o, basis
@@ -77,7 +84,8 @@ class Guess:
         moving = {x for q in o.strict for x in q.names}
         moving |= {f"{f}.{x}" for f in ("sin", "cos") for x in moving}
         self.moving = moving if all(moving.intersection(m) for q in (o.p, *o.strict) for m in q.terms) else set[str]()
-        used = [k for k, q in enumerate(self.known) if degree(q) > (basis is not None) and degree(q) <= top]
+        least = 2 if curved or basis is not None else 1
+        used = [k for k, q in enumerate(self.known) if least <= degree(q) <= top]
         chosen = [(), *((k,) for k in used), *(p for p in pairs if p[0] in used and p[1] in used)]
         self.blocks = list[Block]()
         for places in chosen:
@@ -322,9 +330,12 @@ def find(
     few = [(a, b) for a, b in combinations(sides, 2) if o.known[a].names == o.known[b].names]
     few += [(0, 1)] if len(o.known) > 1 else []
     many = list(combinations(range(min(len(o.known), 12)), 2))
+    # Of many variables the box has many sides, which a set inside of it does not need; without them evidence is short.
+    small = len(o.p.names) < 4
     for more in degrees:
-        for pairs in (few, many) if more and len(o.p.names) < 4 else (few,):
-            guess = Guess(o, scales, least + more, pairs, basis)
+        ways = ((few, False), (many, False)) if more and small else ((few, False),) if small else ((few, True), (few, False))
+        for pairs, curved in ways:
+            guess = Guess(o, scales, least + more, pairs, basis, curved)
             x = guess.floats()
             if x is not None:
                 evidence = guess.exactly(x) if exact else {}

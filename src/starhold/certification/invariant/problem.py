@@ -16,7 +16,7 @@ from starhold.certification.certificate import Certificate
 from starhold.certification.evidence.finding import certificate as kernel_certificate
 from starhold.certification.invariant.system import TURNED, System, check_sizes, turned
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
-from starhold.certification.invariant.theorems import THEOREMS, Shown, WantedSet, a_state, indicator, show
+from starhold.certification.invariant.theorems import ATTRACTING, THEOREMS, Shown, WantedSet, a_state, indicator, show
 from starhold.errors import InputError
 from starhold.files import read_text
 
@@ -180,15 +180,18 @@ class _File:
         escape = self._polynomial(table["escape"], f"{key}.escape") if "escape" in table else None
         squares = self._polynomials(table.get("squares", []), f"{key}.squares")
         core = self._expression(table["core"], f"{key}.core") if "core" in table else None
-        if core is not None and theorem not in ("attracts", "region"):
+        if core is not None and theorem not in ATTRACTING:
             raise InputError(self.where, f"{key}.core", f'a core with theorem "{theorem}"', "theorem attracts or region")
         sets = dict[str, tuple[Any, ...]]()
-        for name in ("start", "unsafe"):
+        for name, others in (("start", ATTRACTING), ("unsafe", ())):
             if theorem == "avoids":
                 self._required(table, name, key)
-            elif name in table:
-                raise InputError(self.where, f"{key}.{name}", f'a set with theorem "{theorem}"', 'theorem = "avoids"')
+            elif name in table and theorem not in others:
+                allowed = ", ".join(("avoids", *others))
+                raise InputError(self.where, f"{key}.{name}", f'a set with theorem "{theorem}"', f"theorem {allowed}")
             sets[name] = self._polynomials(table.get(name, []), f"{key}.{name}")
+        if sets["start"] and theorem != "avoids" and "level" not in table:
+            raise InputError(self.where, f"{key}.level", "nothing", "a level of V that the start set is shown to be below")
         if theorem == "avoids" and at is not None:
             raise InputError(self.where, f"{key}.equilibrium", "a point", "a start and an unsafe set alone")
         numbers = {name: self._positive(table, name, key) for name in _NUMBERS}
@@ -202,8 +205,9 @@ class _File:
         if system.angles and wanted.theorem in ("unstable", "avoids"):
             found = f'"{wanted.theorem}" of a system with sin or cos'
             raise InputError(self.where, f"{key}.theorem", found, "another theorem")
-        if system.angles and wanted.core is not None:
-            raise InputError(self.where, f"{key}.core", "a core of a system with sin or cos", "V alone")
+        for name, given in (("core", wanted.core is not None), ("start", bool(wanted.start))):
+            if system.angles and given:
+                raise InputError(self.where, f"{key}.{name}", f"a {name} of a system with sin or cos", "V alone")
         if system.angles and wanted.equilibrium is None:
             raise InputError(self.where, f"{key}.equilibrium", "nothing", "an equilibrium, as the system has sin or cos")
         for x in system.angles:
@@ -214,7 +218,7 @@ class _File:
                 check_sizes(system, 0 if V is None else V)
         except ValueError as error:
             raise InputError(self.where, f"{key}.V", str(error), "fewer comparisons, or lower powers") from None
-        for name in ("start", "unsafe") if wanted.theorem == "avoids" else ():
+        for name in ("start", "unsafe") if wanted.theorem == "avoids" else ("start",) * bool(wanted.start):
             try:
                 a_state(system, wanted, getattr(wanted, name))
             except ValueError as error:

@@ -38,6 +38,8 @@ SQUARES, VERIFIED = "sums of squares", "exact inequality"
 KERNEL = {"stable": "is stable", "unstable": "is unstable", "avoids": "avoids"}
 """The kernel's theorems; the others are about what attracts."""
 THEOREMS = ("stable", "attracts", "region", "unstable", "intersection", "avoids")
+ATTRACTING = ("attracts", "region")
+"""The theorems that may be told a core, and a set that motions start from."""
 STEPS = {
     "positive": "positive", "border": "bounded", "changes": "falls", "agree": "switching", "continuous": "continuous",
     "never": "falls", "start": "start", "unsafe": "unsafe", "barrier": "barrier",
@@ -54,7 +56,7 @@ class WantedSet:
     variables and parameters; `equilibrium`: the point that M is, a number for every variable, else None, and M is {V <= 0};
     `level`: the level to be shown, None: the largest that is found; `escape`: a function that grows wherever V' = 0 outside
     of M; `squares`: functions that vanish on M, of whose multiples squares are made; `core`: in place of V an indicator of
-    M, which is shown to attract from a set that holds {V <= 0}; `start` and `unsafe`, for `avoids`: functions of which none
+    M, which is shown to attract from a set that holds {V <= 0}; `start` and, for `avoids`, `unsafe`: functions of which none
     is negative in these sets; `known`: the area (or volume) of the true region, if somebody knows it; `published`: the
     largest level that somebody has shown."""
 
@@ -119,8 +121,11 @@ def show(system: System, wanted: WantedSet) -> Shown:
         raise ValueError("a claim of avoidance has no equilibrium")
     if any(wanted.equilibrium[system.variables.index(x)] for x in system.angles if wanted.equilibrium):
         raise ValueError("an equilibrium at which an angle is not zero")
-    if wanted.core is not None and (system.angles or wanted.theorem not in ("attracts", "region")):
+    attracting = not system.angles and wanted.theorem in ATTRACTING
+    if wanted.core is not None and not attracting:
         raise ValueError("a core is only for claims of attraction, in a system without angles")
+    if wanted.start and wanted.theorem != "avoids" and (not attracting or wanted.level is None):
+        raise ValueError("a start set is only for avoidance, or attraction at a given level in a system without angles")
     return _Proof(wanted, candidate(system, wanted)).shown()
 
 
@@ -140,9 +145,12 @@ class _Proof:
         system = what.system
         self.programs = {"rates": program(system.rates, system.inputs)}
         self.states: dict[str, tuple[Any, ...]] = {}
-        for role in ("start", "unsafe") if wanted.theorem == "avoids" else ():
-            self.states[role] = a_state(system, wanted, getattr(wanted, role))
-            self.programs[role] = program([common(getattr(wanted, role))], system.inputs)
+        avoids = wanted.theorem == "avoids"
+        for role, functions in (("start", wanted.start), ("unsafe", wanted.unsafe)):
+            if avoids:
+                self.states[role] = a_state(system, wanted, functions)
+            if functions:
+                self.programs[role] = program([common(functions)], system.inputs)
         self.programs["V"] = program([what.V], system.inputs)
         if wanted.core is not None:
             self.programs["core"] = program([wanted.core], system.inputs)
@@ -151,7 +159,7 @@ class _Proof:
         if wanted.level is not None and not self.unstable:
             self.numbers["level"] = wanted.level
         self.witness: dict[str, Any] = {"name": wanted.name, "box": [list(side) for side in wanted.box]}
-        self.witness["equilibrium"] = wanted.equilibrium is not None
+        self.witness |= {"equilibrium": wanted.equilibrium is not None, "start": bool(wanted.start)}
 
     def shown(self) -> Shown:
         """Return the claim with its outcome."""
@@ -162,7 +170,8 @@ class _Proof:
                 self.numbers["level"] = float(Fraction(kernel["numbers"]["level"]))
             self.tell()
             return self.made(Obligation("proof", SQUARES, "proved"), kernel, "filippov" in statement.assumptions)
-        self.programs.pop("core", None)
+        for role in ("core", "start"):
+            self.programs.pop(role, None)
         for name, word, find in self.refutations():
             state = find()
             if state is not None:
@@ -243,7 +252,7 @@ class _Proof:
 
     def inner(self) -> dict[str, Any] | str:
         """Return the claim of the core alone, or why there is no evidence of it."""
-        alone = replace(self.wanted, V=self.wanted.core, core=None, level=None)
+        alone = replace(self.wanted, V=self.wanted.core, core=None, start=(), level=None)
         return _Proof(alone, candidate(self.what.system, alone)).proof()
 
     def avoided(self) -> dict[str, Any] | str:

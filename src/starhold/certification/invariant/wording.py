@@ -21,7 +21,7 @@ OBLIGATIONS = {
     "bounded": "V is above the level all over the border of the box, so that the set is compact and inside",
     "falls": "V is non-increasing on the set, and decreases except where a given function grows",
     "grows": "V grows wherever it is positive in the box",
-    "start": "V is not positive in the start set",
+    "start": "V is not positive in the start set, or is below the level there",
     "unsafe": "V is positive in the unsafe set",
     "barrier": "V' is at most V times a polynomial",
     "switching": "where the right-hand side jumps, V changes as it must for every mean there",
@@ -41,9 +41,9 @@ def sentence(claim: Claim) -> str:
         return f"{M} is unstable: every motion{sense} that starts in the box where V > 0 leaves the box"
     if theorem == "stable":
         return f"{M} is stable: no motion{sense} leaves {where}, nor any smaller level set"
-    if theorem == "attracts":
-        return f"{M} is asymptotically stable: all motions{sense} that start in {where} stay there and come to it"
-    return f"all motions{sense} that start in {where} stay there and come to {M}"
+    begin, stay = ("the start set", f"in {where}") if claim.witness["start"] else (where, "there")
+    text = f"all motions{sense} that start in {begin} stay {stay} and come to"
+    return f"{M} is asymptotically stable: {text} it" if theorem == "attracts" else f"{text} {M}"
 
 
 def size(numbers: Mapping[str, Any], orbit: float | None = None) -> str:

@@ -120,8 +120,11 @@ class Function:
 
     def where(self) -> str:
         """Write the set that motions start from."""
-        inside = "" if not self.system.box else " of the box"
-        return "everywhere" if self.level is None else f"{{{self.system.roles[self.place]} < {below(self.level)}}}{inside}"
+        return "everywhere" if self.level is None else self.inside(f"{self.system.roles[self.place]} < {below(self.level)}")
+
+    def inside(self, condition: str) -> str:
+        """Write the set of states of the box where a condition holds."""
+        return f"{{{condition}}}" + " of the box" * bool(self.system.box)
 
     def limit(self) -> str:
         """Write the set that motions come to."""
@@ -137,19 +140,24 @@ def stated(text: str, system: System) -> Statement:
 
 def attracts(claim: Claim) -> Proof:
     """All motions from {V < level} stay there and come to M, which is stable (Lyapunov, LaSalle). With a `core`, a function
-    with a level of its own that shows this of {core < core.level}, and with {V <= 0} inside of that, they come to its M."""
-    core = "core" in claim.programs
-    system = System(claim, *(["V", "core"] if core else ["V"]))
+    with a level of its own that shows this of {core < core.level}, and with {V <= 0} inside of that, they come to its M.
+    With a `start` it is said of the motions from {start >= 0}, which lies in {V < level}."""
+    start, core = "start" in claim.programs, "core" in claim.programs
+    system = System(claim, *["start"] * start, "V", *["core"] * core)
     yield from system.sound()
-    functions = [Function(system, 0, claim.numbers.get("level"))]
-    functions += [Function(system, 1, claim.numbers["core.level"])] if core else []
+    functions = [Function(system, int(start), claim.numbers.get("level"))]
+    functions += [Function(system, 1 + start, claim.numbers["core.level"])] if core else []
     for V in functions:
         yield from V.confined(V.level or 0)
         yield from V.changes()
     for i in system.cells if core else ():
-        outer, inner = system.all[i].V
+        *_, outer, inner = system.all[i].V
         yield f"inside {i}", system.sum(claim.numbers["core.level"] - inner, (i,), [-outer], [poly(1)])
-    return stated(f"all motions that start in {functions[0].where()} stay there and come to {functions[-1].limit()}", system)
+    for i in system.cells if start else ():
+        yield f"start {i}", system.sum(claim.numbers["level"] - functions[0].on(i), (i,), [system.all[i].V[0]], [poly(1)])
+    where = functions[0].where()
+    text = f"{functions[0].inside('start >= 0')} stay in {where}" if start else f"{where} stay there"
+    return stated(f"all motions that start in {text} and come to {functions[-1].limit()}", system)
 
 
 def stays(claim: Claim) -> Proof:
