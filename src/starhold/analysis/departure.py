@@ -204,10 +204,15 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     return found
 
 
-def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
-    """Return the law's measurement at a state as a flight begins; numbers may be columns (n,)."""
+def measured_at(loop: ClosedLoop, state: Any) -> Any:
+    """Return the measurement at a state as a flight begins, before the sign policy; numbers may be columns (n,)."""
     carry = loop.carry()._replace(state=state)
-    shown = make_step(loop.composition()).measure(carry, 0, 0, loop.craft, loop.setup())
+    return make_step(loop.composition()).measure(carry, 0, 0, loop.craft, loop.setup())
+
+
+def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
+    """Return what the law is given at a state as a flight begins; numbers may be columns (n,)."""
+    shown = measured_at(loop, state)
     error = np.array(shown.attitude)
     attitude: Any = tuple(fed_back(loop, np.atleast_2d(error.T)).T.reshape(error.shape))
     return shown._replace(attitude=attitude)

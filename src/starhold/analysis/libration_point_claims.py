@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.departure import LOST, Departure, Span
+from starhold.analysis.departure import LOST, Departure, Span, measured_at
 from starhold.analysis.trial import FLIGHTS, BrokenClaimError, Trial, falling
 from starhold.certification.assumptions import IN_THE_PLANE
 from starhold.certification.certificate import Certificate, Claim
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.bodies.libration_point import ROWS, PointMeasurement
+from starhold.parts.bodies.libration_point import ROWS
 from starhold.simulation.lane import Recording
 from starhold.trace.straight_line import evaluated
 
@@ -68,7 +68,8 @@ def value_of(
     programs: Mapping[str, Any], loop: ClosedLoop, position: NDArray[np.float64], velocity: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return V at many states, (3, n) each."""
-    measurement: Any = PointMeasurement(tuple(position), tuple(velocity), 0.0, math.inf)
+    bare = replace(loop, parts=())
+    measurement = measured_at(bare, bare.start._replace(position=tuple(position), velocity=tuple(velocity)))
     return np.asarray(evaluated(programs["lyapunov"], measurement=measurement, gains=loop.gains, craft=loop.known)[0])
 
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO
-from starhold.analysis.departure import shown_at, value_of
+from starhold.analysis.departure import measured_at, shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.evidence.claims import settles
 from starhold.certification.evidence.recorded import TURNS
-from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import ROWS, angular_acceleration
 from starhold.parts.craft import tensor
@@ -117,7 +116,8 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
 
     def s_of(states: Array) -> Array:
-        return np.array(evaluated(programs["surface"], measurement=_told(states), gains=loop.gains))
+        shown = measured_at(free, _states(free, states))
+        return np.array(evaluated(programs["surface"], measurement=shown, gains=loop.gains))
 
     K = s_of(_at_rest(np.vstack([np.zeros(3), np.eye(3)])))
     reach, layer = _switching(free, K)
@@ -228,13 +228,12 @@ def _spun(states: Array, rate: Array) -> Array:
 
 def _height(loop: ClosedLoop, programs: Any) -> Height:
     """Return V of states, whatever quaternion sign the law receives."""
-    return lambda states: value_of(programs, loop, _told(states))
+    return lambda states: value_of(programs, loop, measured_at(loop, _states(loop, states)))
 
 
-def _told(states: Array) -> Measurement:
-    """Return measurements at states about a target at rest."""
-    attitude, rate = (cast(Any, tuple(states[rows])) for rows in (ROWS.attitude, ROWS.rate))
-    return Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
+def _states(loop: ClosedLoop, states: Array) -> Any:
+    """Return the body's state of which each number is a column (n,)."""
+    return unflatten(list(states[: ROWS.torque.stop]), loop.start)
 
 
 def stable_period(loop: ClosedLoop) -> float | None:
@@ -258,9 +257,10 @@ def _slopes(loop: ClosedLoop, step: float) -> Array:
 
 def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
     """Return the law's torque after a small rotation (q) and at a rate, without wheels."""
-    told = Measurement((1.0, *turn), rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
+    bare = replace(loop, parts=(), events=())
+    shown = measured_at(bare, bare.start._replace(attitude=(1.0, *turn), rate=rate))
     memory = loop.law.remember(loop.gains, loop.known, loop.period)
-    return np.array(loop.law.command(told, loop.gains, loop.known, memory)[0])
+    return np.array(loop.law.command(shown, loop.gains, loop.known, memory)[0])
 
 
 def _beyond_floats(loop: ClosedLoop, certificate: Certificate) -> bool:
@@ -324,7 +324,7 @@ def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: n
 
 def _value(loop: ClosedLoop, programs: Any) -> Height:
     """Return V of the states as the law measures them."""
-    return lambda states: value_of(programs, loop, shown_at(loop, unflatten(list(states[: ROWS.torque.stop]), loop.start)))
+    return lambda states: value_of(programs, loop, shown_at(loop, _states(loop, states)))
 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
