@@ -31,12 +31,12 @@ def departures(certificate: Certificate, loop: ClosedLoop, run: Recording, unit:
     s."""
     span, at = Span(loop, run, unit=unit), run.attrs.get("diverged_at")
     common = [] if at is None else [Departure(at * unit, LOST)]
-    found: dict[str, tuple[Departure, ...]] = {}
+    by_kind: dict[str, tuple[Departure, ...]] = {}
     for claim in _proved(certificate):
         left = outside(certificate, claim, loop, run["position"].T, run["velocity"].T, SLACK)
         how = "it is outside the set" if len(left) and left[0] else "it leaves the set"
-        found[claim.kind] = tuple(sorted({*common, *span.unmet(claim), *span.first(left, how)}))
-    return found
+        by_kind[claim.kind] = tuple(sorted({*common, *span.unmet(claim), *span.first(left, how)}))
+    return by_kind
 
 
 def outside(

@@ -59,8 +59,8 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     bound, or towards a sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises
     BrokenClaimError."""
     proved = [(c, c.programs) for c in certificate.claims if c.outcome == "proved"]
-    found = [(c, programs) for c, programs in proved if programs.keys() & {"lyapunov", "surface"}]
-    claim, programs = next((one for one in found if _limited(one[0])), next(iter(found), (None, None)))
+    with_sets = [(c, programs) for c, programs in proved if programs.keys() & {"lyapunov", "surface"}]
+    claim, programs = next((one for one in with_sets if _limited(one[0])), next(iter(with_sets), (None, None)))
     if claim is None or programs is None:
         return None
     if "surface" in programs:
@@ -221,9 +221,9 @@ def _at_rest(attitude: Array) -> Array:
 
 def _spun(states: Array, rate: Array) -> Array:
     """Return states with another rate (3,), or one each (3, n)."""
-    found = states.copy()
-    found[ROWS.rate] = rate if rate.ndim > 1 else rate[:, None]
-    return found
+    spun = states.copy()
+    spun[ROWS.rate] = rate if rate.ndim > 1 else rate[:, None]
+    return spun
 
 
 def _height(loop: ClosedLoop, programs: Any) -> Height:
@@ -251,8 +251,8 @@ def _slopes(loop: ClosedLoop, step: float) -> Array:
     steps = [tuple(map(float, step * e)) for e in np.eye(3)]
     pairs = [(ZERO, x) for x in steps] + [(x, ZERO) for x in steps]
     negative = [tuple(tuple(-x for x in part) for part in pair) for pair in pairs]
-    found = [_torque(loop, *a) - _torque(loop, *cast(Any, b)) for a, b in zip(pairs, negative, strict=True)]
-    return np.array(found).T / (2.0 * step)
+    differences = [_torque(loop, *a) - _torque(loop, *cast(Any, b)) for a, b in zip(pairs, negative, strict=True)]
+    return np.array(differences).T / (2.0 * step)
 
 
 def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
@@ -314,10 +314,10 @@ def _frictionless(wheels: Wheels, bounded: bool) -> Wheels:
 
 def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator) -> Array:
     """Return rotor momenta (wheels, count) for a total momentum of any direction up to the one that is certified."""
-    told = certificate.subject["wheels"]
-    axes, shares, begun = (np.array(told[name]) for name in ("axes", "least", "momentum"))
+    wheels = certificate.subject["wheels"]
+    axes, shares, begun = (np.array(wheels[name]) for name in ("axes", "least", "momentum"))
     total = random.normal(size=(3, states.shape[1]))
-    total *= told["total_momentum"] * random.uniform(size=states.shape[1]) ** (1.0 / 3.0) / np.linalg.norm(total, axis=0)
+    total *= wheels["total_momentum"] * random.uniform(size=states.shape[1]) ** (1.0 / 3.0) / np.linalg.norm(total, axis=0)
     kept = begun + shares @ (begun @ axes)
     return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[ROWS.rate])
 
@@ -335,7 +335,7 @@ def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
         # A lost wheel is claimed to need zero, and does. Where there is no limit, nothing is claimed.
         limits = [np.array([np.inf if x is None else x for x in claim.numbers.get(name, [None])]) for name, _ in needs]
         shares = [
-            np.abs(found).max(axis=1) / np.maximum(most, 1e-300) for (_, found), most in zip(needs, limits, strict=True)
+            np.abs(sizes).max(axis=1) / np.maximum(most, 1e-300) for (_, sizes), most in zip(needs, limits, strict=True)
         ]
         return float(np.concatenate(shares).max())
     size = np.linalg.norm(torque, axis=0) if loop.limit == "norm" else np.abs(torque)
