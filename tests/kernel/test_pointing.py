@@ -203,7 +203,7 @@ def wide_entry(numbers, told):
 FALSE = {
     "turns from rest": lambda numbers, told: numbers.update({"angle": 1.5 * numbers["angle"]}),
     "V between samples": lambda numbers, told: numbers.update(highest=0.5 * numbers["level"]),
-    "V falls by a share": fast_fall,
+    "V decreases by a share": fast_fall,
     "level": low_level,
     "ellipsoid": small_ellipsoid,
     "entry": wide_entry,

@@ -107,14 +107,14 @@ def test_each_number_is_needed():
 @pytest.mark.parametrize(
     ("name", "key", "value", "match"),
     [
-        ("circle", "gains.k", "-1", "V decreases"),
+        ("circle", "gains.k", "-1", "V does not increase"),
         ("circle", "gains.alpha", "-1", "V is"),
         ("circle", "gains.rate", "0", "run through"),
         ("circle", "gains.k_x", "44/5", "x returns"),
         ("circle", "gains.k_velocity", "0", "x returns"),
-        ("circle", "plant.stiffness", "4", "V decreases|x is"),
-        ("circle", "craft.rate", "2", "V decreases|x is"),
-        ("layer", "gains.boundary_layer", "0", "V decreases"),
+        ("circle", "plant.stiffness", "4", "V does not increase|x is"),
+        ("circle", "craft.rate", "2", "V does not increase|x is"),
+        ("layer", "gains.boundary_layer", "0", "V does not increase"),
         ("rest", "gains.k_x", "8", "returns"),
         ("rest", "gains.k_velocity.1", "0", "returns"),
         ("limited axis", "gains.k_x", "20", "turns motions round"),
