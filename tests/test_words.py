@@ -12,14 +12,11 @@ FRAGMENT = re.compile(r"(What|The same|Of)\b")
 
 BARE = {"told", "found", "own", "held", "asked"}
 """Names that hide whether a value is a measurement, a bound, a command or a result."""
-OPEN = {"departure.py", "trial.py", "libration_point_claims.py"}
-"""Files of `analysis` about claims, which follow the certifier's names."""
 CLEAN = (
     *("algebra", "trace", "parts", "laws", "synthesis", "loop", "simulation", "conformance", "publications"),
-    *("campaign", "report", "studies", "scenario/bodies", "cli", "studio", "export"),
+    *("campaign", "report", "studies", "scenario/bodies", "cli", "studio", "export", "link", "analysis"),
     *("files.py", "errors.py", "api.py"),
     *(str(path.relative_to(SOURCE)) for path in sorted((SOURCE / "scenario").glob("*.py"))),
-    *(str(path.relative_to(SOURCE)) for path in sorted((SOURCE / "analysis").glob("*.py")) if path.name not in OPEN),
 )
 """Packages and files without such names."""
 

@@ -325,7 +325,7 @@ def test_the_quaternion_that_is_fed_back_is_that_of_the_loop(cosines, width):
 
 @pytest.mark.slow
 def test_the_set_of_a_claim_is_that_of_the_program_in_its_proof():
-    """Of a law whose V falls with a mixed term alone, and of one that is told by its root."""
+    """Of a law whose V decreases with a mixed term alone, and of one that is told by its root."""
     craft = BASE.replace("gravity_gradient = true", "gravity_gradient = false")
     mixed = '[[law]]\ntype = "lqr"\nform = "II"\nq = [1, 1, 1, 1, 2, 3]\nr = [1e3, 1e3, 1e3]\n'
     for law, kind in ((mixed, "torque-limit"), ('[[law]]\ntype = "modal"\nform = "equal"\na = -0.428\n', "region")):

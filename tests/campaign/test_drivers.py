@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import optimize, special, stats
 
-from starhold.campaign.drivers import find_drivers, independent_causes
+from starhold.campaign.drivers import Column, find_drivers, independent_causes
 from tests.tiers import leading
 
 N = 2000
@@ -151,6 +151,12 @@ def test_inputs_drawn_together_are_marked(rng):
     drivers = find_drivers(inputs, inputs["x1"] > 0.9, {})
     marked = {frozenset(pair.inputs) for pair in drivers.pairs if pair.drawn_together}
     assert marked == {frozenset({"x1", "y"})}
+
+
+def test_rare_words_are_numbered_together_once_they_are_common_enough():
+    for rare, labels in ((1, ["x is a", "x is another"]), (6, ["x is a", "x is b", "x is another"])):
+        words = np.repeat([*"abcdefgh"][: 2 + rare], [60, 40, *[2] * rare])
+        assert Column("x", words).words_grid(0.1)[1] == labels
 
 
 def test_constant_inputs_are_skipped(rng):

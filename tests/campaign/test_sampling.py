@@ -99,6 +99,7 @@ def test_trajectories_of_morris_change_one_uniform_at_a_time():
     steps = np.diff(levels, axis=1)
     assert (np.count_nonzero(steps, axis=2) == 1).all()
     assert (np.count_nonzero(steps, axis=1) == 1).all()
+    assert PLANS["morris"].points() == pytest.approx((levels.reshape(-1, DIMS) * LEVELS - 0.5) / (LEVELS - 1))
 
 
 def test_the_design_of_saltelli_finds_known_indices():

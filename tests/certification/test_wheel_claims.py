@@ -73,7 +73,7 @@ def unstable(gains, craft, axis):
 
 @given(some.lists(weight, min_size=3, max_size=3, unique=True), some.floats(0.05, 2.0))
 def test_three_half_turns_where_weights_differ_and_each_is_unstable(k, damping):
-    """S = 0 leaves, beside the target, half turns about the three axes: V falls from them in 1, 2 or 3 directions."""
+    """S = 0 leaves, beside the target, half turns about the three axes: V decreases from them in 1, 2 or 3 directions."""
     k = [k[0], k[0] + k[1], k[0] + k[1] + k[2]]
     gains = wheel.Gains(damping, tuple(k))
     found = [unstable(gains, FULL, axis) for axis in np.eye(3)]

@@ -202,6 +202,14 @@ def test_only_this_hypothesis_about_a_layer_fails_and_the_claim_is_false(number,
     assert not Oracle(content, claim).holds()
 
 
+def test_a_law_that_cancels_what_wheels_store_is_not_taken_to_slide():
+    def cancelling(m):
+        return add(sliding(0.1)(m), cross(m.body_rate, m.wheel_momentum))
+
+    with pytest.raises(RefusedError, match="no law of this kind is taken with wheels"):
+        failing(*case(cancelling, theorem=REACHES, s=surface(0.1), taken=["wheels"]))
+
+
 @pytest.mark.slow
 def test_a_law_that_clips_falls_in_every_case():
     for beyond, failed in ((0.0, set()), (0.5, set()), (-2.0, {"V is non-increasing"})):

@@ -67,7 +67,7 @@ def test_sets_are_no_smaller_than_those_shown_by_boxes(a, b, sign_policy, level)
 def test_the_set_is_nearly_the_largest():
     """A little beyond its level there are states at which V rises; within it there is none on a grid."""
     _, claim, loop = shown(loop_of())
-    asked = obligations(claim, loop.by_digest)[0]["V falls"]
+    asked = obligations(claim, loop.by_digest)[0]["V decreases"]
     u, x, v = np.meshgrid(np.linspace(0.0, 1.9, 80)[1:], np.linspace(-1.0, 1.0, 60), np.linspace(0.0, 4.0, 80))
     at = {"u": u, "v": v, "t": x * np.sqrt(u * (2.0 - u))}
     room, fall = valued(asked.known[0], at), valued(asked.p, at)
@@ -119,7 +119,7 @@ def test_other_spectra_are_left_alone_and_say_so(lines):
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
-        ({"level": "19/10"}, "V falls: a sum of squares is another one"),
+        ({"level": "19/10"}, "V decreases: a sum of squares is another one"),
         ({"angle": "6"}, "turns from rest"),
         ({"rate": "2"}, "rates on target"),
     ],
@@ -133,7 +133,7 @@ def test_larger_numbers_are_refused(changed, why):
 
 def test_other_gains_and_inertias_are_refused():
     for change, why in (
-        (lambda claim: claim["subject"].update({"gains.b": "-1/100"}), "V falls"),
+        (lambda claim: claim["subject"].update({"gains.b": "-1/100"}), "V decreases"),
         (lambda claim: claim["subject"].update({"gains.phi_0.0": "-1/2"}), "V' turned about axis"),
         (lambda claim: claim["subject"].update({"body.inertia.0.0": "9000"}), "V' turned|more than the state"),
     ):

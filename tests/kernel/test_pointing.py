@@ -145,6 +145,8 @@ def test_a_form_is_nowhere_above_its_polynomial(least):
             form = sum(M[i][k] * x[a] * x[b] for i, a in enumerate(STATE) for k, b in enumerate(STATE))
             assert form <= p.at(x).number
             assert abs(p.at(x).number) <= most(p, sizes)
+    # An even power of q0 is least within an interval about zero.
+    assert least_form(Poly({("q0", "q0", "w1", "w1"): Fraction(1)}), Region([], sizes, low))[0][0] <= max(low, 0) ** 2
 
 
 SLOWER = [("1/2", "1", "3", "2"), ("1/100", "0", "1", "1/50"), ("1", "1", "9", "2")]
@@ -201,7 +203,7 @@ def wide_entry(numbers, told):
 FALSE = {
     "turns from rest": lambda numbers, told: numbers.update({"angle": 1.5 * numbers["angle"]}),
     "V between samples": lambda numbers, told: numbers.update(highest=0.5 * numbers["level"]),
-    "V falls by a share": fast_fall,
+    "V decreases by a share": fast_fall,
     "level": low_level,
     "ellipsoid": small_ellipsoid,
     "entry": wide_entry,

@@ -337,7 +337,7 @@ def test_what_else_is_asked_has_its_table(served: Served) -> None:
         return served.ask("GET", f"/results/{job['number']}/{ended['shown']}")[1]
 
     page = shown("failures", "wheels-orbital")
-    assert "<th>authority (N m)</th>" in page
+    assert "authority<small>N m</small></th>" in page
     assert "data:image/png" in page
     assert "failures.csv" in page
     assert "root sum square" in shown("budget", "cubesat-nadir")

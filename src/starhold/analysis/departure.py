@@ -74,16 +74,16 @@ class Span:
         """Return which values have reached their limits."""
         return values >= limits * ALMOST
 
-    def first(self, held: Any, how: str) -> list[Departure]:
+    def first(self, where: Any, how: str) -> list[Departure]:
         """Return a departure at the first sample at which a condition (n,) holds; a single boolean is about the first
         sample."""
-        places = np.flatnonzero(held)
+        places = np.flatnonzero(where)
         return [Departure(float(self["time"][places[0]]) * self.unit, how)] if len(places) else []
 
     def unmet(self, claim: Claim) -> list[Departure]:
         """Return a departure for every assumption of a claim that the flight does not meet."""
-        told = (found for name in claim.assumptions if (found := assumption(name).unmet) is not None)
-        return [one for unmet in told for held, how in unmet(self) for one in self.first(held, how)]
+        tests = (unmet for name in claim.assumptions if (unmet := assumption(name).unmet) is not None)
+        return [one for unmet in tests for where, how in unmet(self) for one in self.first(where, how)]
 
 
 def departures(
@@ -102,21 +102,21 @@ def departures(
     common = [] if span.changes is None else [Departure(span.changes, change)]
     if not len(span["time"]):
         return {claim.kind: tuple(common) for claim in _left(certificate) if common}
-    held = {"refuted": "so long that even the linear loop is unstable", "proved": ""}
+    reasons = {"refuted": "so long that even the linear loop is unstable", "proved": ""}
     sampled = certificate.claim("sampling")
-    why = held.get("" if sampled is None else sampled.outcome, "for which stability is not proved")
+    why = reasons.get("" if sampled is None else sampled.outcome, "for which stability is not proved")
     held_too_long = span.first(bool(why), f"the torque is held for {loop.period:g} s, {why}")
     # Proofs about held torque are about the linear loop at rest, without stored momentum.
     most = _turn_that_counts(loop, sampled)
     held_too_long += span.first(_turned(span) >= most, TURNED.format(most))
     if run.attrs.get("diverged_at") is not None:
         common.append(Departure(run.attrs["diverged_at"], LOST))
-    found: dict[str, tuple[Departure, ...]] = {}
+    by_kind: dict[str, tuple[Departure, ...]] = {}
     for claim in _left(certificate):
         programs = claim.programs
-        own = [] if "held-torque" in claim.assumptions else held_too_long
-        found[claim.kind] = tuple(sorted({*common, *own, *span.unmet(claim), *_set(claim, programs, span)}))
-    return found
+        paced = [] if "held-torque" in claim.assumptions else held_too_long
+        by_kind[claim.kind] = tuple(sorted({*common, *paced, *span.unmet(claim), *_set(claim, programs, span)}))
+    return by_kind
 
 
 def _turned(span: Span) -> Array:
@@ -146,21 +146,21 @@ def _left(certificate: Certificate) -> list[Claim]:
 
 def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
     """Return whether a flight starts outside the claim's set, and when it leaves the set."""
-    found = [*_away(claim, span), *_misled(claim, span)]
+    left = [*_away(claim, span), *_misled(claim, span)]
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
-        found += span.first(total > momentum * (1.0 + 1e-9), "the total momentum exceeds the stated bound")
+        left += span.first(total > momentum * (1.0 + 1e-9), "the total momentum exceeds the stated bound")
     # V is at most `start` at the start, and `level` from then on; None for no bound.
     start = claim.numbers.get("start")
     level = claim.numbers.get("level", start)
     value = None if start is None or level is None else value_of(programs, span.loop, span.shown)
     if value is None:
-        return found
+        return left
     if value[0] > start:
-        return [*found, *span.first(True, "it is outside the set")]
+        return [*left, *span.first(True, "it is outside the set")]
     # The integration lets V of a motion along the border rise by its own error.
-    return [*found, *span.first(value > cast(float, level) * (1.0 + 1e-6), "it leaves the set")]
+    return [*left, *span.first(value > cast(float, level) * (1.0 + 1e-6), "it leaves the set")]
 
 
 def _away(claim: Claim, span: Span) -> list[Departure]:
@@ -178,13 +178,13 @@ def _misled(claim: Claim, span: Span) -> list[Departure]:
     settles."""
     if not claim.numbers.get("share"):
         return []
-    found = list[Departure]()
+    misled = list[Departure]()
     for name in (fitted.called.replace("-", "_") for fitted in span.loop.used("estimator")):
         turned: Any = relative(tuple(span["attitude"].T), tuple(span[f"{name}_attitude"].T))
         off = np.linalg.norm(span[f"{name}_rate"] - span["rate"], axis=1)
         far = error_angle(np.transpose(turned)) > claim.numbers["attitude_error"]
-        found += span.first(far | (off > claim.numbers["rate_error"]), "the estimation error exceeds the stated bound")
-    return found
+        misled += span.first(far | (off > claim.numbers["rate_error"]), "the estimation error exceeds the stated bound")
+    return misled
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
@@ -192,22 +192,27 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     if loop.remembers:
         return {}
     # The true start, not as measured.
-    loop, found = loop.without("sensor", "estimator"), dict[str, bool]()
+    loop, inside = loop.without("sensor", "estimator"), dict[str, bool]()
     shown = shown_at(loop, loop.start)
     momentum = momentum_of(loop, shown)
     for claim in _left(certificate):
         value = value_of(claim.programs, loop, shown)
         if value is not None and "start" in claim.numbers:
             level = claim.numbers["start"]
-            inside = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
-            found[claim.kind] = bool(inside)
-    return found
+            within = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
+            inside[claim.kind] = bool(within)
+    return inside
+
+
+def measured_at(loop: ClosedLoop, state: Any) -> Any:
+    """Return the measurement at a state as a flight begins, before the sign policy; numbers may be columns (n,)."""
+    carry = loop.carry()._replace(state=state)
+    return make_step(loop.composition()).measure(carry, 0, 0, loop.craft, loop.setup())
 
 
 def shown_at(loop: ClosedLoop, state: Any) -> Measurement:
-    """Return the law's measurement at a state as a flight begins; numbers may be columns (n,)."""
-    carry = loop.carry()._replace(state=state)
-    shown = make_step(loop.composition()).measure(carry, 0, 0, loop.craft, loop.setup())
+    """Return what the law is given at a state as a flight begins; numbers may be columns (n,)."""
+    shown = measured_at(loop, state)
     error = np.array(shown.attitude)
     attitude: Any = tuple(fed_back(loop, np.atleast_2d(error.T)).T.reshape(error.shape))
     return shown._replace(attitude=attitude)

@@ -32,7 +32,7 @@ class CircleGoal(NamedTuple):
         return (0.0, y, z), (0.0, -self.rate * z, self.rate * y)
 
     def distance(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far away each position (n, 3) is."""
+        """Return the distance of each position (n, 3) from the goal."""
         return np.hypot(np.hypot(position[:, 1], position[:, 2]) - self.radius, position[:, 0])
 
 
@@ -46,7 +46,7 @@ class EquilibriumGoal(NamedTuple):
         return self.place, ZERO
 
     def distance(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far away each position (n, 3) is."""
+        """Return the distance of each position (n, 3) from the goal."""
         return np.linalg.norm(position - np.array(self.place), axis=1)
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.analysis.departure import LOST, Departure, Span
+from starhold.analysis.departure import LOST, Departure, Span, measured_at
 from starhold.analysis.trial import FLIGHTS, BrokenClaimError, Trial, falling
 from starhold.certification.assumptions import IN_THE_PLANE
 from starhold.certification.certificate import Certificate, Claim
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.bodies.libration_point import ROWS, PointMeasurement
+from starhold.parts.bodies.libration_point import ROWS
 from starhold.simulation.lane import Recording
 from starhold.trace.straight_line import evaluated
 
@@ -31,12 +31,12 @@ def departures(certificate: Certificate, loop: ClosedLoop, run: Recording, unit:
     s."""
     span, at = Span(loop, run, unit=unit), run.attrs.get("diverged_at")
     common = [] if at is None else [Departure(at * unit, LOST)]
-    found: dict[str, tuple[Departure, ...]] = {}
+    by_kind: dict[str, tuple[Departure, ...]] = {}
     for claim in _proved(certificate):
         left = outside(certificate, claim, loop, run["position"].T, run["velocity"].T, SLACK)
         how = "it is outside the set" if len(left) and left[0] else "it leaves the set"
-        found[claim.kind] = tuple(sorted({*common, *span.unmet(claim), *span.first(left, how)}))
-    return found
+        by_kind[claim.kind] = tuple(sorted({*common, *span.unmet(claim), *span.first(left, how)}))
+    return by_kind
 
 
 def outside(
@@ -68,7 +68,8 @@ def value_of(
     programs: Mapping[str, Any], loop: ClosedLoop, position: NDArray[np.float64], velocity: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return V at many states, (3, n) each."""
-    measurement: Any = PointMeasurement(tuple(position), tuple(velocity), 0.0, math.inf)
+    bare = replace(loop, parts=())
+    measurement = measured_at(bare, bare.start._replace(position=tuple(position), velocity=tuple(velocity)))
     return np.asarray(evaluated(programs["lyapunov"], measurement=measurement, gains=loop.gains, craft=loop.known)[0])
 
 

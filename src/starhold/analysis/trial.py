@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import ZERO
-from starhold.analysis.departure import shown_at, value_of
+from starhold.analysis.departure import measured_at, shown_at, value_of
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.evidence.claims import settles
 from starhold.certification.evidence.recorded import TURNS
-from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import ROWS, angular_acceleration
 from starhold.parts.craft import tensor
@@ -60,8 +59,8 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     bound, or towards a sliding surface. None where none of these is proved, or floats cannot fly the loop. Raises
     BrokenClaimError."""
     proved = [(c, c.programs) for c in certificate.claims if c.outcome == "proved"]
-    found = [(c, programs) for c, programs in proved if programs.keys() & {"lyapunov", "surface"}]
-    claim, programs = next((one for one in found if _limited(one[0])), next(iter(found), (None, None)))
+    with_sets = [(c, programs) for c, programs in proved if programs.keys() & {"lyapunov", "surface"}]
+    claim, programs = next((one for one in with_sets if _limited(one[0])), next(iter(with_sets), (None, None)))
     if claim is None or programs is None:
         return None
     if "surface" in programs:
@@ -117,7 +116,8 @@ def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, fl
     free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
 
     def s_of(states: Array) -> Array:
-        return np.array(evaluated(programs["surface"], measurement=_told(states), gains=loop.gains))
+        shown = measured_at(free, _states(free, states))
+        return np.array(evaluated(programs["surface"], measurement=shown, gains=loop.gains))
 
     K = s_of(_at_rest(np.vstack([np.zeros(3), np.eye(3)])))
     reach, layer = _switching(free, K)
@@ -221,20 +221,19 @@ def _at_rest(attitude: Array) -> Array:
 
 def _spun(states: Array, rate: Array) -> Array:
     """Return states with another rate (3,), or one each (3, n)."""
-    found = states.copy()
-    found[ROWS.rate] = rate if rate.ndim > 1 else rate[:, None]
-    return found
+    spun = states.copy()
+    spun[ROWS.rate] = rate if rate.ndim > 1 else rate[:, None]
+    return spun
 
 
 def _height(loop: ClosedLoop, programs: Any) -> Height:
     """Return V of states, whatever quaternion sign the law receives."""
-    return lambda states: value_of(programs, loop, _told(states))
+    return lambda states: value_of(programs, loop, measured_at(loop, _states(loop, states)))
 
 
-def _told(states: Array) -> Measurement:
-    """Return measurements at states about a target at rest."""
-    attitude, rate = (cast(Any, tuple(states[rows])) for rows in (ROWS.attitude, ROWS.rate))
-    return Measurement(attitude, rate, rate, ZERO, ZERO, ZERO, ZERO, 0.0)
+def _states(loop: ClosedLoop, states: Array) -> Any:
+    """Return the body's state of which each number is a column (n,)."""
+    return unflatten(list(states[: ROWS.torque.stop]), loop.start)
 
 
 def stable_period(loop: ClosedLoop) -> float | None:
@@ -252,15 +251,16 @@ def _slopes(loop: ClosedLoop, step: float) -> Array:
     steps = [tuple(map(float, step * e)) for e in np.eye(3)]
     pairs = [(ZERO, x) for x in steps] + [(x, ZERO) for x in steps]
     negative = [tuple(tuple(-x for x in part) for part in pair) for pair in pairs]
-    found = [_torque(loop, *a) - _torque(loop, *cast(Any, b)) for a, b in zip(pairs, negative, strict=True)]
-    return np.array(found).T / (2.0 * step)
+    differences = [_torque(loop, *a) - _torque(loop, *cast(Any, b)) for a, b in zip(pairs, negative, strict=True)]
+    return np.array(differences).T / (2.0 * step)
 
 
 def _torque(loop: ClosedLoop, turn: Any, rate: Any) -> Array:
     """Return the law's torque after a small rotation (q) and at a rate, without wheels."""
-    told = Measurement((1.0, *turn), rate, rate, ZERO, ZERO, ZERO, ZERO, loop.period)
+    bare = replace(loop, parts=(), events=())
+    shown = measured_at(bare, bare.start._replace(attitude=(1.0, *turn), rate=rate))
     memory = loop.law.remember(loop.gains, loop.known, loop.period)
-    return np.array(loop.law.command(told, loop.gains, loop.known, memory)[0])
+    return np.array(loop.law.command(shown, loop.gains, loop.known, memory)[0])
 
 
 def _beyond_floats(loop: ClosedLoop, certificate: Certificate) -> bool:
@@ -314,17 +314,17 @@ def _frictionless(wheels: Wheels, bounded: bool) -> Wheels:
 
 def _rotors(loop: ClosedLoop, certificate: Certificate, states: Array, random: np.random.Generator) -> Array:
     """Return rotor momenta (wheels, count) for a total momentum of any direction up to the one that is certified."""
-    told = certificate.subject["wheels"]
-    axes, shares, begun = (np.array(told[name]) for name in ("axes", "least", "momentum"))
+    wheels = certificate.subject["wheels"]
+    axes, shares, begun = (np.array(wheels[name]) for name in ("axes", "least", "momentum"))
     total = random.normal(size=(3, states.shape[1]))
-    total *= told["total_momentum"] * random.uniform(size=states.shape[1]) ** (1.0 / 3.0) / np.linalg.norm(total, axis=0)
+    total *= wheels["total_momentum"] * random.uniform(size=states.shape[1]) ** (1.0 / 3.0) / np.linalg.norm(total, axis=0)
     kept = begun + shares @ (begun @ axes)
     return kept[:, None] - shares @ (total - tensor(loop.craft.inertia) @ states[ROWS.rate])
 
 
 def _value(loop: ClosedLoop, programs: Any) -> Height:
     """Return V of the states as the law measures them."""
-    return lambda states: value_of(programs, loop, shown_at(loop, unflatten(list(states[: ROWS.torque.stop]), loop.start)))
+    return lambda states: value_of(programs, loop, shown_at(loop, _states(loop, states)))
 
 
 def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
@@ -335,7 +335,7 @@ def _need(states: Array, loop: ClosedLoop, claim: Claim) -> float:
         # A lost wheel is claimed to need zero, and does. Where there is no limit, nothing is claimed.
         limits = [np.array([np.inf if x is None else x for x in claim.numbers.get(name, [None])]) for name, _ in needs]
         shares = [
-            np.abs(found).max(axis=1) / np.maximum(most, 1e-300) for (_, found), most in zip(needs, limits, strict=True)
+            np.abs(sizes).max(axis=1) / np.maximum(most, 1e-300) for (_, sizes), most in zip(needs, limits, strict=True)
         ]
         return float(np.concatenate(shares).max())
     size = np.linalg.norm(torque, axis=0) if loop.limit == "norm" else np.abs(torque)

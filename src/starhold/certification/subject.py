@@ -135,7 +135,7 @@ def followed(loop: ClosedLoop) -> Knots | None:
 
 
 def described_gains(law: Law, gains: Any) -> dict[str, Any]:
-    """A law's gains by name, choices by theirs."""
+    """Return a law's gains by name; a choice is given by its own name."""
     found: dict[str, Any] = {}
     for item, value in zip(law.fields(), gains, strict=True):
         found[item.name] = item.gain.choices[value] if item.gain.choices else _plain(value)

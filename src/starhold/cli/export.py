@@ -61,12 +61,8 @@ def aem(
     force: Force = False,
 ) -> None:
     """Write the attitudes of a run as a CCSDS attitude ephemeris message."""
-    from starhold.api import export_aem
-    from starhold.cli.console import console
-
-    _refuse_present(output, force)
-    words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
-    console.print(f"{export_aem(run, output, version=version, **words)}", soft_wrap=True)  # type: ignore
+    words = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
+    _write("export_aem", run, output, force, version=version, **words)
 
 
 @app.command()
@@ -81,12 +77,8 @@ def oem(
     force: Force = False,
 ) -> None:
     """Write the orbit of a run as a CCSDS orbit ephemeris message."""
-    from starhold.api import export_oem
-    from starhold.cli.console import console
-
-    _refuse_present(output, force)
-    words: dict[str, Any] = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
-    console.print(f"{export_oem(run, output, center=center, **words)}", soft_wrap=True)
+    words = {"epoch": epoch, "object_name": object_name, "object_id": object_id, "frame": frame}
+    _write("export_oem", run, output, force, center=center, **words)
 
 
 @app.command()
@@ -109,6 +101,15 @@ def link(
     console.print(f"{output}", soft_wrap=True)
 
 
+def _write(function: str, given: Path, output: Path, force: bool, **words: Any) -> None:
+    """Write a file by a function of the Python interface, and print what it returns."""
+    from starhold import api
+    from starhold.cli.console import console
+
+    _refuse_present(output, force)
+    console.print(f"{getattr(api, function)(given, output, **words)}", soft_wrap=True)
+
+
 def _refuse_present(output: Path, force: bool) -> None:
     from starhold.errors import InputError
 
@@ -126,11 +127,7 @@ def requirements(
     force: Force = False,
 ) -> None:
     """Write the requirements of a scenario for other tools: CSV or ReqIF."""
-    from starhold.api import export_requirements
-    from starhold.cli.console import console
-
-    _refuse_present(output, force)
-    console.print(f"{export_requirements(file, output, original)}", soft_wrap=True)
+    _write("export_requirements", file, output, force, original=original)
 
 
 def print_exported(exported: Exported, folder: Path) -> None:

@@ -38,7 +38,7 @@ class Type(NamedTuple):
     text: str = ""
 
     def braced(self, parts: list[str]) -> str:
-        """Return what sets a variable to these values of its members."""
+        """Return the C initialiser that gives the members of a variable these values."""
         pairs = zip(self.members, parts, strict=True)
         # A literal needs its type nowhere but where it stands alone.
         texts = [text.removeprefix(f"({member.type.name})") for member, text in pairs]

@@ -29,8 +29,8 @@ EVERY = 100
 class LostLawError(CutShortError):
     """A law's process failed. flight: what was flown until then."""
 
-    def __init__(self, flight: Stepper, found: str, allowed: str) -> None:
-        super().__init__("run", "--law-process", found, allowed)
+    def __init__(self, flight: Stepper, failure: str, allowed: str) -> None:
+        super().__init__("run", "--law-process", failure, allowed)
         self.flight = flight
 
 

@@ -139,35 +139,35 @@ class Decoder:
             self._held.clear()
 
     def _frames(self) -> Iterator[Message | Fault]:
-        held = self._held
-        while held:
-            begin = held.find(MAGIC)
+        buffer = self._held
+        while buffer:
+            begin = buffer.find(MAGIC)
             if begin < 0:
                 # The beginning of a frame may still be cut.
-                begin = next(len(held) - n for n in range(len(MAGIC) - 1, -1, -1) if held.endswith(MAGIC[:n]))
+                begin = next(len(buffer) - n for n in range(len(MAGIC) - 1, -1, -1) if buffer.endswith(MAGIC[:n]))
             if begin > 0:
-                del held[:begin]
+                del buffer[:begin]
                 if not self._skipping:
                     yield Fault.MALFORMED
-            if len(held) >= len(MAGIC):
+            if len(buffer) >= len(MAGIC):
                 self._skipping = False
             elif begin > 0:
                 self._skipping = True
-            if len(held) < HEAD.size:
+            if len(buffer) < HEAD.size:
                 return
-            _, version, number, zero, size, step = HEAD.unpack_from(held)
+            _, version, number, zero, size, step = HEAD.unpack_from(buffer)
             end = HEAD.size + size
             fits = version == VERSION and zero == 0 and (size <= LINE if self.by_plant else size in _sizes(number))
-            if fits and len(held) < end + TAIL.size:
+            if fits and len(buffer) < end + TAIL.size:
                 return
-            if not fits or TAIL.unpack_from(held, end)[0] != zlib.crc32(held[:end]):
+            if not fits or TAIL.unpack_from(buffer, end)[0] != zlib.crc32(buffer[:end]):
                 # The next frame may begin within what was taken for one.
-                del held[:1]
+                del buffer[:1]
                 self._skipping = True
                 yield Fault.MALFORMED if version == VERSION or zero != 0 else Fault.VERSION
                 continue
-            payload = bytes(held[HEAD.size : end])
-            del held[: end + TAIL.size]
+            payload = bytes(buffer[HEAD.size : end])
+            del buffer[: end + TAIL.size]
             yield self._checked(_of_payload(number, step, payload))
 
     def _checked(self, message: Message | Fault) -> Message | Fault:

@@ -51,7 +51,7 @@ def limit(unit: str) -> Parameter:
 
 
 def is_given(*numbers: Any) -> bool:
-    """Whether one of these is not zero; a recorded number stands for those that runs draw, which are not."""
+    """Whether any of these is nonzero; a number that is being recorded counts as nonzero, because runs may draw it."""
     return any(not isinstance(number, float | int) or number for number in leaves(numbers))
 
 

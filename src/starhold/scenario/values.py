@@ -62,7 +62,7 @@ class Place:
 
     @property
     def whole(self) -> bool:
-        """Whether it holds a whole number."""
+        """Whether its value is a whole number."""
         return self.gain is not None and self.gain.whole
 
     @property

@@ -17,6 +17,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
+from starhold.parts.orbit import period_of
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
@@ -246,9 +247,8 @@ def _orbit_period(scenario: Scenario) -> float | None:
     orbit = scenario.table.orbit
     if orbit is None:
         return None
-    position, velocity = orbit.start
-    inverse = 2.0 / math.hypot(*position) - math.hypot(*velocity) ** 2 / orbit.gravitational_parameter
-    return 2.0 * math.pi / math.sqrt(orbit.gravitational_parameter * inverse**3) if inverse > 0.0 else None
+    period = period_of(*orbit.start, orbit.gravitational_parameter)
+    return period if math.isfinite(period) else None
 
 
 def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:

@@ -141,7 +141,9 @@ def reach(loop: Loop, shape: Shape) -> Reach:
     V, hysteresis = loop.add(height, measurement=ASKED), loop.loop.hysteresis_width
     loop.written_by[V] = {name: float(x) for name, x in shape._asdict().items()}
     signed: dict[str, Any] = {"hysteresis": hysteresis} if HYSTERESIS in words(loop) else {}
-    asked = cast(Sum, obligations(loop.claim(ISOTROPIC, words(loop), V, level=1, **signed), loop.by_digest)[0]["V falls"])
+    asked = cast(
+        Sum, obligations(loop.claim(ISOTROPIC, words(loop), V, level=1, **signed), loop.by_digest)[0]["V decreases"]
+    )
     top = shape.other_equilibrium
     if SHORTEST in words(loop):
         # Where q0 = 0.

@@ -204,7 +204,7 @@ def converges_without_axes(claim: Claim) -> Proof:
     u, v, t = map(var, "uvt")
     height, fall, q2 = reduced(V), -reduced(slope), u * (2 - u)
     yield "V is least on target", Sum(height, [q2 - t * t], (), [v * v, u * u, q2])
-    yield "V falls", Sum(fall, [level - height, q2 - t * t], (), [v * v, q2])
+    yield "V decreases", Sum(fall, [level - height, q2 - t * t], (), [v * v, q2])
     statement = yield from concluded(loop, [f"every motion from {{V <= {below(level)}}} stays there and"], strictly=True)
     return replace(statement, label="region")
 

@@ -50,7 +50,7 @@ def points(claim: Claim) -> Proof:
         Q, H, F, push, rest = held.fall(tube)
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(F), F), -tau), H, -beta)
-        yield f"V falls by a share {k}", Definite(fallen)
+        yield f"V decreases by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
         c, tube = end, held.tube(held.region(end))

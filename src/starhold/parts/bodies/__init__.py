@@ -1,0 +1,1 @@
+"""Bodies: equations of motion and what laws measure, one per file."""

@@ -157,11 +157,3 @@ def shaken(angle: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> V
         cosine, sine = cosine_sine(turn)
         torque = add(torque, scale(speed * speed, add(scale(cosine, first), scale(sine, second))))
     return torque
-
-
-def most_shaken(wheels: Wheels) -> float:
-    """The largest torque of rotors out of balance (N m), within their momentum limits and on a body at rest."""
-    if not wheels.unbalanced:
-        return 0.0
-    pairs = zip(top_speeds(wheels), wheels.unbalanced, strict=True)
-    return sum(speed**2 * float(np.linalg.norm(np.array(pair), 2)) for speed, pair in pairs)

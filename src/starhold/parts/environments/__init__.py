@@ -1,0 +1,1 @@
+"""Environments: torques, forces and fields around the craft, one per file."""

@@ -263,8 +263,8 @@ def _slope(rate: Vector, craft: Craft) -> Matrix:
 
 
 def aligned(now: Memory, shown: Vector, true: Vector, params: Numbers, begin: Matrix) -> Memory:
-    """The estimate as it begins anew: turned as little as the field asks for, with anything possible about it; bias or rate
-    stay, with the variance of the start."""
+    """Return the estimate at a restart: the attitude is turned as little as the measured field requires, and is unknown
+    about the field; bias or rate stay, with the initial variance."""
     foretold, size = to_body(now.attitude, true), maximum(norm(shown), TINY)
     old, new = scale(1.0 / maximum(norm(foretold), TINY), foretold), scale(1.0 / size, shown)
     # Opposite fields are turned by a turn about any axis.

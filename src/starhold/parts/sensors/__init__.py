@@ -1,0 +1,1 @@
+"""Sensors: readings of the state, one per file."""

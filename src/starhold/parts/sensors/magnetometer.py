@@ -67,7 +67,7 @@ class Numbers(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """The field that it shows, and whether it is a new one (1) or that of an earlier control step (0)."""
+    """The measured field, and whether it is new (1) or from an earlier control step (0)."""
 
     magnetic_field: Annotated[Vector, Quantity("T", "as measured, body axes", "axis")]
     magnetic_field_is_new: Annotated[float, Quantity("1", "1 where the magnetic field is a new one, else 0")]

@@ -1,0 +1,1 @@
+"""Targets: attitudes to reach, one per file."""

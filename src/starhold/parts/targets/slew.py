@@ -113,7 +113,7 @@ def goal(params: Numbers, state: Any, step: int, before: Any) -> Goal:
 
 
 def examples() -> list[Params]:
-    """One with a coast, and one without that begins later and keeps away from the Sun."""
+    """Return a slew with a coast, and one without, which begins later and keeps away from the Sun."""
     wide = Params((0.0, 1.0, 1.0, 0.2), math.radians(0.5), math.radians(0.05), begin=20.0)
     short = Params((0.99, 0.1, 0.0, 0.05), 0.05, 2e-4, (1.0, 0.0, 0.1, 0.0), 10.0, axis=(0.0, 1.0, 0.0), keep_out=0.2)
     return [wide, short]

@@ -1,0 +1,1 @@
+"""Reports of the bodies that have figures or sections of their own."""

@@ -113,10 +113,10 @@ class Result(NamedTuple):
 
 
 class Option(NamedTuple):
-    """An option. key: the key of the scenario whose value it replaces, a whole number if `whole`, else a time; "" for a text
-    that `read` takes. file: "csv" or "png", where it names a file for the numbers or for the figure. content: reads what
-    the text says or names, which `study` takes after the law, None without the option. argument: how the help calls it
-    where it is no option but has to follow FILE."""
+    """An option of a command. key: the scenario key whose value it replaces, a whole number if `whole`, else a time; "" for
+    a text that `read` takes. file: "csv" or "png" for an option that names the file of the numbers or of the figure.
+    content: turns the text into what `study` takes after the law; that is None without the option. argument: its name in
+    the help if it is a required argument after FILE instead of an option."""
 
     key: str
     help: str

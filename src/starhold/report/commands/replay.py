@@ -1,4 +1,4 @@
-"""Telemetry replayed: what the estimator and the law of a scenario make of recorded readings."""
+"""Telemetry is replayed: recorded readings go through the estimator and the law of a scenario."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""Flights and metrics of the bodies that have a study of their own."""

@@ -1,0 +1,1 @@
+"""Publication A: its numbers and how they are measured."""

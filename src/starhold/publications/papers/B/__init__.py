@@ -1,0 +1,1 @@
+"""Publication B: its numbers and how they are measured."""

@@ -77,7 +77,7 @@ def mean_time(desk: Desk, name: str) -> float:
 
 
 def ratio(desk: Desk, name: str, to: str = "lyapunov") -> float:
-    """How many times as long a call takes as one of another law, in the mean."""
+    """The mean duration of a call divided by that of another law."""
     return mean_time(desk, name) / mean_time(desk, to)
 
 

@@ -1,0 +1,1 @@
+"""Publication C: its numbers and how they are measured."""

@@ -159,7 +159,7 @@ def globally(desk: Desk) -> Finding:
     return Finding(max(torques) > 0.0, "no torque at rest, half a turn away about any of 50 axes")
 
 
-def euler_krylov(desk: Desk, file: str, laws: Sequence[str], until: float) -> Figure:
+def tait_bryan(desk: Desk, file: str, laws: Sequence[str], until: float) -> Figure:
     """Yaw, pitch and roll from the orbital frame over time, a panel a law."""
     panels: list[Panel] = []
     for law in laws:

@@ -1,0 +1,1 @@
+"""Publication D: its numbers and how they are measured."""

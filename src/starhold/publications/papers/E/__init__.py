@@ -1,0 +1,1 @@
+"""Publication E: its numbers and how they are measured."""

@@ -71,7 +71,7 @@ class Dials(Body):
     def moved(self, scenario: Scenario, loop: ClosedLoop, values: Mapping[str, Any]) -> Moved:
         """Return the numbers of a loop under these values, as from `build` and `make_events`."""
         nominal, flown = _crafts(scenario, values, loop.craft)
-        cutoff = values.get(LIMIT, loop.saturation_limit())
+        saturation_limit = values.get(LIMIT, loop.saturation_limit())
         attitude = unit_of(values[ATTITUDE]) if ATTITUDE in values else values.get(ANGLES)
         begun = start_of(scenario, target_of(scenario), attitude, values.get(RATE))
         # An inertia that changes as the motion begins keeps the angular momentum, as in `Phase.rate_from`.
@@ -82,7 +82,7 @@ class Dials(Body):
         rotors, parts = values.get(ROTORS), loop.parts
         if rotors is not None:
             parts = tuple(replace(f, params=rotors.wheels) if f.part.name == "wheels" else f for f in parts)
-        return Moved(begun._replace(rate=rate), begun, flown, nominal, cutoff, parts)
+        return Moved(begun._replace(rate=rate), begun, flown, nominal, saturation_limit, parts)
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Craft:
         """Return the craft that laws know under these values, which may be recorded ones; InputError where no file may have
