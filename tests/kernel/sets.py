@@ -8,6 +8,7 @@ from starhold.algebra.polynomial import Polynomial
 from starhold.algebra.scalar import clip, less, maximum, sign, where
 from starhold.certification.invariant.prover import Attempt, proved, scales
 from starhold.certification.invariant.theorems import program
+from starhold.kernel.numbers import rational
 from starhold.kernel.programs import digest
 
 SQUARE = {"x": (-2, 2), "y": (-2, 2)}
@@ -112,3 +113,21 @@ SETS = {
 def text(name):
     """Return the certificate of one of these."""
     return certificate(*SETS[name]())
+
+
+OPERATIONS = {
+    "plus": lambda a, b: a + b, "minus": lambda a, b: a - b, "product": lambda a, b: a * b, "divide": lambda a, b: a / b,
+    "negative": lambda a: -a, "less": lambda a, b: a < b, "less_equal": lambda a, b: a <= b,
+    "select": lambda c, a, b: a if c else b,
+}  # fmt: skip
+
+
+def value(program, state):
+    """Return the outputs of a program in floats."""
+    values = [state[name] for name in program["inputs"]]
+    for step in program["steps"]:
+        if step[0] == "constant":
+            values.append(float(rational(step[1])))
+        else:
+            values.append(OPERATIONS[step[0]](*(values[k] for k in step[1:])))
+    return [values[k] for k in program["outputs"]]

@@ -11,7 +11,7 @@ import pytest
 from starhold.kernel.check import check
 from starhold.kernel.numbers import WORK, Account, RefusedError, rational
 from starhold.kernel.programs import digest
-from tests.kernel.sets import ORIGIN, SETS, SQUARE, attempt, certificate, round_, slanted, switching, text
+from tests.kernel.sets import ORIGIN, SETS, SQUARE, attempt, certificate, round_, slanted, switching, text, value
 from tests.tiers import leading
 
 LEVELS = {
@@ -23,11 +23,6 @@ LEVELS = {
     "sliding": 0.999,
     "pendulum": 1.99,
 }
-OPERATIONS = {
-    "plus": lambda a, b: a + b, "minus": lambda a, b: a - b, "product": lambda a, b: a * b, "divide": lambda a, b: a / b,
-    "negative": lambda a: -a, "less": lambda a, b: a < b, "less_equal": lambda a, b: a <= b,
-    "select": lambda c, a, b: a if c else b,
-}  # fmt: skip
 STEP = 1e-5
 
 
@@ -202,17 +197,6 @@ def changed(part, rng):
         k = rng.randrange(len(part))
         return [changed(own, rng) if i == k else own for i, own in enumerate(part)] if rng.random() < 0.9 else part[:-1]
     return str(rational(part) * 2 + 1) if isinstance(part, str) and part[-1:].isdigit() else part
-
-
-def value(program, state):
-    """Return the outputs of a program in floats."""
-    values = [state[name] for name in program["inputs"]]
-    for step in program["steps"]:
-        if step[0] == "constant":
-            values.append(float(rational(step[1])))
-        else:
-            values.append(OPERATIONS[step[0]](*(values[k] for k in step[1:])))
-    return [values[k] for k in program["outputs"]]
 
 
 def false(content, rng, count=400):

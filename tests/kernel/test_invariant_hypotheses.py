@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import pytest
 
 from starhold.algebra.scalar import absolute, less, where
-from tests.kernel.sets import ORIGIN, SQUARE, attempt, cycle, round_, slanted
-from tests.kernel.test_invariant import value
+from tests.kernel.sets import ORIGIN, SQUARE, attempt, cycle, round_, slanted, value
 
 UNIT = {"x": (-1, 1), "y": (-1, 1)}
 AT_ORIGIN = {"member.x": 0, "member.y": 0}
