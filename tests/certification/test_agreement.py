@@ -37,6 +37,12 @@ def test_many_random_scenarios(first, tmp_path):
         assert fault_in(text, tmp_path) == "", text
 
 
+def test_a_law_that_clips_its_torque_is_certified(tmp_path):
+    text = random_scenario(np.random.default_rng(1104), tmp_path)
+    assert 'limit = "axis"' in text.split("[[law]]")[1]
+    assert fault_in(text, tmp_path) == ""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(0, 80, 20))
 def test_no_flight_contradicts_what_is_proved_of_flights_like_it(first, tmp_path):

@@ -151,7 +151,8 @@ def against_limit(loop: Loop, V: str, turn: float) -> bool:
     limit = loop.loop.craft.torque_limit
     exact = wired(loop, V)
     angle = min(turn, pi)
-    if loop.loop.limit == "none" or not isfinite(limit):
+    # A state is sought along the slopes at rest, which say little of a law with cases.
+    if loop.loop.limit == "none" or not isfinite(limit) or any(len(cases) > 1 for cases in exact.law):
         return False
     name = "limit" if loop.loop.limit == "axis" else "limit.norm"
     form = -quadratic(-exact.lyapunov)
