@@ -12,7 +12,7 @@ from starhold.certification.unmodelled import pushes
 from starhold.kernel.numbers import Account
 from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
 from starhold.scenario.building import build
-from tests.kernel.flights import Around, Surroundings, along
+from tests.kernel.flights import Around, Surroundings, along, cross
 from tests.kernel.oracle import Oracle, run
 from tests.tiers import leading
 
@@ -42,7 +42,11 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     Q, H, F = floats(Q), floats(H), floats(F)
     corners = np.array([floats(A) for A in held.corners()])
     linear = [(corners[9 + 2 * k] - corners[8 + 2 * k]) / (2 * 1.4144 * n["momentum"]) for k in range(3)]
-    grown = 0.0
+    grown, stiff = 0.0, own.stiffness if held.soft else np.inf
+
+    def leaning(around, q, t):
+        """Where the momentum and the target's rate alone would hold the body."""
+        return np.concatenate([0.0 * w, -cross(around.target(q, t)[0], around.kept) / stiff])
 
     def asked(q, w, *around):
         return run(oracle.programs["law"], oracle.inputs(q, w, *around)[0])
@@ -50,7 +54,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     for unit in (along(rng.normal(size=(3, LANES))), along(F[:3] @ x)):
         around = Around(bounds, oracle.J, inverse, rng, LANES)
         around.kept = n["momentum"] * rng.uniform(size=LANES) ** 0.3 * along(rng.normal(size=(3, LANES)))
-        momentum, turning = around.kept, np.linalg.norm(w, axis=0) + n["target.rate"]
+        begun, momentum, turning = leaning(around, q, 0.0), around.kept, np.linalg.norm(w, axis=0) + n["target.rate"]
         error = n["error"] + n.get("error.per.rate", 0.0) * turning
         command = around.command(asked, q, w, 0.0, unit) + error * unit
         later, rate, turned = q, w, rng.uniform()
@@ -60,7 +64,8 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
                     unit
                 )
                 later, rate = around.after(later, rate, h * k / 4, command, outside, part * h / 4)
-        y = np.concatenate([rate, later[1:]])
+        y, ended = np.concatenate([rate, later[1:]]), leaning(around, later, h)
+        assert np.linalg.norm(begun, axis=0).max() <= float(held.leant[1])
         assert (np.abs(y) <= np.array([[float(tube.sizes[name])] for name in STATE])).all()
         drift = np.abs(rate - w).max(axis=1) / np.array([float(one) for one in tube.drift])
         assert 0.02 < drift.max() <= 1.0
@@ -69,9 +74,10 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
         assert (change <= most).all()
         A = floats(held.near.A)[:, :, None] + sum(a[:, :, None] * b for a, b in zip(linear, momentum, strict=True))
         # All of the motion in A of the momentum, or all of it what noise adds, which is in A without momentum.
-        whole, swayed = np.einsum("ijk,jk->ik", A, x), (region.sizes[SPEED], region.sizes[ANGLE])
-        for after, radii in ((whole, AT_REST), (floats(held.near.A) @ x, swayed)):
-            left, ((B, b), *others) = y - after, held.linear(tube, radii)
+        z = x - begun
+        whole, swayed = np.einsum("ijk,jk->ik", A, z), (region.sizes[SPEED], region.sizes[ANGLE])
+        for after, radii in ((whole, AT_REST), (floats(held.near.A) @ z, swayed)):
+            left, ((B, b), *others) = y - ended - after, held.linear(tube, radii)
             v = np.linalg.solve(floats(B)[:3], left[:3])
             used = float(np.linalg.norm(v, axis=0).max()) / float(b)
             assert used <= 1.0
@@ -103,3 +109,20 @@ def test_a_target_whose_motion_is_misread_moves_the_torque_by_no_more_than_its_b
         true, seen = (np.array(run(oracle.programs["law"], one)) for one in (inputs, misread))
         far = max(far, float(np.linalg.norm(seen - true)))
     assert 0.3 * bound < far <= bound
+
+
+def test_a_body_that_leans_on_its_momentum_is_where_it_is_said_to_be_and_stays():
+    """Without the lean the push that holds it would be a larger one than is claimed of what is not slow."""
+    Account.left = 10**12
+    given = sh.load("cubesat-nadir")
+    loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
+    own = Pushed(loop, pushes(loop.loop, loop.known.envelope(True))._replace(attitude=0.0, rate=0.0))
+    held = own.leans[0][2]
+    n, A, (B, b) = own.told, floats(held.near.A), held.linear(held.tube(held.region(held.s / 2**26)), AT_REST)[0]
+    torque = np.cross(np.eye(3)[0] * n["target.rate"], np.eye(3)[2] * n["momentum"])
+    assert np.isclose(np.linalg.norm(torque), float(held.lasting), rtol=1e-9)
+    x = np.zeros(6)
+    for _ in range(2000):
+        x = A @ x + floats(B) @ torque
+    assert np.isclose(np.linalg.norm(x[3:]), float(held.leant[1]), rtol=1e-6)
+    assert float(b) < np.linalg.norm(torque)

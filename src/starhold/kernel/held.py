@@ -110,10 +110,17 @@ class Held:
         asked, turning = minus(loop.u, self.u), growing(self.beside)
         self.more = growing(asked)
         left = [p + q for p, q in zip(minus(asked, self.more), minus(self.beside, turning), strict=True)]
-        # What does not, by the first that it has of what comes from outside.
-        self.rigid = {x: [first(p, x) for p in left] for x in ("e", "a", "h", "r")}
+        # What does not: that of momentum and the target's rate is slow, the rest by the first that it has of what comes from
+        # outside.
+        self.slow = [with_momentum(p, "r") for p in left]
+        self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
         self.N = inverse(loop.given)
+        # How large the slow torque is, how far a torque that lasts turns the body, and how far this one.
+        self.lasting = felt(self.slow, "h", self.others) * self.size("h")
+        stiff = [[-x for x in row[TURN]] for row in self.near.torque]
+        self.soft = stretch(inverse(stiff)) if self.lasting else Fraction(0)
+        self.leant: Radii = Fraction(0), self.soft * self.lasting
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
         self.bend = apply(self.N, self.gyroscopic)
@@ -175,11 +182,11 @@ class Held:
         far from there and what errors that noise drives add linearly on target."""
         if not self.turned + self.rated + self.led + self.hurried:
             return Fraction(0), Fraction(0)
-        e, r, a, _ = (self.size(letter) for letter in "erah")
+        r, a = self.size("r"), self.size("a")
         turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
         wrong = {"q": self.turned / 2, "w": self.rated + turn["r"]} | turn
-        wrong |= {"h": stretch(self.loop.given) * self.rated, "e": 2 * e}
-        sizes = {name: x + wrong[name[-1] if name in (SPEED, ANGLE) else name[0]] for name, x in region.sizes.items()}
+        wrong["h"] = stretch(self.loop.given) * self.rated
+        sizes = {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in region.sizes.items()}
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
@@ -202,7 +209,7 @@ class Held:
 
     def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
         """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
-        nothing on, what is told at once."""
+        nothing on; the torque is at no time nearer than this to what the law is told."""
         e, r, a, H = (self.size(letter) for letter in "erah")
         w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
         change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
@@ -218,7 +225,7 @@ class Held:
         held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
         steady, uneven = self.misread(region)
         rigid = sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
-        steady, uneven = steady + rigid, uneven + rigid
+        steady, uneven = steady + rigid + self.lasting, uneven + rigid + self.lasting
         widths = [norm(row) for row in self.N]
 
         def within(wide: list[Fraction]) -> Sizes:
@@ -278,12 +285,13 @@ class Held:
             reach(self.felt, [sizes[name] for name in STATE])
         )
 
-    def astray(self, tube: Tube) -> list[Fraction]:
-        """Return how far the rates are in a period from where the acceleration that is linear in the sample takes them."""
+    def astray(self, tube: Tube, lasting: Fraction = Fraction(0)) -> list[Fraction]:
+        """Return how far the rates are in a period from where the acceleration that is linear in the sample, and that of a
+        torque that is `lasting`, take them."""
         sizes = tube.region.sizes | {"v": 1 - tube.region.least}
         left = [most(p, sizes) for p in self.speeding]
         columns = zip(left, reach(tube.bent, tube.drift), self.N, strict=True)
-        return [self.h * (a + b + tube.push * norm(n)) for a, b, n in columns]
+        return [self.h * (a + b + (tube.push - lasting) * norm(n)) for a, b, n in columns]
 
     def corners(self) -> list[Rows]:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
@@ -303,8 +311,9 @@ class Held:
         return found
 
     def linear(self, tube: Tube, swayed: Radii) -> list[tuple[Rows, Fraction]]:
-        """Return pairs B, b such that samples in the tube's region, less what noise adds linearly, at most `swayed`, are
-        followed by x+ = Ax + the sum of B v, |v| <= b, with A between those of `corners`."""
+        """Return pairs B, b such that samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with
+        A between those of `corners`: less what noise adds linearly, at most `swayed`, and less where the slow torque alone
+        would hold the body, at most `leant`."""
         h, N, region = self.h, self.N, tube.region
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
@@ -315,13 +324,15 @@ class Held:
         # Rates drift from nothing on, too; what noise adds is not in A.
         parts = zip((RATE, TURN), swayed, strict=True)
         swaying = h * sum((stretch([row[k] for row in self.near.rates]) * x for k, x in parts), Fraction(0))
-        drift = norm(self.astray(tube)) + swaying
+        drift = norm(self.astray(tube, self.lasting)) + swaying
         mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * drift / 2
         uneven = 2 * mean - tube.pushed - odd
+        # In a whole period momentum and target change by twice what they do in the mean.
+        moved = 2 * self.soft * self.stale(tube.sizes, self.slow)
         return [
-            (self.near.B, tube.uneven + mean),
+            (self.near.B, tube.uneven - self.lasting + mean),
             (scalar(0) + N, h * h / 8 * uneven),
-            (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))),
+            (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2)) + moved),
         ]
 
 

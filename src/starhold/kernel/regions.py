@@ -99,9 +99,9 @@ def first(p: Poly, letter: str) -> Poly:
     return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
 
 
-def with_momentum(p: Poly) -> Poly:
-    """Return what of a polynomial is a product of wheels' momentum and a rate."""
-    return Poly({m: c for m, c in p.terms.items() if [name[0] for name in m] == ["h", "w"]})
+def with_momentum(p: Poly, rate: str = "w") -> Poly:
+    """Return what of a polynomial is a product of wheels' momentum and a rate, the body's or the target's."""
+    return Poly({m: c for m, c in p.terms.items() if [name[0] for name in m] == sorted(("h", rate))})
 
 
 def growing(parts: list[Poly]) -> list[Poly]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio, smallest
 from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
@@ -43,18 +44,14 @@ RATES = (5, 3, 2, 1, 0.5)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
 LEAST = 1e-6
 """The deflection (rad) of a spring as stiff as the law under the least external torque that is considered."""
-HEED = 0.5
-"""The weights of an ellipsoid's rates relative to its rotations, until they reduce no bound further."""
-NEARLY = 1e-3
-"""The share by which the linear motion is first scaled, to allow for the wheels' momentum."""
 NEARER = 0.25
 """A claim is made only if the ultimate bound is below this share of the largest rotation in the set."""
 LEANS = (0.1, 0.15, 0.2, 0.28)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
-MORE, FLOOR, LARGER, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.0 + 1e-9, 1.03, 1.005, 7, 8.0, 20, 24, 2000
-"""Margins for rounding; for the last level above its limit, and for ellipsoids above the least, so that motions enter them
-in finite time; the digits of their numbers; the largest ratio of successive levels; the most levels and ellipsoids; the
-number of states of a set at which the torque is examined.
+FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.03, 7, 8.0, 20, 24, 2000
+"""The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
+the largest ratio of successive levels; the most levels and ellipsoids; the number of states of a set at which the torque is
+examined.
 """
 
 
@@ -133,6 +130,7 @@ class Chain:
         noise."""
         angle, fastest = self.ends(tube, tube.region.X)
         heed, corners = HEED, self.held.corners()
+        away = swayed[0] + self.held.leant[0], swayed[1] + self.held.leant[1]
         for _ in range(ELLIPSOIDS):
             pushes = self.held.linear(tube, swayed)
             own = [floats(B) * float(b) for B, b in pushes]
@@ -142,9 +140,9 @@ class Chain:
             shape, shares = found
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
             rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
-            reach = highest_ratio(widened(tube.region.X, swayed), X)
-            inner = self.held.tube(tube.region.within(X, swayed))
-            end = self.ends(inner, X, swayed)
+            reach = highest_ratio(widened(tube.region.X, away), X)
+            inner = self.held.tube(tube.region.within(X, away))
+            end = self.ends(inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
                     break
@@ -341,45 +339,3 @@ def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
 def feedback(loop: AttitudeLoop) -> float:
     """Return the stiffness of the law near rest, a third of its trace."""
     return -float(sum(row[3 + k] for k, row in enumerate(near_target(loop, Fraction(0)).torque))) / 3.0
-
-
-def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tuple[Array, list[float]] | None:
-    """Return the matrix of an ellipsoid invariant under disturbances of size 1, approximately the one with the least
-    rotation, and its shares. heed: the weight of rates relative to rotations, in powers."""
-    radius = float(np.abs(np.linalg.eigvals(A)).max())
-    if radius >= 1.0:
-        return None
-
-    def shape(x: Array) -> tuple[float, Array, Array]:
-        shares, more = np.exp(x[:-1]) / (1.0 + np.exp(x[:-1]).sum()) * (1.0 - radius**2), np.exp(x[-1])
-        fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(A))
-        fed += 1e-14 * np.diag(np.diag(fed))
-        kept = 1.0 - shares.sum()
-        if radius**2 * (1.0 + more) >= kept:
-            return inf, A, shares
-        found: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
-        own = (found + found.T) / 2.0
-        # So much larger that no corner leaves it.
-        room = own - corners @ own @ corners.transpose(0, 2, 1) / kept
-        if np.linalg.eigvalsh(room).min() <= 0.0:
-            return inf, A, shares
-        own = own * max(float(linalg.eigh(fed, one, eigvals_only=True)[-1]) for one in room)
-        wide, turned = (float(np.log(np.linalg.eigvalsh(own[k, k])[-1])) for k in (RATE, TURN))
-        return turned + heed * wide, own, shares
-
-    def size(x: Array) -> float:
-        return shape(x)[0]
-
-    sizes = [float(np.linalg.norm(B, 2)) for B in pushes]
-    weight = np.log(np.array([x / sizes[0] + 1e-12 for x in sizes] + [NEARLY]))
-    begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
-    options = {"maxfev": 400, "initial_simplex": begun}
-    optimize: Any = import_module("scipy.optimize")
-    found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
-    least, X, shares = shape(found.x)
-    return (X * LARGER, [float(a) for a in shares]) if isfinite(least) else None
-
-
-def highest_ratio(a: Rows, b: Rows) -> float:
-    """Return an upper bound of the eigenvalues of b^-1 a."""
-    return float(linalg.eigh(floats(a), floats(b), eigvals_only=True)[-1]) * MORE

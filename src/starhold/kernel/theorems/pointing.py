@@ -56,6 +56,7 @@ def points(claim: Claim) -> Proof:
         c, tube = end, held.tube(held.region(end))
         within.append((h * samples, tube.sizes[ANGLE]))
     last, beside, corners = tube.region.X, AT_REST, held.corners()
+    away = swayed[0] + held.leant[0], swayed[1] + held.leant[1]
     for k, told in enumerate(ellipsoids):
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
@@ -65,10 +66,10 @@ def points(claim: Claim) -> Proof:
         for corner, A in enumerate(corners):
             after = image(X, shares, A, pushed)
             yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
-        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(tube.region.X, swayed), -1))
+        yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(tube.region.X, away), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
-        tube, last, beside = held.tube(tube.region.within(X, swayed)), X, swayed
+        tube, last, beside = held.tube(tube.region.within(X, away)), X, away
         within.append((h * samples, tube.sizes[ANGLE]))
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
     # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.

@@ -1,0 +1,114 @@
+"""Finds ellipsoids that the sampled linear motion does not leave, under bounded disturbances and any momentum of wheels."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from math import inf, isfinite, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.certification.evidence.finding import floats
+from starhold.certification.evidence.squares import interior_point
+from starhold.kernel.numbers import Rows
+from starhold.kernel.regions import RATE, TURN
+
+linalg: Any = import_module("scipy.linalg")
+Array = NDArray[np.float64]
+
+HEED = 0.5
+"""The weights of an ellipsoid's rates relative to its rotations, until they reduce no bound further."""
+NEARLY = 1e-3
+"""The share by which the linear motion is first scaled, to allow for the wheels' momentum."""
+MORE, LARGER = 1.0 + 1e-9, 1.005
+"""The margin for rounding, and that of ellipsoids above the least, so that motions enter them in finite time."""
+PAIRS = [(i, k) for k in range(6) for i in range(k + 1)]
+"""The entries of a symmetric matrix by which an interior point knows it."""
+
+
+def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tuple[Array, list[float]] | None:
+    """Return the matrix of an ellipsoid invariant under disturbances of size 1, approximately the one with the least
+    rotation, and its shares. heed: the weight of rates relative to rotations, in powers."""
+    radius = float(np.abs(np.linalg.eigvals(A)).max())
+    if radius >= 1.0:
+        return None
+
+    def shape(x: Array) -> tuple[float, Array, Array]:
+        shares, more = np.exp(x[:-1]) / (1.0 + np.exp(x[:-1]).sum()) * (1.0 - radius**2), np.exp(x[-1])
+        fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(A))
+        fed += 1e-14 * np.diag(np.diag(fed))
+        kept = 1.0 - shares.sum()
+        if radius**2 * (1.0 + more) >= kept:
+            return inf, A, shares
+        found: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
+        own = (found + found.T) / 2.0
+        # So much larger that no corner leaves it.
+        room = own - corners @ own @ corners.transpose(0, 2, 1) / kept
+        if np.linalg.eigvalsh(room).min() <= 0.0:
+            return inf, A, shares
+        own = own * max(float(linalg.eigh(fed, one, eigvals_only=True)[-1]) for one in room)
+        return extent(own, heed), own, shares
+
+    def size(x: Array) -> float:
+        return shape(x)[0]
+
+    sizes = [float(np.linalg.norm(B, 2)) for B in pushes]
+    weight = np.log(np.array([x / sizes[0] + 1e-12 for x in sizes] + [NEARLY]))
+    begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
+    options = {"maxfev": 400, "initial_simplex": begun}
+    optimize: Any = import_module("scipy.optimize")
+    found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
+    least, X, shares = shape(found.x)
+    if not isfinite(least):
+        return None
+    own = fitted(corners, pushes, shares, X, heed) if len(corners) > 1 else None
+    if own is not None and extent(own, heed) < least:
+        X = own
+    return X * LARGER, [float(a) for a in shares]
+
+
+def extent(X: Array, heed: float) -> float:
+    """Return the logarithm of the largest rotation in an ellipsoid, and of its largest rate by its weight."""
+    wide, turned = (float(np.log(np.linalg.eigvalsh(X[k, k])[-1])) for k in (RATE, TURN))
+    return turned + heed * wide
+
+
+def fitted(corners: Array, pushes: list[Array], shares: Array, X: Array, heed: float) -> Array | None:
+    """Return the ellipsoid with about the least rotation that no corner leaves with these shares, in units in which the
+    other one, X, is about 1; None without one."""
+    kept, scale = 1.0 - float(shares.sum()), np.sqrt(np.diag(X))
+    if kept <= 0.0:
+        return None
+    fed = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(X)) / np.outer(scale, scale)
+    basis = np.array([[[float({i, k} == {a, b}) for a in range(6)] for b in range(6)] for i, k in PAIRS])
+    rows, right = list[Array](), list[Array]()
+    for corner in corners * scale / scale[:, None]:
+        rows.append(np.hstack([-triangle(basis - corner @ basis @ corner.T / kept).T, np.zeros((len(PAIRS), 2))]))
+        right.append(-triangle(fed))
+    for place, part in enumerate((RATE, TURN)):
+        units = -np.eye(2)[place][:, None, None] * np.diag(1.0 / scale[part] ** 2) * float(np.min(scale[part])) ** 2
+        rows.append(triangle(np.concatenate([basis[:, part, part], units])).T)
+        right.append(np.zeros(6))
+    cost = np.array([*[0.0] * len(PAIRS), heed, 1.0])
+    found = interior_point(cost, np.vstack(rows), np.concatenate(right), 0, 0, [6] * len(corners) + [3, 3])
+    if found is None:
+        return None
+    own = np.einsum("n,nij->ij", found[: len(PAIRS)], basis) * np.outer(scale, scale)
+    plain = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(X))
+    room = own - corners @ own @ corners.transpose(0, 2, 1) / kept
+    if np.linalg.eigvalsh(own)[0] <= 0.0 or np.linalg.eigvalsh(room).min() <= 0.0:
+        return None
+    return own * max(float(linalg.eigh(plain, one, eigvals_only=True)[-1]) for one in room)
+
+
+def triangle(M: Array) -> Array:
+    """Return the upper triangles (..., n (n + 1) / 2) of symmetric matrices, column by column, as an interior point takes
+    them."""
+    n = M.shape[-1]
+    return np.stack([M[..., i, k] * (1.0 if i == k else sqrt(2.0)) for k in range(n) for i in range(k + 1)], axis=-1)
+
+
+def highest_ratio(a: Rows, b: Rows) -> float:
+    """Return an upper bound of the eigenvalues of b^-1 a."""
+    return float(linalg.eigh(floats(a), floats(b), eigvals_only=True)[-1]) * MORE
