@@ -63,9 +63,8 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
     if not isfinite(least):
         return None
     own = fitted(corners, pushes, shares, X, heed) if len(corners) > 1 else None
-    if own is not None and extent(own, heed) < least:
-        X = own
-    return X * LARGER, [float(a) for a in shares]
+    better = X if own is None or extent(own, heed) >= least else own
+    return better * LARGER, [float(a) for a in shares]
 
 
 def extent(X: Array, heed: float) -> float:
