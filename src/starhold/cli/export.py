@@ -101,7 +101,7 @@ def link(
     console.print(f"{output}", soft_wrap=True)
 
 
-def _write(function: str, given: Path, output: Path, force: bool, **words: Any) -> None:
+def _write(function: str, given: Path | str, output: Path, force: bool, **words: Any) -> None:
     """Write a file by a function of the Python interface, and print what it returns."""
     from starhold import api
     from starhold.cli.console import console

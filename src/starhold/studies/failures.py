@@ -247,7 +247,8 @@ def _orbit_period(scenario: Scenario) -> float | None:
     orbit = scenario.table.orbit
     if orbit is None:
         return None
-    period = period_of(*orbit.start, orbit.gravitational_parameter)
+    position, velocity = orbit.start
+    period = period_of(position, velocity, orbit.gravitational_parameter)
     return period if math.isfinite(period) else None
 
 
