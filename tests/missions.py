@@ -149,3 +149,30 @@ dipole_limit = "0.2 A m^2"
 """
 """Wheels, and rods that a safe mode flies by."""
 SAFE = '[[law.mode]]\nname = "safe"\ntype = "b-dot"\nk = 1e-3\neffectors = ["magnetorquers"]\n'
+
+WATCHED = cubesat(
+    HEADS + 'started_by = "quest"\nstart_deviation = "1 deg"\n',
+    """
+[[part]]
+type = "gnss"
+[[part]]
+type = "magnetometer"
+noise = "50 nT"
+[[part]]
+type = "sun-sensor"
+[[part]]
+type = "complementary-filter"
+attitude_gain = 0.2
+bias_gain = 0.01
+watches = true
+started_by = "mekf"
+[[part]]
+type = "quest"
+watches = true
+[[law]]
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+""",
+)
+"""QUEST starts the law's filter, and that another one, which watches as QUEST does."""
