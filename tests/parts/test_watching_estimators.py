@@ -84,9 +84,9 @@ def _number(value):
 
 
 def test_an_estimator_gives_another_its_first_attitude():
-    """QUEST sees Sun and field from 5 s on, the tracker stars from 20 s on: until then the filter carries QUEST's attitude on
-    with the deviation stated for it, and a tracker's attitude is weighed against that as covariances say."""
-    given, run = flown(FILTER | {"started_by": "quest", "start_deviation": "1 arcmin"}, QUEST)
+    """QUEST sees Sun and field from 5 s on, the tracker stars from 20 s on: until then the filter carries QUEST's attitude
+    on with the deviation stated for it, and a tracker's attitude is weighed against that as covariances say."""
+    _, run = flown(FILTER | {"started_by": "quest", "start_deviation": "1 arcmin"}, QUEST)
     valid, time = run["mekf_is_valid"].values, run["time"].values
     assert valid.tolist() == (time >= 5.0).astype(float).tolist()
     begin, seen = np.flatnonzero(time == 5.0)[0], np.flatnonzero(time == 20.0)[0]

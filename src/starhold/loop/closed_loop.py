@@ -63,8 +63,8 @@ class Composition(NamedTuple):
 
 class Memories(NamedTuple):
     """The memories of parts from one control step to the next, in the order in which a loop has them; `followed` is the
-    target's attitude at the previous step, for a target that is continued from it; `readings` are those that are recorded, and
-    after them the estimates of watchers."""
+    target's attitude at the previous step, for a target that is continued from it; `readings` are those that are recorded,
+    and after them the estimates of watchers."""
 
     followed: Any
     environments: tuple[Any, ...]

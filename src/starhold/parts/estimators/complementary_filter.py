@@ -22,7 +22,7 @@ CARD = Card(
     assumptions=(
         "attitudes come without delay; of several that are new at once the mean is taken",
         "the bias changes slowly",
-        "the first attitude measured, or given by the estimator that starts it, takes the place of the one stated for the start",
+        "the first attitude, measured or of the estimator that starts it, takes the place of the one stated for the start",
     ),
 )
 ROLE = "estimator"

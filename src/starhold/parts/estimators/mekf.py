@@ -256,7 +256,7 @@ def arrived(before: Memory, params: Numbers) -> Instant:
 
 
 def started(now: Instant, readings: Any, params: Numbers) -> Instant:
-    """The estimate with the attitude of another estimator in place of the one stated for the start, and with its deviation."""
+    """The estimate with the attitude of another estimator in place of the one stated for the start, with that deviation."""
     if not hasattr(readings, FIX):
         return now
     square = params.start_turn
