@@ -14,8 +14,7 @@ from starhold.loop.kernels import make_step
 from starhold.parts.estimators import complementary_filter, quest
 from starhold.report.attitude_plots import unsure
 from starhold.scenario.building import build
-from tests.parts.test_validity import COMPLEMENTARY, ORBIT
-from tests.parts.trackers import FILTER, FIRST, GYRO, scenario
+from tests.parts.trackers import COMPLEMENTARY, FILTER, FIRST, GYRO, ORBIT, scenario
 
 SENSORS = (
     GYRO,

@@ -104,12 +104,12 @@ def parse_oem(path: Path) -> Oem:
                 raise ValueError(f"no {key}")
             if metadata[key] != about.setdefault(key, metadata[key]):
                 raise ValueError(f"line {number}: a segment of {key} = {metadata[key]}, after one of {about[key]}")
-        own, states, more = _segment(lines)
-        if instants and own[0] != instants[-1]:
-            ends = f"a segment from {stamp_of(own[0])} on, after one that ends at {stamp_of(instants[-1])}"
+        times_here, states, more = _segment(lines)
+        if instants and times_here[0] != instants[-1]:
+            ends = f"a segment from {stamp_of(times_here[0])} on, after one that ends at {stamp_of(instants[-1])}"
             raise ValueError(f"line {number}: {ends}: each has to begin where the one before ends")
         begins.append(len(rows))
-        instants, rows = instants + own, rows + states
+        instants, rows = instants + times_here, rows + states
     times = np.array([(instant - instants[0]) / SECOND for instant in instants])
     names = (about[key] for key in NEEDED)
     return Oem(times, 1e3 * np.array(rows), stamp_of(instants[0]), *names, tuple(begins))

@@ -99,11 +99,11 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         if timed and not hasattr(readings, CLOCK):
             vars(readings)[CLOCK] = number_of(step) * setup.period
         estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
-        told, watching = estimated(values, tuple(every), memories, craft, setup)
+        estimates, watching = estimated(values, tuple(every), memories, craft, setup)
         if parts.estimator is not None:
-            (estimate, *told), (estimator, *watching) = told, watching
+            (estimate, *estimates), (estimator, *watching) = estimates, watching
             values = estimate._asdict()
-        shown += told
+        shown += estimates
         known = state._replace(**{name: x for name, x in values.items() if name in state._fields})
         telling = [one for one in named.torques if one.part.flag("MODELLED")]
         torque = total(

@@ -130,7 +130,7 @@ Late: TypeAlias = Timing | tuple[()]
 class Waiting(NamedTuple):
     """The memory of a sensor, and what it saw at earlier control steps, the newest first."""
 
-    own: Any
+    sensor: Any
     seen: tuple[tuple[Any, ...], ...]
 
 
@@ -146,10 +146,10 @@ def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
     return late if any(late) else ()
 
 
-def awaited(own: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
+def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
     """The memory at the start, with that of a sensor itself: these fields of the state were always what they are then."""
-    kept = late.periods + bool(late.share or late.jitter) if late else 0
-    return Waiting(own, (tuple(getattr(state, name) for name in names),) * kept) if late else own
+    count = late.periods + bool(late.share or late.jitter) if late else 0
+    return Waiting(sensor, (tuple(getattr(state, name) for name in names),) * count) if late else sensor
 
 
 def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dice, place: int) -> tuple[Any, Any, Any]:
@@ -168,12 +168,12 @@ def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dic
     then = dict(zip(names, values, strict=True))
     if "attitude" in then:
         then["attitude"] = normalise(then["attitude"])
-    return state._replace(**then), memory.own, seen[: len(memory.seen)]
+    return state._replace(**then), memory.sensor, seen[: len(memory.seen)]
 
 
-def kept(own: Any, seen: Any) -> Any:
+def kept(sensor: Any, seen: Any) -> Any:
     """The memory of a sensor for the next control step, with what it has seen."""
-    return Waiting(own, seen) if seen else own
+    return Waiting(sensor, seen) if seen else sensor
 
 
 def stretch(axes: Axes) -> float:

@@ -431,6 +431,6 @@ def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
     for table in schemas:
         table["required"] = sorted({"type", *table.get("required", [])})
     file = {"type": "string", "description": "a Python file that holds a part, relative to this one; it is run"}
-    own = {name: key for name, key in EstimatorTable.model_json_schema()["properties"].items() if name != "type"}
-    from_file = {"title": "PartFromFile", "type": "object", "properties": {"file": file, **own}, "required": ["file"]}
+    keys = {name: key for name, key in EstimatorTable.model_json_schema()["properties"].items() if name != "type"}
+    from_file = {"title": "PartFromFile", "type": "object", "properties": {"file": file, **keys}, "required": ["file"]}
     return [*schemas, from_file | {"not": {"required": ["type"]}}]
