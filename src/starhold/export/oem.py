@@ -111,8 +111,8 @@ def parse_oem(path: Path) -> Oem:
         begins.append(len(rows))
         instants, rows = instants + times_here, rows + states
     times = np.array([(instant - instants[0]) / SECOND for instant in instants])
-    names = (about[key] for key in NEEDED)
-    return Oem(times, 1e3 * np.array(rows), stamp_of(instants[0]), *names, tuple(begins))
+    name, center, frame, system = (about[key] for key in NEEDED)
+    return Oem(times, 1e3 * np.array(rows), stamp_of(instants[0]), name, center, frame, system, tuple(begins))
 
 
 def _segment(lines: Lines) -> tuple[list[int], list[list[float]], bool]:

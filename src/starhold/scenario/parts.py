@@ -21,11 +21,11 @@ from starhold.parts.contract import CLOCK
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
-from starhold.parts.stated_attitude import IS_VALID
 from starhold.scenario.assumed import with_assumed
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.csv_files import csv_lines, number_in
 from starhold.scenario.schema import columns
+from starhold.scenario.starting import check_starts
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
 ONE = "one of each, or an estimator that fuses them all"
@@ -153,7 +153,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         used = loop.used(role)
         if len(used) > 1:
             raise InputError(where, _key(used[1]), f"a second {role}, beside {used[0].called}", most)
-    _check_starts(loop, where)
+    check_starts(loop, where)
     _check_effectors(loop, where)
     readings = _check_sensors(loop, where)
     there = {f.part.name for f in fitted}
@@ -181,30 +181,6 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         raise InputError(
             where, _key(loop.used("effector")[0]), f"an effector on the body {loop.body.name}", "a body that turns"
         )
-
-
-def _check_starts(loop: ClosedLoop, where: str) -> None:
-    """Raise InputError where an estimator cannot be started by the one that it names."""
-    there = {fitted.called: fitted for fitted in loop.estimating}
-    for one in loop.estimating:
-        if not one.started_by:
-            continue
-        key = f"{_key(one)}: started_by"
-        others = [name for name in there if name != one.called]
-        if not one.part.flag("STARTABLE"):
-            known = [name for name, part in parts("estimator").items() if part.flag("STARTABLE")]
-            raise InputError(where, key, f"{one.part.name}, which no other starts", f"a {' or '.join(known)}")
-        if one.started_by not in others:
-            allowed = nearest(one.started_by, others) if others else "the name of another estimator, which watches"
-            raise InputError(where, key, show(one.started_by), allowed)
-        lacking = [name for name in ("attitude", IS_VALID) if name not in there[one.started_by].part.module.Estimate._fields]
-        if lacking:
-            raise InputError(where, key, f"{one.started_by}, which gives no {lacking[0]}", "an estimator that gives it")
-        seen, then = [one.called], one.started_by
-        while then and then not in seen:
-            seen, then = [*seen, then], there[then].started_by if then in there else ""
-        if then:
-            raise InputError(where, key, f"{' started by '.join([*seen, then])}", "an estimator that begins by itself")
 
 
 def _check_estimates(loop: ClosedLoop, where: str) -> None:
@@ -422,15 +398,3 @@ def _alike(one: Any, other: Any, still: bool = False) -> bool:
         same = isinstance(other, tuple) and len(cast(Any, one)) == len(cast(Any, other))
         return same and all(_alike(a, b, still) for a, b in zip(cast(Any, one), cast(Any, other), strict=True))
     return not isinstance(other, tuple) and isinstance(one, (int, float, Buffer)) and not isinstance(one, bool)
-
-
-def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Return JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file;
-    shared: keys of its scenarios that give parameters to all parts."""
-    schemas = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
-    for table in schemas:
-        table["required"] = sorted({"type", *table.get("required", [])})
-    file = {"type": "string", "description": "a Python file that holds a part, relative to this one; it is run"}
-    keys = {name: key for name, key in EstimatorTable.model_json_schema()["properties"].items() if name != "type"}
-    from_file = {"title": "PartFromFile", "type": "object", "properties": {"file": file, **keys}, "required": ["file"]}
-    return [*schemas, from_file | {"not": {"required": ["type"]}}]
