@@ -149,3 +149,36 @@ dipole_limit = "0.2 A m^2"
 """
 """Wheels, and rods that a safe mode flies by."""
 SAFE = '[[law.mode]]\nname = "safe"\ntype = "b-dot"\nk = 1e-3\neffectors = ["magnetorquers"]\n'
+
+WATCHED = cubesat(
+    HEADS.replace('noise = 2e-5\n[[part]]\ntype = "star', 'noise = 2e-5\ndelay = 0.7\njitter = 0.01\n[[part]]\ntype = "star')
+    + 'started_by = "quest"\nstart_deviation = "1 deg"\n',
+    """
+[[part]]
+type = "gnss"
+delay = 1.0
+jitter = 0.1
+[[part]]
+type = "magnetometer"
+noise = "50 nT"
+delay = 0.2
+[[part]]
+type = "sun-sensor"
+jitter = 0.01
+delay = 0.5
+[[part]]
+type = "complementary-filter"
+attitude_gain = 0.2
+bias_gain = 0.01
+watches = true
+started_by = "mekf"
+[[part]]
+type = "quest"
+watches = true
+[[law]]
+type = "lyapunov"
+k_rate = 0.006
+k_attitude = 0.0008
+""",
+)
+"""QUEST starts the law's filter, and that another one, which watches as QUEST does; sensors are late."""

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from starhold.errors import InputError, optional, shortly
+from starhold.analysis.ranking import MetricSet
+from starhold.errors import InputError, expect, optional, shortly
 from starhold.export.oem import export_oem as export_oem
 from starhold.export.oem import read_oem as read_oem
 from starhold.files import passing_folder
@@ -104,6 +105,7 @@ def metrics(run: xr.Dataset | Flight) -> Metrics:
     Neither flown nor timed again, so that only a Flight tells what the law's calls cost. ValueError for a Dataset that is no
     run."""
     if not hasattr(run, "data_vars"):
+        expect(getattr(run, "metric_set", run), MetricSet, "metrics", "a run of sh.simulate, or a flight of sh.compare")
         flight = cast("Flight", run)
         return flight.metric_set.measured(flight.metrics)
     recording = Recording.of(cast("xr.Dataset", run))

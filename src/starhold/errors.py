@@ -43,6 +43,13 @@ class CutShortError(InputError):
     recording: Any = None
 
 
+def expect(value: Any, kinds: Any, where: str, allowed: str) -> None:
+    """Raise InputError where an argument of the Python interface is of none of these types."""
+    if not isinstance(value, kinds):
+        given = repr(value)[:60] if isinstance(value, str | int | float | None) else f"a {type(value).__name__}"
+        raise InputError(where, "", given.replace("'", '"'), allowed)
+
+
 @contextmanager
 def input_at(where: str, key: str, given: str = "") -> Generator[None]:
     """Refuse as the user's input there what raises a ValueError."""

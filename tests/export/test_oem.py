@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 import starhold as sh
 from starhold.parts.craft import EARTH
 from starhold.parts.epoch import days_of
+from starhold.scenario.element_sets import READERS
 from tests.running import starhold
 
 TEXT = """
@@ -33,6 +34,7 @@ ORBIT = """altitude = "500 km"
 inclination = "97 deg"
 epoch = "2027-03-20T12:00:00Z"
 """
+parse = READERS["oem"]
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +106,38 @@ def test_a_flight_begins_between_the_states_and_says_how_far_it_comes(run, tmp_p
     assert far == pytest.approx(flown, rel=0.15)
 
 
+ABOUT = "OBJECT_NAME = SPACECRAFT\nOBJECT_ID = 0000-000A\nCENTER_NAME = EARTH\nREF_FRAME = EME2000\nTIME_SYSTEM = UTC\n"
+SPAN = "START_TIME = 2027-03-20T12:05:00\nSTOP_TIME = 2027-03-20T12:20:00\n"
+SECOND = f"META_START\n{ABOUT}{SPAN}META_STOP\n2027-03-20T12:05:00 "
+
+
+def test_segments_are_read_one_after_the_other_and_no_state_lies_between_them(run, tmp_path):
+    """As a library of others reads them. The second segment has another orbit, 1 km beside the first from 12:05 on: states
+    are of the one or the other, and at their common instant of the second."""
+    sh.export_oem(run, tmp_path / "one.oem")
+    lines = (tmp_path / "one.oem").read_text().splitlines()
+    place = next(k for k, line in enumerate(lines) if line.startswith("2027-03-20T12:05:00 "))
+    moved = []
+    for line in lines[place:]:
+        stamp, x, *rest = line.split()
+        moved.append(" ".join([stamp, repr(float(x) + 1.0), *rest]))
+    text = "\n".join([*lines[: place + 1], SECOND.rsplit("\n", 1)[0], *moved, ""])
+    (tmp_path / "two.oem").write_text(text)
+    segments = NdmIo().from_path(tmp_path / "two.oem").body.segment
+    theirs = [[float(one.x.value) for one in segment.data.state_vector] for segment in segments]
+    told, single = sh.read_oem(tmp_path / "two.oem"), sh.read_oem(tmp_path / "one.oem")
+    assert told.begins == (0, len(theirs[0])) == (0, 6)
+    np.testing.assert_allclose(told.states[:, 0], 1e3 * np.concatenate(theirs), rtol=1e-15)
+    assert told.times[5] == told.times[6] == 300.0
+    assert single.begins == (0,)
+    both = [parse(tmp_path / name) for name in ("two.oem", "one.oem")]
+    for time, beside in ((290.0, 0.0), (299.9, 0.0), (300.0, 1e3), (310.0, 1e3), (700.0, 1e3)):
+        (x, y, z), (v, *_) = (np.subtract(*pair) for pair in zip(*(one.state(one.epoch, time) for one in both), strict=True))
+        # In axes of date the step is turned by the precession.
+        assert np.linalg.norm([x, y, z]) == pytest.approx(beside, abs=0.05)
+        assert abs(v) < 1e-3
+
+
 @pytest.mark.parametrize(
     ("change", "orbit", "said"),
     [
@@ -117,7 +151,10 @@ def test_a_flight_begins_between_the_states_and_says_how_far_it_comes(run, tmp_p
         ({"VERS = 2.0": "VERS = 9"}, "", "line 1: CCSDS_OEM_VERS = 9"),
         ({"2027-03-20T12:05:00 ": "2027-03-20T12:05:00 1 "}, "", "line 20: 7 numbers behind the epoch, 6 or 9 are wanted"),
         ({"2027-03-20T12:05:00 ": "2027-03-20T12:01:00 "}, "", "the epoch 2027-03-20T12:01:00 after 2027-03-20T12:04:00"),
-        ({"2027-03-20T12:05:00 ": "META_START\n"}, "", "line 20: a second segment"),
+        ({"2027-03-20T12:05:00 ": "META_START\n"}, "", "line 21: .* in place of key = value"),
+        ({"2027-03-20T12:05:00 ": SECOND}, "", "from 2027-03-20T12:05:00 on, after one that ends at 2027-03-20T12:04"),
+        ({"2027-03-20T12:05:00 ": SECOND.replace("EARTH", "MOON")}, "", "CENTER_NAME = MOON, after one of EARTH"),
+        ({"2027-03-20T12:05:00 ": SECOND.replace("CENTER_NAME", "CENTER")}, "", "no CENTER_NAME"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_in_one_line(run, change, orbit, said, tmp_path):

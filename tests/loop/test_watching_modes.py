@@ -14,12 +14,13 @@ from scipy.spatial.transform import Rotation
 import starhold as sh
 from starhold.algebra.rotation import short_turn
 from starhold.laws.monitors import KINDS, Monitor, watched
+from starhold.parts import sun
 from starhold.scenario.reading import builtin_text, parse
 from starhold.studies.compare import record
 from starhold.studies.modes import epoch_of, modes_flown
 from starhold.studies.verification import by_flight
 from tests.making import built, flown
-from tests.missions import GUARDED, HEADS, SAFE, WHEELS, cubesat, mode
+from tests.missions import GUARDED, HEADS, SAFE, WATCHFUL, WHEELS, cubesat, mode
 from tests.refusals import refused
 
 FREE = GUARDED.replace('on_loss = "safe"\n', "")
@@ -202,3 +203,14 @@ def test_a_monitor_trips_where_counting_says(kind, shape):
         found.append(truth)
     assert found == counted(kind, values, estimates, limit, times)
     assert 3 < sum(found) < len(found) - 3
+
+
+def test_conditions_and_slews_see_the_sun_of_the_file():
+    """That which parts see, by almanac or precise, as it is held against ERFA in test_ephemeris."""
+    epoch, seen = (2026.0, 3.0, 5.0, 6.0, 30.0, 0.0), []
+    for place, given in enumerate(("", 'ephemeris = "precise"\n')):
+        found = parse(WATCHFUL.replace("[orbit]\n", f"[orbit]\n{given}"), "here")
+        numbers = built(found).carry().memory.watch.sky.sun
+        assert numbers == found.laws[0].slews[1].sun == sun.prepared(epoch, place)
+        seen.append(np.array(sun.sun(0.0, numbers).direction))
+    assert 1e-5 < np.linalg.norm(seen[0] - seen[1]) < 1e-3

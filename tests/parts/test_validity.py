@@ -12,12 +12,10 @@ import starhold as sh
 from starhold.report.attitude_plots import unsure
 from starhold.scenario.building import build
 from starhold.simulation.lane import Recording
-from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, errors, scenario, tracker
+from tests.parts.trackers import ARCSEC, COMPLEMENTARY, FILTER, FIRST, GYRO, ORBIT, errors, scenario, tracker
 from tests.tiers import leading
 
 LATE = FIRST | {"outage": [0.0, 10.0]}
-COMPLEMENTARY = {"type": "complementary-filter", "attitude_gain": 0.2, "bias_gain": 0.01}
-ORBIT = {"position": [6.9e6, 0.0, 0.0], "velocity": [0.0, 5.0e3, 5.7e3]}
 DIRECTIONS = ({"type": "gnss"}, {"type": "magnetometer"}, {"type": "sun-sensor", "outage": [0.0, 10.0]})
 
 

@@ -8,6 +8,8 @@ import starhold as sh
 
 ARCSEC = math.radians(1.0 / 3600.0)
 GYRO = {"type": "gyro", "noise": 2e-5, "bias_walk": 1e-4}
+COMPLEMENTARY = {"type": "complementary-filter", "attitude_gain": 0.2, "bias_gain": 0.01}
+ORBIT = {"position": [6.9e6, 0.0, 0.0], "velocity": [0.0, 5.0e3, 5.7e3]}
 MEKF = {"type": "mekf", "noise": 2e-5, "bias_walk": 1e-4, "bias": 3e-4}
 
 

@@ -12,8 +12,7 @@ from starhold.errors import InputError
 from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.epoch import EPOCH, START, date_of
 from starhold.report.settings import settings
-from starhold.scenario.json_schema import json_schema
-from starhold.scenario.parts import part_schemas
+from starhold.scenario.json_schema import json_schema, part_schemas
 from starhold.scenario.reading import make_scenario, parse
 from starhold.scenario.values import locate
 from starhold.simulation.lane import fly

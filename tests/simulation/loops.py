@@ -16,7 +16,7 @@ from starhold.parts.targets.history import tabulate
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from tests.making import ORBITAL, aimed, built, noise, on_wheels, point_loop
-from tests.missions import WATCHFUL
+from tests.missions import WATCHED, WATCHFUL
 
 FUNCTIONS = str(Path(__file__).parent / "every_function.toml")
 """A scenario whose law uses every elementary function and the time, and whose inertia changes."""
@@ -71,6 +71,7 @@ def choices() -> dict[str, Any]:
     found["lag"] = replace(plain.with_parts(fit("actuator", "lag", 0.3)), substeps=2)
     found["rate limit"] = replace(plain.with_parts(fit("actuator", "rate-limit", 0.02)), substeps=2, seed=-5)
     found["modes that watch"] = built(parse(WATCHFUL, "here"))
+    found["estimators that watch"] = built(parse(WATCHED, "here"))
     found["free space"] = plain.without("environment")
     wheeled = built(parse(builtin_text("wheels-orbital") + FAULT, "here"))
     for allocation in ("least-squares", "least-peak"):

@@ -102,6 +102,24 @@ def test_campaigns_draw_mountings_that_no_law_is_told():
         sh.campaign(scenario(), over=over, runs=4, search=False)
 
 
+def test_a_law_takes_the_momentum_along_the_axes_of_its_nominal_craft():
+    """The same as of wheels that are mounted askew so: what is told and shared out follows [nominal], what acts does not."""
+    turned = Rotation.from_rotvec([0.0, 0.0, 0.02]).apply(AXES)
+    other = scenario([None] * 4)
+    tables = [{"axis": axis.tolist()} for axis in turned]
+    loop = built(other.with_({"nominal": {"wheel": tables}}))
+    step, (_, carry) = make_step(loop.composition()), fly(loop, 40)
+    given = step.measure(carry, 40, (1, 0), loop.known, loop.setup()).wheel_momentum
+    momentum = carry.effectors[0].momentum
+    assert np.abs(turned.T @ momentum - given).max() < 1e-15
+    assert np.abs(AXES.T @ momentum - given).max() > 1e-5
+    run = flown(loop, 120)
+    assert np.abs(run["wheel_command"] @ turned + run["command"]).max() < 1e-15
+    # Of equal axes nothing changes.
+    same = built(other.with_({"nominal": {"wheel": [{"axis": axis.tolist()} for axis in AXES]}}))
+    assert same.wheels.known_axes == ()
+
+
 @pytest.mark.slow
 def test_no_claim_is_made_of_wheels_that_are_askew_and_large_turns_are_refused():
     for turns, proved in (([None] * 4, True), (TURNS, False)):

@@ -36,7 +36,7 @@ class Replay:
 def compile_calls(loop: ClosedLoop) -> tuple[Kernel, ClosedLoop]:
     """Return the code that repeats the calls of a loop's law, and the loop with what is part of a call."""
     # The noise of the simulation is no part of one, but for that of readings which the call is given.
-    needed = loop.used("estimator") or getattr(loop.law.module, "WATCHES", False)
+    needed = loop.estimating or getattr(loop.law.module, "WATCHES", False)
     loop = loop.without("random-torque") if needed else loop.without("random-torque", "sensor")
     return make_kernel(replay, loop.composition(), 1, loop.carry(), Numbers.of(loop.phases(1)[0]), passes=True), loop
 

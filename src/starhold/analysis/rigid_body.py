@@ -245,7 +245,7 @@ def measure(
     for a run that did not diverge. cones: those of requirements, whose metrics are added; None: no requirement."""
     attrs = run.attrs
     given = attrs["control_period"], int(attrs["record_every"]), attrs["limit"]
-    more = cones, "wheel_momentum" in run.arrays, validity_notes.column_of(run.arrays) is not None
+    more = cones, "wheel_momentum" in run.arrays, validity_notes.column_of(run.arrays, run.attrs) is not None
     meter = recorded_meter(len(run["time"]) - 1, *given, attitude_tolerance, rate_tolerance, *more)
     return meter.of_recording(run, float(attrs["torque_limit"]))
 

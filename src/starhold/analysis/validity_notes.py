@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from starhold.algebra.scalar import less, maximum, where
@@ -18,9 +19,11 @@ class Validity(NamedTuple):
     longest: float
 
 
-def column_of(names: Iterable[str]) -> str | None:
-    """The recorded quantity that says whether the estimate is valid, None without any; estimators are recorded last."""
-    saying = [name for name in names if name == IS_VALID or name.endswith(f"_{IS_VALID}")]
+def column_of(names: Iterable[str], attrs: Mapping[str, Any] = MappingProxyType({})) -> str | None:
+    """The recorded quantity that says whether the law's estimate is valid, None without any; attrs: those of the recording,
+    which name the estimators that only watch."""
+    watching = {f"{name.replace('-', '_')}_{IS_VALID}" for name in attrs.get("watchers", "").split(", ")}
+    saying = [name for name in names if (name == IS_VALID or name.endswith(f"_{IS_VALID}")) and name not in watching]
     return saying[-1] if saying else None
 
 

@@ -80,7 +80,7 @@ def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
 def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     """Add up the bounds of the parts of a loop that declare them."""
     torques, errors = [Push(0.0)], [Push(0.0)]
-    for fitted in loop.parts:
+    for fitted in _acting(loop):
         for told, found in zip((torques, errors), _pushes(fitted, envelope), strict=True):
             told += [] if found is None else [found]
     driven = driven_errors(loop)
@@ -91,7 +91,7 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
         noisy = driven is not None and fitted in driven.parts
         return fitted not in estimated and (noisy or not _is_random(_noise(fitted, loop.period)))
 
-    told = [NO_ERRORS, *(found for f in loop.parts if (found := _bounded(f)) is not None and counts(f))]
+    told = [NO_ERRORS, *(found for f in _acting(loop) if (found := _bounded(f)) is not None and counts(f))]
     attitude, rate, *_ = (sum(own) for own in zip(*told, strict=True))
     (torque, per_rate), (command, command_per_rate) = ([sum(x) for x in zip(*own, strict=True)] for own in (torques, errors))
     turn = band_of(loop)[2:] if loop.target.part.name == "orbital" else (0.0, 0.0)
@@ -136,7 +136,7 @@ def samples_of(loop: ClosedLoop) -> int:
 
 def assumed_away(loop: ClosedLoop) -> list[str]:
     """Return the parts of a loop that only claims of the kinds `BOUNDED` include, as role and name."""
-    return [_called(f) for f in loop.parts if not _is_read(f)]
+    return [_called(f) for f in _acting(loop) if not _is_read(f)]
 
 
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
@@ -149,11 +149,16 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
             return tuple(f"{WITHOUT}{name}" for name in away)
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
-        absent = [f for f in loop.parts if not (_is_read(f) or f in noisy or _says(loop, f, envelope, f in estimated))]
+        absent = [f for f in _acting(loop) if not (_is_read(f) or f in noisy or _says(loop, f, envelope, f in estimated))]
         share = band_of(loop).share
         return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []))
 
     return tuple(replace(claim, assumptions=(*claim.assumptions, *more(claim))) for claim in claims)
+
+
+def _acting(loop: ClosedLoop) -> tuple[Fitted, ...]:
+    """Return the parts of a loop without the estimators that only watch."""
+    return tuple(fitted for fitted in loop.parts if fitted.role != "watcher")
 
 
 def _called(fitted: Fitted) -> str:

@@ -97,6 +97,8 @@ def command_of(name: str) -> Any:
             about[0] = load(about[0], allow_unstable)
         subject = declared.prepare(*about, **{key: value for key, value in given.items() if value is not None})
         folder, title = Path(), getattr(subject[0], "name", "")
+        if declared.check is not None:
+            declared.check(*subject)
         if declared.suffix:
             folder = open_folder(output or Path("results") / f"{title}-{declared.suffix}", force)
         with _progress(declared) as notice:

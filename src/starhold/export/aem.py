@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import conjugate, multiply
-from starhold.errors import InputError
+from starhold.errors import InputError, expect
 from starhold.files import read_text, write_text
 from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, days_of, precession
 
@@ -60,7 +60,7 @@ def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) ->
     """Write the attitudes of a run, a Dataset, a run.nc or its folder, as a message, and return its path. epoch: UTC at its
     start, None for its own; about: further arguments of `write_aem`. InputError for a run without attitudes, a word that
     does not fit, and a file that cannot be written."""
-    run = open_run(run) if isinstance(run, str | Path) else run
+    run = open_run(run)
     if "attitude" not in run:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
     times, attitudes = run["time"].to_numpy(), run["attitude"].to_numpy()
@@ -74,10 +74,13 @@ def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) ->
     return path
 
 
-def open_run(place: str | Path) -> Any:
-    """Read a run.nc, or that of a folder. InputError where there is none."""
+def open_run(place: Any) -> Any:
+    """Return a Dataset itself, or read a run.nc, or that of a folder. InputError where there is none."""
+    if hasattr(place, "data_vars"):
+        return place
     import xarray as xr
 
+    expect(place, (str, Path), "run", "a run of sh.simulate, a run.nc, or the folder of one")
     path = Path(place) / "run.nc" if Path(place).is_dir() else Path(place)
     try:
         return xr.load_dataset(path, engine="h5netcdf")
@@ -142,6 +145,7 @@ def write_message(path: Path, version: str, metadata: list[str], rows: list[str]
 
 def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str) -> _Message:
     """Read a message of a kind by its function. InputError where it cannot be read."""
+    expect(file, (str, Path), "message", "the name of a file")
     try:
         return parse(Path(file))
     except OSError as error:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity, quantities
-from starhold.algebra.structure import buffers, leaves
+from starhold.algebra.structure import buffers, leaves, rebuild
 from starhold.algebra.structured import Buffer
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
@@ -81,6 +81,7 @@ class FlightLaw:
                 (),
                 kept.get("estimator", NoMemory()),
                 estimate,
+                tuple(kept.get("watchers", ())),
             )
             owns = tuple(wheels for _ in self.parts.effectors)
             sign = kept.get("sign", self.loop.carry().h)
@@ -90,6 +91,7 @@ class FlightLaw:
                 "sign": after.h,
                 "law": after.memory,
                 "estimator": after.memories.estimator,
+                "watchers": rebuild(kept["watchers"], after.memories.watchers) if after.memories.watchers else (),
                 "followed": after.memories.followed,
                 "steps": kept.get("steps", 0.0) + 1.0,
             }
@@ -100,6 +102,7 @@ class FlightLaw:
 
 def flight_law(loop: ClosedLoop) -> FlightLaw:
     """Return the part of a loop that flies on a computer. InputError for a part that has no form in C."""
+    loop = loop.as_commanded()
     parts, setup, carry = loop.composition(), loop.setup(), loop.carry()
     modelled = [place for place, part in enumerate(parts.environments) if part.flag("MODELLED")]
     for place in modelled:
@@ -154,15 +157,18 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         sensors=(Part("readings", _READINGS),) * len(given),  # pyright: ignore[reportArgumentType]
         actuators=(),
     )
+    watching = [fitted.called for fitted in loop.used("watcher")]
     named = setup._replace(
         target=numbers,
         environments=_named("Environments", [(parts.environments[k].name, setup.environments[k]) for k in modelled]),
         effectors=_named("Effectors", [(parts.effectors[k].name, setup.effectors[k]) for k in acting]),
         sensors=((),) * len(given),
         actuators=(),
+        watchers=_named("Watchers", [*zip(watching, setup.watchers, strict=True)]),
     )
     kept = {"sign": carry.h if _keeps_sign(composition, module) else (), "law": carry.memory}
     kept |= {"estimator": carry.memories.estimator, "followed": carry.memories.followed}
+    kept["watchers"] = _named("WatcherStates", [*zip(watching, carry.memories.watchers, strict=True)])
     kept |= {"steps": 0.0} if timed else {}
     start = _named("FlightState", [(name, value) for name, value in kept.items() if any(True for _ in leaves(value))])
     inputs = _noted("FlightInput", fields, notes)

@@ -28,7 +28,8 @@ NEEDED = ("OBJECT_NAME", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM")
 
 class Oem(NamedTuple):
     """The orbit of a message: times (n,) in s since the first of them, whose epoch it is, positions and velocities (n, 6; m,
-    m/s), and the names of the object, the centre, the frame and the time system."""
+    m/s), the names of the object, the centre, the frame and the time system, and the rows with which its segments begin,
+    each with the instant at which the one before ends."""
 
     times: NDArray[np.float64]
     states: NDArray[np.float64]
@@ -37,6 +38,7 @@ class Oem(NamedTuple):
     center: str
     frame: str
     time_system: str
+    begins: tuple[int, ...] = (0,)
 
 
 @shortly
@@ -56,7 +58,7 @@ def export_oem(
     scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", into which an orbit in axes of date (MOD_EARTH) is
     turned; any other name is what the inertial axes are called. center: the body that is orbited. Numbers have all their
     digits. InputError for a run without an orbit, a word that does not fit, and a file that cannot be written."""
-    flown: Any = open_run(run) if isinstance(run, str | Path) else run
+    flown: Any = open_run(run)
     if "attitude" not in flown or not np.linalg.norm(flown["position"].to_numpy(), axis=1).all():
         raise InputError("export oem", "", "a run without an orbit", "one of a scenario with [orbit]")
     states = np.concatenate([flown["position"].to_numpy(), flown["velocity"].to_numpy()], axis=1)
@@ -78,26 +80,49 @@ def export_oem(
 
 @shortly
 def read_oem(file: str | Path) -> Oem:
-    """Read a CCSDS orbit ephemeris message of one segment: `times` (s, since the first), `states` (positions and velocities,
-    m and m/s), and what it is about. Accelerations and covariances are skipped. InputError where it is none."""
+    """Read a CCSDS orbit ephemeris message: `times` (s, since the first), `states` (positions and velocities, m and m/s),
+    what it is about, and where its segments begin. Accelerations and covariances are skipped. InputError where it is
+    none."""
     return read_message(file, parse_oem, "a CCSDS orbit ephemeris message")
 
 
 def parse_oem(path: Path) -> Oem:
-    """Read the orbit of a message of one segment. OSError, or ValueError that names the line and its error."""
+    """Read the orbit of a message. OSError, or ValueError that names the line and its error: all segments are read, and
+    must be about one object in one frame and follow each other without a gap."""
     lines = Lines(read_text(path))
     version = lines.value("CCSDS_OEM_VERS")
     if version not in VERSIONS:
         raise ValueError(f"line {lines.number}: CCSDS_OEM_VERS = {version}, of which {', '.join(VERSIONS)} are read")
     list(lines.before("META_START"))
-    metadata = dict(lines.pair(line) for line in lines.before("META_STOP"))
-    for key in NEEDED:
-        if key not in metadata:
-            raise ValueError(f"no {key}")
-    instants, rows = list[int](), list[list[float]]()
+    instants, rows, begins = list[int](), list[list[float]](), list[int]()
+    about, more = dict[str, str](), True
+    while more:
+        number = lines.number
+        metadata = dict(lines.pair(line) for line in lines.before("META_STOP"))
+        for key in NEEDED:
+            if key not in metadata:
+                raise ValueError(f"no {key}")
+            if metadata[key] != about.setdefault(key, metadata[key]):
+                raise ValueError(f"line {number}: a segment of {key} = {metadata[key]}, after one of {about[key]}")
+        times_here, states, more = _segment(lines)
+        if instants and times_here[0] != instants[-1]:
+            ends = f"a segment from {stamp_of(times_here[0])} on, after one that ends at {stamp_of(instants[-1])}"
+            raise ValueError(f"line {number}: {ends}: each has to begin where the one before ends")
+        begins.append(len(rows))
+        instants, rows = instants + times_here, rows + states
+    times = np.array([(instant - instants[0]) / SECOND for instant in instants])
+    name, center, frame, system = (about[key] for key in NEEDED)
+    return Oem(times, 1e3 * np.array(rows), stamp_of(instants[0]), name, center, frame, system, tuple(begins))
+
+
+def _segment(lines: Lines) -> tuple[list[int], list[list[float]], bool]:
+    """Read the instants (ns) and states (km, km/s) of a segment, and whether another one follows. ValueError for another
+    line, and for instants that do not grow."""
+    instants, rows, more = list[int](), list[list[float]](), False
     while (line := lines.following()) is not None:
-        if line == "META_START":
-            raise ValueError(f"line {lines.number}: a second segment; only messages of one segment are read")
+        more = line == "META_START"
+        if more:
+            break
         if line == "COVARIANCE_START":
             list(lines.before("COVARIANCE_STOP"))
             continue
@@ -111,5 +136,4 @@ def parse_oem(path: Path) -> Oem:
     for earlier, later in pairwise(instants):
         if later <= earlier:
             raise ValueError(f"the epoch {stamp_of(later)} after {stamp_of(earlier)}")
-    times = np.array([(instant - instants[0]) / SECOND for instant in instants])
-    return Oem(times, 1e3 * np.array(rows), stamp_of(instants[0]), *(metadata[key] for key in NEEDED))
+    return instants, rows, more

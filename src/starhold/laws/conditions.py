@@ -293,9 +293,10 @@ def needs_sky(tests: Iterable[str]) -> bool:
     return any((tested := quantity_of(test)) is not None and tested.sky for test in tests)
 
 
-def sky_at(epoch: Date) -> Sky:
-    """The sky at the start. ValueError for an epoch that is no date, or not from 1950 to 2050."""
-    return Sky(sun.prepared(epoch), sidereal(days_of(epoch)))
+def sky_at(epoch: Date, ephemeris: int = 0) -> Sky:
+    """The sky at the start; ephemeris: how the Sun moves, as parts are given it. ValueError for an epoch that is no date, or
+    not from 1950 to 2050."""
+    return Sky(sun.prepared(epoch, ephemeris), sidereal(days_of(epoch)))
 
 
 def station_at(settings: Mapping[str, Any]) -> Station:

@@ -120,6 +120,8 @@ class Modes:
     on_loss: int | None = None
     """The mode, counted from 0, that begins where wheels are lost or a monitor trips."""
     monitors: tuple[Monitor, ...] = ()
+    ephemeris: int = 0
+    """How the Sun of conditions moves, as the scenario gives it to parts."""
 
     @property
     def CARD(self) -> Card:  # noqa: N802
@@ -207,7 +209,7 @@ class Modes:
             switches = [one for _, _, of_mode in self.parts(gains) for one in of_mode]
             given = [dict(zip(switch.keys, levels, strict=True)) for switch, (_, _, *levels) in switches]
             stations = tuple(station_at(numbers) for numbers in given if "latitude" in numbers)
-            watch = Watch(-1.0, sky_at(gains.epoch) if needs_sky(self.tests) else (), stations, NEVER)
+            watch = Watch(-1.0, sky_at(gains.epoch, self.ephemeris) if needs_sky(self.tests) else (), stations, NEVER)
         if self.on_loss is not None:
             losses = Losses(tuple(monitor.at_start for monitor in self.monitors), gains.wheels_lost, 0.0, 0.0)
         return Memory(0.0, -1.0, (0.0,) * slots, now, fresh, watch, losses)

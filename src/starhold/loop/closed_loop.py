@@ -39,11 +39,13 @@ class Setup(NamedTuple):
     sensors: tuple[Any, ...]
     estimator: Any
     actuators: tuple[Any, ...]
+    watchers: tuple[Any, ...] = ()
 
 
 class Composition(NamedTuple):
     """The parts whose equations a loop is made of; one kernel flies all loops of equal compositions and numbers of one
-    form."""
+    form. watchers: the estimators that the law does not use; starters: for the law's estimator and each of them the place,
+    in this order, of the one that starts it, -1 for none; () where none is started."""
 
     body: Part
     law: Law
@@ -55,11 +57,14 @@ class Composition(NamedTuple):
     actuators: tuple[Part, ...]
     limit: Limit
     sign_policy: str
+    watchers: tuple[Part, ...] = ()
+    starters: tuple[int, ...] = ()
 
 
 class Memories(NamedTuple):
     """The memories of parts from one control step to the next, in the order in which a loop has them; `followed` is the
-    target's attitude at the previous step, for a target that is continued from it."""
+    target's attitude at the previous step, for a target that is continued from it; `readings` are those that are recorded,
+    and after them the estimates of watchers."""
 
     followed: Any
     environments: tuple[Any, ...]
@@ -67,6 +72,7 @@ class Memories(NamedTuple):
     readings: tuple[Any, ...]
     estimator: Any
     estimate: Any
+    watchers: tuple[Any, ...] = ()
 
 
 class Carry(NamedTuple):
@@ -168,8 +174,13 @@ class ClosedLoop:
         return bodies[0].part if bodies else find("body", self.law.body)
 
     def used(self, role: str) -> tuple[Fitted, ...]:
-        """The parts of a role."""
-        return tuple(fitted for fitted in self.parts if fitted.part.role == role)
+        """The parts of a role; of an estimator that the law does not use it is "watcher"."""
+        return tuple(fitted for fitted in self.parts if fitted.role == role)
+
+    @property
+    def estimating(self) -> tuple[Fitted, ...]:
+        """The law's estimator, if any, and those that watch."""
+        return (*self.used("estimator"), *self.used("watcher"))
 
     def find(self, name: str) -> Fitted | None:
         """The first part of this name, as the part itself is called."""
@@ -214,10 +225,21 @@ class ClosedLoop:
         """The limit at which the command saturates; infinite without one."""
         return getattr(self.craft, "torque_limit", np.inf) if self.command_limit is None else self.command_limit
 
+    def as_commanded(self) -> Self:
+        """Return the loop without the estimators that neither the law uses nor its own starts with."""
+        there = {fitted.called: fitted for fitted in self.estimating}
+        needed, now = list[str](), next(iter(self.used("estimator")), None)
+        while now is not None:
+            needed, now = [*needed, now.called], there.get(now.started_by)
+        return replace(self, parts=tuple(f for f in self.parts if not f.watches or f.called in needed))
+
     def composition(self) -> Composition:
         """The parts whose equations this loop is made of."""
         estimator = next(iter(self.used("estimator")), None)
-        used = {role: tuple(f.part for f in self.used(role)) for role in ("environment", "effector", "sensor", "actuator")}
+        roles = ("environment", "effector", "sensor", "actuator", "watcher")
+        used = {role: tuple(f.part for f in self.used(role)) for role in roles}
+        names = [fitted.called for fitted in self.estimating]
+        starters = [names.index(fitted.started_by) if fitted.started_by else -1 for fitted in self.estimating]
         return Composition(
             self.body,
             self.law,
@@ -229,6 +251,8 @@ class ClosedLoop:
             used["actuator"],
             self.limit,
             self.sign_policy if self.body.flag("SIGN_POLICIES") else "",
+            used["watcher"],
+            tuple(starters) if any(place >= 0 for place in starters) else (),
         )
 
     @property
@@ -265,6 +289,7 @@ class ClosedLoop:
             prepared("sensor"),
             next(iter(prepared("estimator")), ()),
             prepared("actuator"),
+            prepared("watcher"),
         )
 
     def phases(self, steps: int) -> list[Phase]:
@@ -292,13 +317,17 @@ class ClosedLoop:
         h = () if goal is None else self.body.module.side_of(start, goal)
         sensors, estimator = self.used("sensor"), next(iter(self.used("estimator")), None)
         kept = NoMemory() if estimator is None else estimator.remembered(setup.estimator, start)
+        watchers = self.used("watcher")
+        watching = tuple(f.remembered(numbers, start) for f, numbers in zip(watchers, setup.watchers, strict=True))
+        watched = [before_first(f.part, start, memory) for f, memory in zip(watchers, watching, strict=True)]
         memories = Memories(
             self._followed(goal.attitude, setup) if goal is not None and self.target.part.flag("FOLLOWS") else NoMemory(),
             tuple(f.remembered(numbers) for f, numbers in zip(self.used("environment"), setup.environments, strict=True)),
             tuple(f.remembered(numbers, start) for f, numbers in zip(sensors, setup.sensors, strict=True)),
-            tuple(before_first(f.part, start) for f in sensors if is_recorded(f.part)),
+            (*(before_first(f.part, start) for f in sensors if is_recorded(f.part)), *watched),
             kept,
             () if estimator is None else before_first(estimator.part, start, kept),
+            watching,
         )
         effectors = tuple(f.remembered(numbers) for f, numbers in zip(self.used("effector"), setup.effectors, strict=True))
         followed = sum(f.part.hook("rates") is not None for f in self.used("actuator"))

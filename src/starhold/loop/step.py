@@ -17,7 +17,7 @@ from starhold.laws.conditions import Sight
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import Carry, Composition, can_be_inactive, is_recorded
 from starhold.parts.actuators.limits import LIMITS
-from starhold.parts.contract import CLOCK
+from starhold.parts.contract import CLOCK, FIX
 from starhold.parts.part import Part
 from starhold.parts.random import RANGE, Dice
 from starhold.parts.roles import Loads, Scene
@@ -99,10 +99,11 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
         if timed and not hasattr(readings, CLOCK):
             vars(readings)[CLOCK] = number_of(step) * setup.period
         estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
+        estimates, watching = estimated(values, tuple(every), memories, craft, setup)
         if parts.estimator is not None:
-            several = SimpleNamespace(**values, every=tuple(every))
-            estimate, estimator = parts.estimator.module.estimate(several, estimator, setup.estimator, craft, setup.period)
+            (estimate, *estimates), (estimator, *watching) = estimates, watching
             values = estimate._asdict()
+        shown += estimates
         known = state._replace(**{name: x for name, x in values.items() if name in state._fields})
         telling = [one for one in named.torques if one.part.flag("MODELLED")]
         torque = total(
@@ -126,10 +127,29 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
                 _readings(tuple(vars(readings)))(*vars(readings).values()),
             )
             return body.observe(known, scene), memories._replace(
-                followed=before, sensors=tuple(kept), readings=tuple(shown), estimator=estimator, estimate=estimate
+                followed=before,
+                sensors=tuple(kept),
+                readings=tuple(shown),
+                estimator=estimator,
+                estimate=estimate,
+                watchers=tuple(watching),
             )
 
         return show, goal, Sight(known, tuple(every), estimate)
+
+    def estimated(values, every, memories, craft, setup):
+        """The estimates, and memories, of the law's estimator and of those that watch."""
+        used = parts.estimator is not None
+        before = (*([memories.estimator] if used else []), *memories.watchers)
+        numbers = (*([setup.estimator] if used else []), *setup.watchers)
+        estimates, after = list(before), list(before)
+        for one, place, starter in named.estimating:
+            fix = {} if starter < 0 else {FIX: estimates[starter]}
+            readings = SimpleNamespace(**values, every=every, **fix)
+            estimates[place], after[place] = one.module.estimate(
+                readings, before[place], numbers[place], craft, setup.period
+            )
+        return estimates, after
 
     def measure(carry, step, key, craft, setup):
         show, goal, _ = observed(carry, step, key, craft, setup)
@@ -324,10 +344,23 @@ class _Named:
         self.modes = module if isinstance(module, Modes) else None
         ranges = _ranges([*parts.environments, *parts.sensors])
         self.environments, self.sensors = ranges[: len(environments)], ranges[len(environments) :]
+        self.estimating = _in_turn(parts)
 
     def inactive(self, effector: Part, memory: Any) -> Any:
         """Whether an effector is inactive in the present mode; None for one that never is."""
         return self.modes.inactive(effector.name, memory) if self.modes is not None and can_be_inactive(effector) else None
+
+
+def _in_turn(parts: Composition) -> list[tuple[Part, int, int]]:
+    """The law's estimator and those that watch, each with its place and that of the one that starts it (-1: none), which
+    comes before it."""
+    every = ([] if parts.estimator is None else [parts.estimator]) + [*parts.watchers]
+    starters = parts.starters or (-1,) * len(every)
+
+    def depth(place: int) -> int:
+        return 0 if starters[place] < 0 else 1 + depth(starters[place])
+
+    return [(every[place], place, starters[place]) for place in sorted(range(len(every)), key=depth)]
 
 
 def _ranges(parts: list[Part]) -> list[int]:

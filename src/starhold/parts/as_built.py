@@ -1,11 +1,13 @@
 """Sensors as they are built: mounted a little otherwise than law and filter take them, with axes of another scale that are
-not at right angles, in steps and within limits. What is not asked for leaves a sensor's equations as they are."""
+not at right angles, in steps and within limits, read late and a little beside the control instant. What is not asked for
+leaves a sensor's equations as they are."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -37,7 +39,13 @@ AXES = Parameter(
 )
 """The declaration of errors of a sensor's axes, common to all sensors."""
 JITTER = Parameter("s", at_least=0.0, text="deviation of the instant at which it is read from the control instant")
-"""The declaration of sampling jitter, common to sensors that see the attitude."""
+"""The declaration of sampling jitter, common to all sensors."""
+DELAY = Parameter("s", at_least=0.0, text="dead time: from the instant at which it is read to its reading")
+"""The declaration of dead time, common to all sensors."""
+LONGEST = 64
+"""Control periods that a dead time may last."""
+ALMOST = 1e-9
+"""A dead time this near to a control period's multiple, in control periods, is taken for it."""
 
 
 def resolution(unit: str) -> Parameter:
@@ -103,6 +111,69 @@ def when_read(state: Any, jitter: Step, dice: Dice, place: int) -> Any:
         return state
     half = scale(0.5 * jitter[0] * dice.normals(place, 1)[0], state.rate)
     return state._replace(attitude=normalise(turned(state.attitude, (1.0, *half))))
+
+
+class Timing(NamedTuple):
+    """How late a sensor shows a state: whole control periods, a constant of a kernel, and the share of one more; and the
+    jitter of its instants in control periods; () for none."""
+
+    periods: int
+    share: Step
+    jitter: Step = ()
+
+
+PLACE = ("attitude", "position")
+"""What sensors of directions see."""
+Late: TypeAlias = Timing | tuple[()]
+
+
+class Waiting(NamedTuple):
+    """The memory of a sensor, and what it saw at earlier control steps, the newest first."""
+
+    sensor: Any
+    seen: tuple[tuple[Any, ...], ...]
+
+
+def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
+    """The dead time, and the jitter of what a sensor sees change from step to step, () for neither. ValueError for one
+    that is too long."""
+    if delay > LONGEST * period:
+        raise ValueError(f"the delay must be at most {LONGEST} control periods, {LONGEST * period:g} s")
+    steps = delay / period
+    whole = math.floor(steps + ALMOST)
+    share = steps - whole
+    late = Timing(whole, step_of(share if share > ALMOST else 0.0), step_of(jitter / period))
+    return late if any(late) else ()
+
+
+def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
+    """The memory at the start, with that of a sensor itself: these fields of the state were always what they are then."""
+    count = late.periods + bool(late.share or late.jitter) if late else 0
+    return Waiting(sensor, (tuple(getattr(state, name) for name in names),) * count) if late else sensor
+
+
+def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dice, place: int) -> tuple[Any, Any, Any]:
+    """The state with these fields as they were when the sensor was read, which change along a straight line between control
+    steps; the memory of the sensor itself; and what it has seen, for `kept`."""
+    if not late:
+        return state, memory, ()
+    now = tuple(getattr(state, name) for name in names)
+    seen = (now, *memory.seen)
+    values = seen[late.periods]
+    if late.share or late.jitter:
+        moved = [*late.share, *(j * dice.normals(place, 1)[0] for j in late.jitter)]
+        share = moved[0] if len(moved) == 1 else moved[0] + moved[1]
+        pairs = zip(values, seen[late.periods + 1], strict=True)
+        values = tuple(tuple(a + share * (b - a) for a, b in zip(*pair, strict=True)) for pair in pairs)
+    then = dict(zip(names, values, strict=True))
+    if "attitude" in then:
+        then["attitude"] = normalise(then["attitude"])
+    return state._replace(**then), memory.sensor, seen[: len(memory.seen)]
+
+
+def kept(sensor: Any, seen: Any) -> Any:
+    """The memory of a sensor for the next control step, with what it has seen."""
+    return Waiting(sensor, seen) if seen else sensor
 
 
 def stretch(axes: Axes) -> float:

@@ -22,6 +22,10 @@ CLOCK = "time"
 """The reading that every loop gives to a law that declares it: seconds since the start. No sensor is needed for it."""
 
 
+FIX = "fix"
+"""The reading that an estimator gets which another one starts: the other's estimate, to be used once it is valid."""
+
+
 class NoMemory(NamedTuple):
     """The memory of a part that keeps nothing."""
 

@@ -85,12 +85,20 @@ class Part:
 @dataclass(frozen=True)
 class Fitted:
     """A part in a loop: its parameters, the name that recordings and errors call it by, and the state that it starts
-    with (of effectors; None: the part's default)."""
+    with (of effectors; None: the part's default). An estimator may watch: the law does not use it; and another one, of
+    the name `started_by`, may give it its first attitude."""
 
     part: Part
     params: Any = ()
     name: str = ""
     start: Any = None
+    watches: bool = False
+    started_by: str = ""
+
+    @property
+    def role(self) -> str:
+        """Its role in the loop: that of the part, but "watcher" for an estimator that watches."""
+        return "watcher" if self.watches else self.part.role
 
     @property
     def called(self) -> str:

@@ -206,9 +206,12 @@ class Estimator(Protocol):
     """The state as it is computed from readings. `NEEDS`: the readings that it takes, by name; `Estimate` is a
     NamedTuple whose fields are named as those of the body's state that it estimates. `SEVERAL`: a dict from the name of a
     reading that it takes of several sensors to the parameter with a row for each sensor after the first, "" for none.
-    `ASSUMES`: a dict from a reading to its parameters that a scenario may leave to the sensor that has them too."""
+    `ASSUMES`: a dict from a reading to its parameters that a scenario may leave to the sensor that has them too.
+    `STARTABLE`: whether it takes its first attitude from the estimate of another one, which it reads as `fix`, once that is
+    valid."""
 
     NEEDS: tuple[str, ...]
+    STARTABLE: bool
     Estimate: type
 
     def estimate(self, readings: Any, memory: Any, params: Any, craft: Any, period: Scalar, /) -> tuple[Any, Any]:

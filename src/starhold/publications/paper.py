@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from starhold.errors import InputError
+from starhold.errors import InputError, expect
 from starhold.publications.verdicts import PLAIN, Printed, Verdict
 
 PAPERS = ("A", "B", "C", "D", "E")
@@ -121,6 +121,7 @@ def papers_of(word: str) -> list[str]:
 
 def paper_of(word: str, or_else: str = "") -> str:
     """The letter of a publication, in capitals. InputError for anything else, naming the words allowed."""
+    expect(word, str, "reproduce", f"{', '.join(PAPERS)}{or_else}")
     if word.upper() not in PAPERS:
         raise InputError("reproduce", "publication", word, f"{', '.join(PAPERS)}{or_else}")
     return word.upper()

@@ -116,7 +116,7 @@ def unsure(flights: Sequence[Flight]) -> tuple[tuple[float, float], ...]:
     """List from when to when (s) the estimate of a law is not valid; of one that goes to and fro, the first few times."""
     spans = dict[tuple[float, float], None]()
     for run in (flight.recording for flight in flights):
-        name = column_of(run.arrays)
+        name = column_of(run.arrays, run.attrs)
         bad = run[name] < 0.5 if name else np.zeros(len(run["time"]), bool)
         turns = np.flatnonzero(np.diff(np.r_[False, bad, False]))[: 2 * MOST_MARKS]
         ends = np.r_[run["time"], run["time"][-1]]

@@ -145,7 +145,10 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
     """Return the equations of the metrics of a law's flights; numbers that a slider or the duration changes go by name."""
     run, settling = flight.recording, table.settling
     every, limit = table.simulation.record_every, run.attrs["limit"]
-    tolerances, estimated = (settling.attitude_tolerance, settling.rate_tolerance), column_of(run.arrays) is not None
+    tolerances, estimated = (
+        (settling.attitude_tolerance, settling.rate_tolerance),
+        column_of(run.arrays, run.attrs) is not None,
+    )
     meter = recorded_meter(0, law.period, every, limit, *tolerances, estimated=estimated)
     program = meter.program(tuple((name, run[name].shape[1:]) for name, _ in law.columns), 0.0)
     known = {

@@ -48,7 +48,7 @@ SHOWN = 64
 ALLOWED = {
     "tle": "a text file of one satellite's two lines of 69 characters, with or without a name above",
     "omm": "an orbit mean-elements message of one satellite, as .xml, .csv, .json, or keyword = value",
-    "oem": "an orbit ephemeris message of one segment about the Earth, UTC, as keyword = value",
+    "oem": "an orbit ephemeris message about the Earth, UTC, as keyword = value",
 }
 
 
@@ -99,6 +99,8 @@ class Ephemeris(NamedTuple):
     frame: str
     first: str
     rows: tuple[tuple[float, ...], ...]
+    begins: tuple[int, ...] = (0,)
+    """The rows with which segments begin."""
     motion = "the ephemeris"
 
     @property
@@ -121,9 +123,12 @@ class Ephemeris(NamedTuple):
         if not -1e-5 <= time <= self.last + 1e-5:
             side = "before the first" if time < 0.0 else "after the last"
             raise ValueError(f"{date_text(epoch)} is {side} state of {self.file}")
-        times = np.array([row[0] for row in self.rows])
+        # A manoeuvre may lie between two segments: no polynomial goes through both.
+        first = max((begin for begin in self.begins if self.rows[begin][0] <= time), default=0)
+        segment = self.rows[first : next((begin for begin in self.begins if begin > first), None)]
+        times = np.array([row[0] for row in segment])
         begin = int(np.clip(np.searchsorted(times, time) - NEAREST // 2, 0, max(len(times) - NEAREST, 0)))
-        rows = np.array(self.rows[begin : begin + NEAREST])
+        rows = np.array(segment[begin : begin + NEAREST])
         # Each time twice: with the position, and with its derivative.
         nodes, values = np.repeat(rows[:, 0] - time, 2), rows[:, 1:].reshape(-1, 3)
         interpolated = KroghInterpolator(nodes, values).derivatives(0.0, der=2)
@@ -267,7 +272,7 @@ def _ephemeris(path: Path) -> Ephemeris:
         if given not in allowed:
             raise ValueError(f"{key} = {given}, of which {', '.join(allowed)} are read")
     rows = np.column_stack([oem.times, oem.states]).tolist()
-    return Ephemeris(path.name, oem.frame, oem.epoch, tuple(map(tuple, rows)))
+    return Ephemeris(path.name, oem.frame, oem.epoch, tuple(map(tuple, rows)), oem.begins)
 
 
 READERS = {"tle": _two_lines, "omm": _message, "oem": _ephemeris}

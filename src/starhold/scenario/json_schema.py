@@ -5,7 +5,7 @@ from typing import Any
 from starhold.scenario.bodies import bodies, others
 from starhold.scenario.bodies.interface import Body
 from starhold.scenario.modes import ModeTable, modes_model
-from starhold.scenario.parts import part_schemas
+from starhold.scenario.parts import EstimatorTable, installed, part_model
 from starhold.scenario.schema import LawTable, law_model
 
 
@@ -61,3 +61,15 @@ def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> lis
     needed = [name for name in shared.get("required", []) if name != "type"]
     known.update(shared.get("$defs", {}))
     return [*tables, from_file | {"required": ["file", *needed], "not": {"required": ["type"]}}]
+
+
+def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Return JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file;
+    shared: keys of its scenarios that give parameters to all parts."""
+    schemas = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
+    for table in schemas:
+        table["required"] = sorted({"type", *table.get("required", [])})
+    file = {"type": "string", "description": "a Python file that holds a part, relative to this one; it is run"}
+    keys = {name: key for name, key in EstimatorTable.model_json_schema()["properties"].items() if name != "type"}
+    from_file = {"title": "PartFromFile", "type": "object", "properties": {"file": file, **keys}, "required": ["file"]}
+    return [*schemas, from_file | {"not": {"required": ["type"]}}]

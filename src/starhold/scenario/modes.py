@@ -16,6 +16,7 @@ from starhold.laws.conditions import SETTINGS, TESTED, TESTS, TIMES, level_of, n
 from starhold.laws.interface import Gain
 from starhold.laws.modes import AFTER, DWELL, NAME, WHEELS_LOST, Mode, Modes, Switch, make_law
 from starhold.loop.slews import Slew
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import DAY, Date, date_of, days_of, iso_text
 from starhold.parts.part import Fitted
 from starhold.scenario.bodies.interface import Body
@@ -226,7 +227,8 @@ def read_modes(data: Any, scenario: Scenario, context: Any, key: str) -> Read:
         read_monitor(one, [each.name for each in tables], scenario, where, f"{key}.monitor[{place}]")
         for place, one in enumerate(table.monitor, 1)
     )
-    law = make_law(Modes(tuple(modes), on_loss, tuple(monitor for monitor, _ in monitors)))
+    watching = tuple(monitor for monitor, _ in monitors)
+    law = make_law(Modes(tuple(modes), on_loss, watching, scenario.table.shared.get(EPHEMERIS.shared, 0)))
     if needs_sky(law.module.tests):
         if epoch is None:
             raise InputError(where, "orbit.epoch", "nothing", f"a date, which conditions of {key} need")

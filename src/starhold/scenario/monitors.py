@@ -49,7 +49,7 @@ def read_monitor(
         raise InputError(where, f"{key}.modes", show(unknown), nearest(unknown, [*modes]))
     if (table.reading is None) == (table.estimate is None):
         raise InputError(where, key, "neither reading nor estimate" if table.reading is None else "both", "one of them")
-    estimators = [fitted for fitted in scenario.parts if fitted.part.role == "estimator"]
+    estimators = [fitted for fitted in scenario.parts if fitted.role == "estimator"]
     sensor: int | None = None
     if table.reading is None:
         if table.kind == "residual" or table.sensor is not None:

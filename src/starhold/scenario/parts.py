@@ -25,12 +25,13 @@ from starhold.scenario.assumed import with_assumed
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.csv_files import csv_lines, number_in
 from starhold.scenario.schema import columns
+from starhold.scenario.starting import check_starts
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
 ONE = "one of each, or an estimator that fuses them all"
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts in [[part]] tables; laws and bodies have tables of their own."""
-SINGLE = {"estimator": "one estimator", "target": "one target"}
+SINGLE = {"estimator": "one estimator for the law; others with watches = true", "target": "one target"}
 """Roles that only one part of a loop may have."""
 
 
@@ -39,6 +40,15 @@ class PartTable(Table):
 
     type: str
     name: Annotated[Name | None, Field(description="its name in recordings and errors; the type if absent")] = None
+
+
+class EstimatorTable(PartTable):
+    """The keys of an estimator's table beside its own parameters."""
+
+    watches: Annotated[bool, Field(description="whether it is only recorded and compared; the law uses another one")] = False
+    started_by: Annotated[
+        Name | None, Field(description="name of the estimator whose first valid attitude it starts with; none if absent")
+    ] = None
 
 
 def installed() -> dict[str, Part]:
@@ -51,7 +61,8 @@ def part_model(part: Part, shared: tuple[str, ...]) -> type[Any]:
     """Return the table of a part; shared: keys of the scenario that give parameters in its place."""
     entries: dict[str, Any] = {"type": (Literal[part.name], part.name), **columns(own_fields(part.fields(), shared))}
     title = part.name.replace("-", " ").title().replace(" ", "")
-    return create_model(title, __base__=PartTable, __doc__=part.card.summary, **entries)
+    base = EstimatorTable if part.role == "estimator" else PartTable
+    return create_model(title, __base__=base, __doc__=part.card.summary, **entries)
 
 
 def read_parts(
@@ -86,7 +97,8 @@ def read_part(
     table = with_rows(part, table, folder, where, key)
     refuse_own(table, part.fields(), shared, where, key)
     read = validate(part_model(part, tuple(shared)), table, where, key, ["file"], units)
-    return Fitted(part, params_of(part, read, shared), read.name or "")
+    fitted = Fitted(part, params_of(part, read, shared), read.name or "")
+    return replace(fitted, watches=read.watches, started_by=read.started_by or "") if part.role == "estimator" else fitted
 
 
 def params_of(part: Part, read: Any, shared: Mapping[str, Any]) -> Any:
@@ -141,6 +153,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
         used = loop.used(role)
         if len(used) > 1:
             raise InputError(where, _key(used[1]), f"a second {role}, beside {used[0].called}", most)
+    check_starts(loop, where)
     _check_effectors(loop, where)
     readings = _check_sensors(loop, where)
     there = {f.part.name for f in fitted}
@@ -188,10 +201,8 @@ def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
     """Return the names of what the sensors read. InputError where two read what is taken of one only."""
     single = {*loop.law.reads} - {*getattr(loop.law.module, "SEVERAL", ())}
     single |= {name for fitted in loop.parts for name in fitted.part.reads}
-    several: dict[str, str] = {}
-    for estimator in loop.used("estimator"):
-        several = getattr(estimator.part.module, "SEVERAL", {})
-        single |= {name for name in estimator.part.needs if name not in several}
+    for estimator in loop.estimating:
+        single |= {name for name in estimator.part.needs if name not in _several(estimator)}
     single |= set() if loop.used("estimator") else set(loop.body.module.State._fields)
     sensors: dict[str, list[str]] = {}
     for sensor in loop.used("sensor"):
@@ -200,8 +211,8 @@ def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
                 given = f"a second sensor of {name}, beside {sensors[name][0]}"
                 raise InputError(where, _key(sensor), given, "one of each, or an estimator that fuses them all")
             sensors.setdefault(name, []).append(sensor.called)
-    for estimator in loop.used("estimator"):
-        for name, key in several.items():
+    for estimator in loop.estimating:
+        for name, key in _several(estimator).items():
             others = sensors.get(name, [])[1:]
             rows = len(getattr(estimator.params, key)) if key else len(others)
             if rows != len(others):
@@ -209,6 +220,10 @@ def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
                 allowed = f"a row for each sensor of {name} after the first, in the order of the file"
                 raise InputError(where, _key(estimator), given, allowed)
     return set(sensors)
+
+
+def _several(estimator: Fitted) -> dict[str, str]:
+    return getattr(estimator.part.module, "SEVERAL", {})
 
 
 def _measuring(reading: str) -> str:
@@ -383,15 +398,3 @@ def _alike(one: Any, other: Any, still: bool = False) -> bool:
         same = isinstance(other, tuple) and len(cast(Any, one)) == len(cast(Any, other))
         return same and all(_alike(a, b, still) for a, b in zip(cast(Any, one), cast(Any, other), strict=True))
     return not isinstance(other, tuple) and isinstance(one, (int, float, Buffer)) and not isinstance(one, bool)
-
-
-def part_schemas(body: str, shared: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Return JSON Schemas of the [[part]] tables of a body: one for each installed part, and one for a part from a file;
-    shared: keys of its scenarios that give parameters to all parts."""
-    schemas = [part_model(part, shared).model_json_schema() for part in installed().values() if part.body in ("", body)]
-    for table in schemas:
-        table["required"] = sorted({"type", *table.get("required", [])})
-    file = {"type": "string", "description": "a Python file that holds a part, relative to this one; it is run"}
-    name = PartTable.model_json_schema()["properties"]["name"]
-    from_file = {"title": "PartFromFile", "type": "object", "properties": {"file": file, "name": name}, "required": ["file"]}
-    return [*schemas, from_file | {"not": {"required": ["type"]}}]

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from starhold.errors import InputError, shortly
+from starhold.errors import InputError, expect, shortly
 from starhold.laws.catalogue import Law
 from starhold.loop.slews import Slew
 from starhold.parts.part import Fitted
@@ -158,6 +159,8 @@ def load(source: str | Path, allow_unstable: bool = False) -> Scenario:
 
 def _read_text(source: str | Path) -> tuple[str, str, Path]:
     """Return the text of a file or of a built-in scenario, its name in errors, and its folder."""
+    allowed = "a scenario, or the name of a file or of a built-in scenario; sh.scenario takes tables"
+    expect(source, (str, PathLike), WHERE, allowed)
     path, where = Path(source), cut(str(source), LONGEST_PATH)
     try:
         if not path.is_file() and str(source) in builtin_names():
@@ -186,6 +189,7 @@ def make_scenario(tables: Mapping[str, Any], folder: str | Path = ".", allow_uns
     "pd", ...}]}: strings, numbers, booleans, dates, lists and tables; tuples and NumPy arrays count as lists, a SciPy
     Rotation as the quaternion of an attitude, and None as absent. File names in it are relative to `folder`. InputError as
     for a file. The scenario's `with_` makes variants, and its `text` is the file."""
+    expect(tables, Mapping, WHERE, 'tables, {"spacecraft": {...}, ...}; sh.load reads a file or a name')
     written = plain(tables, WHERE, "")
     scenario = read_tables(written, toml_text(written), WHERE, Path(folder), allow_unstable)
     say_distance(scenario)

@@ -9,6 +9,7 @@ from starhold.errors import input_at
 from starhold.laws.interface import Gain
 from starhold.loop.slews import Slew
 from starhold.parts import sun
+from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH
 from starhold.parts.targets.eigenaxis import ACCELERATION, AXIS, KEEP_OUT, RATE, cone_of
 from starhold.scenario.quantity import quantity
@@ -38,6 +39,7 @@ def slew_of(table: SlewTable | None, scenario: Scenario, key: str) -> Slew | Non
         return None
     with input_at(scenario.where, key):
         cone = cone_of(table.axis, table.keep_out)
-        seen = sun.prepared(scenario.table.shared[EPOCH.shared]) if cone else ()
+        shared = scenario.table.shared
+        seen = sun.prepared(shared[EPOCH.shared], shared.get(EPHEMERIS.shared, 0)) if cone else ()
     torque = math.inf if table.torque_limit is None else table.torque_limit
     return Slew(table.rate, table.acceleration, torque, cone, seen)

@@ -197,6 +197,8 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
         "limit": loop.limit,
         "parts": ", ".join(fitted.called for fitted in loop.parts if fitted.part.role != "body"),
     }
+    if watchers := loop.used("watcher"):
+        attrs["watchers"] = ", ".join(fitted.called for fitted in watchers)
     if carry.lost_at >= 0.0:
         attrs["diverged_at"] = carry.lost_at * loop.period
     return Recording(arrays, attrs, columns, getattr(loop.body.module, "TIME_UNIT", "s"))
@@ -204,7 +206,7 @@ def label(loop: ClosedLoop, samples: NDArray[np.float64], carry: Carry, record_e
 
 def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
     """Return the recorded quantities in the order of samples: name, quantity and its number of components. Names of sensors'
-    and an estimator's quantities begin with the part's name; so do those of effectors where a name would occur twice."""
+    and estimators' quantities begin with the part's name; so do those of effectors where a name would occur twice."""
     sample = make_step(loop.composition()).sample(loop.carry(), 0, loop.setup())
     body_sample, records, readings, estimate = sample
     effectors = [f for f in loop.used("effector") if f.part.hook("record") is not None]
@@ -214,6 +216,7 @@ def recorded(loop: ClosedLoop) -> list[tuple[str, Quantity, int]]:
     taken: set[str] = set()
     groups = [("", body_sample), *(("", one) for one in records)]
     callers = ["", *(f.called for f in effectors), *([loop.law.name] if loop.law.hook("record") is not None else [])]
+    sensors += loop.used("watcher")
     groups += [(f.called, one) for f, one in zip(sensors, readings, strict=True)]
     groups += [(f.called, estimate) for f in estimators]
     callers += [f.called for f in (*sensors, *estimators)]

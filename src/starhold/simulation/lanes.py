@@ -262,7 +262,7 @@ def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = Non
 
 def _differ(loop: ClosedLoop) -> bool:
     """Return whether the initial memories of a loop depend on the body's initial state."""
-    starting = [f.part for f in (*loop.used("sensor"), *loop.used("estimator")) if f.part.hook("remember")]
+    starting = [f.part for f in (*loop.used("sensor"), *loop.estimating) if f.part.hook("remember")]
     return bool(starting or loop.carry().memories.readings or loop.carry().memories.estimate) or (
         loop.aims and loop.target.part.flag("FOLLOWS")
     )

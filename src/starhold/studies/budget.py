@@ -222,7 +222,7 @@ def check_budget(scenario: Scenario) -> tuple[Requirement, ...]:
     """Return the requirements that the budget of a scenario decides. InputError where one is not an upper bound on the level
     of an index, such as "ape", and where an index needs an estimator that is absent."""
     tables = tables_of(scenario, "budget")
-    known = PERFORMANCE if all(fitted.part.role != "estimator" for fitted in scenario.parts) else MEANINGS
+    known = PERFORMANCE if all(fitted.role != "estimator" for fitted in scenario.parts) else MEANINGS
     return at_most(scenario, tables, dict.fromkeys([index.lower() for index in known], "rad"))
 
 

@@ -75,7 +75,7 @@ def named(value: Any, name: str) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-_OF_PART = re.compile(r"(?:(memories|setup)\.)?(sensor|environment|effector)s\[(\d+)\]")
+_OF_PART = re.compile(r"(?:(memories|setup)\.)?(sensor|environment|effector|watcher)s\[(\d+)\]")
 _OF_ONE = re.compile(r"(memories|setup)\.(estimator|target)\b")
 
 

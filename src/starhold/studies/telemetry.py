@@ -16,8 +16,9 @@ from starhold.export.aem import from_date
 from starhold.loop.closed_loop import ClosedLoop, is_recorded
 from starhold.parts.epoch import OF_J2000, iso_text
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
+from starhold.scenario.building import build
 from starhold.scenario.checking import nearest
-from starhold.scenario.reading import Scenario
+from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import recorded
 from starhold.simulation.stepper import sensed_of
 from starhold.studies.telemetry_files import (
@@ -92,6 +93,11 @@ def quantities_of(loop: ClosedLoop) -> Known:
             meant = known[name][0]._replace(text=f"{name} as {fitted.called} measures it")
             known[f"{fitted.called.replace('-', '_')}_{name}"] = meant, len(flatten((value,)))
     return known
+
+
+def check(scenario: Scenario, entry: LawEntry, source: Any, mapping: str | Path | None = None, *_: Any) -> None:
+    """Raise InputError where telemetry cannot be read for a law of a scenario."""
+    read(scenario, build(scenario, entry), source, mapping)
 
 
 def read(scenario: Scenario, loop: ClosedLoop, source: Any, mapping: str | Path | None = None) -> Telemetry:

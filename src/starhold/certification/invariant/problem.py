@@ -17,7 +17,7 @@ from starhold.certification.evidence.finding import certificate as kernel_certif
 from starhold.certification.invariant.system import TURNED, System, check_sizes, turned
 from starhold.certification.invariant.text import MOST_DIGITS, RESERVED, ExpressionError, as_written, read
 from starhold.certification.invariant.theorems import ATTRACTING, THEOREMS, Shown, WantedSet, a_state, indicator, show
-from starhold.errors import InputError
+from starhold.errors import InputError, expect
 from starhold.files import read_text
 
 MOVING, MOST, LARGEST, LONGEST = 7, 9, 1e100, 100
@@ -78,6 +78,7 @@ def builtin_names() -> list[str]:
 
 def load(source: str | Path) -> InvariantProblem:
     """Read the problem in a file, or the built-in one of that name. InputError states its first error."""
+    expect(source, (str, Path), "invariant", "a problem, or the name of a file or of a built-in problem")
     path = Path(source)
     if not path.exists() and str(source) in builtin_names():
         file = resources.files("starhold.certification.invariant") / "builtin" / f"{source}.toml"

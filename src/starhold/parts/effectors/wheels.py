@@ -361,8 +361,12 @@ def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
 
 
 def shared_as(params: Wheels, known: Wheels) -> Wheels:
-    """The wheels with a torque shared out among them as among those that laws take them for, if these are as many."""
-    return params._replace(least=known.least) if len(params.axes) == len(known.axes) else params
+    """The wheels with a torque shared out, and their momentum told, as of those that laws take them for, if these are as
+    many."""
+    if len(params.axes) != len(known.axes):
+        return params
+    axes = as_known(known).axes
+    return params._replace(least=known.least, known_axes=() if axes == params.axes else axes)
 
 
 def axial_inertia(params: Wheels) -> NDArray[np.float64]:

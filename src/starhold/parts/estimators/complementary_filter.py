@@ -8,9 +8,10 @@ from typing import Annotated, Any, NamedTuple
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.scalar import Scalar, both, less, opposite, where
+from starhold.algebra.structure import chosen
 from starhold.algebra.vector import IDENTITY, ZERO, Vector, scale, subtract
 from starhold.parts.attitudes import attitudes_of, small_turn, together
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import FIX, Card, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.stated_attitude import START, VALID, unit_quaternion
 
@@ -21,12 +22,13 @@ CARD = Card(
     assumptions=(
         "attitudes come without delay; of several that are new at once the mean is taken",
         "the bias changes slowly",
-        "the first attitude measured takes the place of the one stated for the start",
+        "the first attitude, measured or of the estimator that starts it, takes the place of the one stated for the start",
     ),
 )
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 SEVERAL = {"attitude": ""}
+STARTABLE = True
 FIRST = {"gyro_bias": ZERO, "is_valid": 0.0}
 
 
@@ -69,6 +71,7 @@ def remember(params: Params, state: Any) -> Memory:
 
 def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
     """The estimate at a control step, and the prediction for the next."""
+    memory = _started(memory, readings)
     (measured, new), *others = seen = attitudes_of(readings)
     if others:
         measured, _, new = together(seen, [IDENTITY] * len(seen))
@@ -83,6 +86,14 @@ def estimate(readings: Any, memory: Memory, params: Params, craft: Craft, period
     ahead = normalise(multiply(attitude, (1.0, *step)))
     begun = where(new, 1.0, memory.begun)
     return Estimate(attitude, rate, bias, begun), Memory(ahead, bias, begun)
+
+
+def _started(memory: Memory, readings: Any) -> Memory:
+    """The memory with the attitude of another estimator in place of the one stated for the start."""
+    if not hasattr(readings, FIX):
+        return memory
+    first = both(less(0.5, readings.fix.is_valid), less(memory.begun, 0.5))
+    return chosen(first, memory._replace(attitude=readings.fix.attitude, begun=1.0), memory)
 
 
 def examples() -> list[Params]:

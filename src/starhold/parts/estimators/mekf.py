@@ -35,7 +35,7 @@ from starhold.algebra.vector import (
 from starhold.algebra.vector import multiply as product
 from starhold.parts.attitudes import attitudes_of, small_turn, together, turned_by
 from starhold.parts.boresight import unit_boresight
-from starhold.parts.contract import Card, Noise, Parameter, Recursion
+from starhold.parts.contract import FIX, Card, Noise, Parameter, Recursion
 from starhold.parts.covariance import (
     GYRO_BIAS,
     GYRO_NOISE,
@@ -61,12 +61,14 @@ CARD = Card(
         "attitudes come without delay",
         "the rate changes in proportion to time between control steps",
         "the error of the attitude is small",
-        "the first attitude of a star tracker takes the place of the one stated for the start",
+        "the first attitude of a star tracker takes the place of the one stated for the start; that of the estimator that "
+        "starts it does so with the deviation stated for the start",
     ),
 )
 ROLE = "estimator"
 NEEDS = ("attitude", "rate")
 SEVERAL = {"attitude": "more_trackers"}
+STARTABLE = True
 ASSUMES = {"attitude": ("cross", "roll", "boresight")}
 FIRST = {"gyro_bias": ZERO, "attitude_deviation": ZERO, "gyro_bias_deviation": ZERO, "is_valid": 0.0}
 HOUR = 3600.0
@@ -230,7 +232,7 @@ def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, perio
         after = chosen(known, corrected(now, measured, params, period), taken(now, measured, params))
         return (after._replace(memory=after.memory._replace(stage=2.0)),)
 
-    (now,) = when(new, correct, arrived(before, params))
+    (now,) = when(new, correct, started(arrived(before, params), readings, params))
     after = now.memory
     rate = subtract(subtract(readings.rate, after.bias), now.noise)
     spread, walked = deviations(now.turn), deviations(after.walk)
@@ -251,6 +253,16 @@ def arrived(before: Memory, params: Numbers) -> Instant:
     """The estimate at a control step before it is corrected."""
     ahead = along_diagonal(before.turn, 3.0 * params.reading)
     return Instant(before.attitude, before.turn, ZERO, before._replace(turn=ahead))
+
+
+def started(now: Instant, readings: Any, params: Numbers) -> Instant:
+    """The estimate with the attitude of another estimator in place of the one stated for the start, with that deviation."""
+    if not hasattr(readings, FIX):
+        return now
+    square = params.start_turn
+    begun = taken(now, readings.fix.attitude, params._replace(tracker=diagonal((square, square, square))))
+    first = both(less(0.5, readings.fix.is_valid), less(now.memory.stage, 1.5))
+    return chosen(first, begun._replace(memory=begun.memory._replace(stage=2.0)), now)
 
 
 def taken(now: Instant, measured: Quaternion, params: Numbers) -> Instant:

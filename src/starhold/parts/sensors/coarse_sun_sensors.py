@@ -25,7 +25,7 @@ from starhold.algebra.vector import (
 )
 from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -56,6 +56,8 @@ CUBE: tuple[Row, ...] = (
     (0.0, 0.0, 1.0),
     (0.0, 0.0, -1.0),
 )
+MOST = RANGE - 1
+"""Diodes at most, whose random numbers leave one for the jitter."""
 FAINT = 1e-6
 """Weight of what the currents leave open, which is taken for zero."""
 
@@ -75,11 +77,13 @@ class Params(NamedTuple):
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
     ephemeris: Annotated[int, EPHEMERIS] = 0
+    jitter: Annotated[float, as_built.JITTER] = 0.0
+    delay: Annotated[float, as_built.DELAY] = 0.0
 
 
 class Numbers(NamedTuple):
     """Unit normals, as flight software has them; the deviation, the albedo and the threshold; the Sun, the control period
-    (s), the outage (control steps), and the axes of the mounting, () for those of the body."""
+    (s), the outage (control steps); () or the axes of the mounting, the jitter of its instants (s), and how late it is."""
 
     normals: tuple[Vector, ...]
     noise: Scalar
@@ -89,6 +93,8 @@ class Numbers(NamedTuple):
     period: Scalar
     outage: Window
     axes: as_built.Axes
+    jitter: as_built.Step = ()
+    late: as_built.Late = ()
 
 
 class Reading(NamedTuple):
@@ -99,19 +105,28 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for faces without direction, too many of them, a bad epoch and a bad outage."""
-    if not 0 < len(params.faces) <= RANGE:
-        raise ValueError(f"from 1 to {RANGE} diodes are taken, not {len(params.faces)}")
+    """The numbers of a flight. ValueError for faces without direction, too many of them, a bad epoch, a bad outage and too
+    long a delay."""
+    if not 0 < len(params.faces) <= MOST:
+        raise ValueError(f"from 1 to {MOST} diodes are taken, not {len(params.faces)}")
     if not all(math.hypot(*face) > 0.0 for face in params.faces):
         raise ValueError("each diode needs a normal with a direction")
     normals = tuple(scale(1.0 / math.hypot(*face), face) for face in params.faces)
     outage, axes = in_steps(params.outage, period), as_built.axes_of(params.mounting_error, ZERO)
     shares = params.noise, params.albedo, params.threshold
-    return Numbers(normals, *shares, sun.prepared(params.epoch, params.ephemeris), period, outage, axes)
+    read = as_built.step_of(params.jitter), as_built.late_by(params.delay, period)
+    return Numbers(normals, *shares, sun.prepared(params.epoch, params.ephemeris), period, outage, axes, *read)
+
+
+def remember(params: Numbers, state: Any) -> Any:
+    """The state at the start where the sensor is late."""
+    return as_built.awaited(NoMemory(), params.late, state, as_built.PLACE)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The direction by the currents of this control step."""
+    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, MOST)
+    state = as_built.when_read(state, params.jitter, dice, MOST)
     seen = sun.sun(number_of(step) * params.period, params.sun)
     up = unit(state.position)
     light = sun.in_view(state.position, seen)
@@ -128,7 +143,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     length = norm(direction)
     visible = both(less(params.threshold, length), opposite(is_out(step, params.outage)))
     shown: Any = tuple(where(visible, divide(x, length), 0.0) for x in direction)
-    return Reading(shown, where(visible, 1.0, 0.0)), memory
+    return Reading(shown, where(visible, 1.0, 0.0)), as_built.kept(memory, waiting)
 
 
 def _current(

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity
+from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, add
+from starhold.parts import as_built
 from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.random import Dice
 
@@ -17,6 +19,7 @@ CARD = Card(
 )
 ROLE = "sensor"
 NEEDS = ("two-body",)
+SEEN = ("position", "velocity")
 
 
 class Params(NamedTuple):
@@ -24,6 +27,16 @@ class Params(NamedTuple):
 
     position: Annotated[float, Parameter("m", at_least=0.0, text="standard deviation of each component")] = 0.0
     velocity: Annotated[float, Parameter("m/s", at_least=0.0, text="standard deviation of each component")] = 0.0
+    delay: Annotated[float, as_built.DELAY] = 0.0
+    jitter: Annotated[float, as_built.JITTER] = 0.0
+
+
+class Numbers(NamedTuple):
+    """Deviations of position (m) and velocity (m/s), and how late the receiver is."""
+
+    position: Scalar
+    velocity: Scalar
+    late: as_built.Late
 
 
 class Reading(NamedTuple):
@@ -33,12 +46,23 @@ class Reading(NamedTuple):
     velocity: Annotated[Vector, Quantity("m/s", "as measured, inertial", "axis")]
 
 
-def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int) -> tuple[Reading, NoMemory]:
+def prepare(params: Params, period: float) -> Numbers:
+    """The numbers of a flight. ValueError for too long a delay."""
+    return Numbers(params.position, params.velocity, as_built.late_by(params.delay, period, params.jitter))
+
+
+def remember(params: Numbers, state: Any) -> Any:
+    """The state at the start where it is late."""
+    return as_built.awaited(NoMemory(), params.late, state, SEEN)
+
+
+def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """Position and velocity at this control step, with noise."""
+    state, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 6)
     position = add(state.position, dice.vector(0, params.position))
-    return Reading(position, add(state.velocity, dice.vector(3, params.velocity))), memory
+    return Reading(position, add(state.velocity, dice.vector(3, params.velocity))), as_built.kept(memory, waiting)
 
 
 def examples() -> list[Params]:
-    """One of a CubeSat, and an exact one."""
-    return [Params(10.0, 0.1), Params()]
+    """One of a CubeSat, an exact one, and one that is late."""
+    return [Params(10.0, 0.1), Params(), Params(10.0, 0.1, 0.12, 1e-3)]

@@ -26,6 +26,7 @@ CARD = Card(
 )
 ROLE = "sensor"
 HOUR = 3600.0
+SEEN = ("rate",)
 
 
 class Params(NamedTuple):
@@ -65,12 +66,14 @@ class Params(NamedTuple):
         float,
         Parameter("s", above=0.0, text="of that part: its Allan deviation is largest, 0.62 of it, at 1.9 of this time"),
     ] = 100.0
+    delay: Annotated[float, as_built.DELAY] = 0.0
+    jitter: Annotated[float, as_built.JITTER] = 0.0
 
 
 class Numbers(NamedTuple):
     """Deviations of a reading and of the bias's step (rad/s), the bias at the start, the scale factor and the limit; () or
-    its axes, its step (rad/s), and of the part of the bias that wanders the share that stays and the deviation of what is
-    added (rad/s)."""
+    its axes, its step (rad/s), of the part of the bias that wanders the share that stays and the deviation of what is
+    added (rad/s), and how late it is."""
 
     deviation: Scalar
     walk: Scalar
@@ -80,6 +83,7 @@ class Numbers(NamedTuple):
     axes: as_built.Axes = ()
     step: as_built.Step = ()
     wander: tuple[Scalar, ...] = ()
+    late: as_built.Late = ()
 
 
 class Wandering(NamedTuple):
@@ -96,7 +100,7 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step."""
+    """The numbers of a control step. ValueError for too long a delay."""
     walk = params.bias_walk * math.sqrt(period / HOUR)
     stays, size = math.exp(-period / params.correlation_time), params.bias_instability
     return Numbers(
@@ -108,30 +112,33 @@ def prepare(params: Params, period: float) -> Numbers:
         as_built.axes_of(params.mounting_error, params.axis_errors),
         as_built.step_of(params.resolution),
         (stays, size * math.sqrt(1.0 - stays * stays)) if as_built.is_given(size) else (),
+        as_built.late_by(params.delay, period, params.jitter),
     )
 
 
-def remember(params: Numbers, state: Any) -> Vector | Wandering:
-    """The bias at the start (rad/s)."""
-    return Wandering(params.bias, ZERO) if params.wander else params.bias
+def remember(params: Numbers, state: Any) -> Any:
+    """The bias at the start (rad/s), and the rate then where it is late."""
+    return as_built.awaited(Wandering(params.bias, ZERO) if params.wander else params.bias, params.late, state, SEEN)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The rate with the bias and noise of this control step, and the bias of the next."""
+    state, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 9)
     bias = add(memory.bias, memory.wander) if params.wander else memory
     seen = as_built.along(params.axes, state.rate)
     shown = add(add(scale(params.factor, seen), bias), dice.vector(0, params.deviation))
     reading = Reading(as_built.shown(shown, params.step, params.limit))
     if not params.wander:
-        return reading, add(memory, dice.vector(3, params.walk))
+        return reading, as_built.kept(add(memory, dice.vector(3, params.walk)), waiting)
     stays, added = params.wander
     wander = add(scale(stays, memory.wander), dice.vector(6, added))
-    return reading, Wandering(add(memory.bias, dice.vector(3, params.walk)), wander)
+    return reading, as_built.kept(Wandering(add(memory.bias, dice.vector(3, params.walk)), wander), waiting)
 
 
 def error(params: Params) -> Errors:
-    """The bias at the start and half a step; what grows with the rate, or wanders, has no bound."""
+    """The bias at the start and half a step; what grows with the rate, wanders or comes late has no bound."""
     built = as_built.is_given(params.scale_error, params.mounting_error, params.axis_errors, params.bias_instability)
+    built = built or as_built.is_given(params.delay, params.jitter)
     if built or params.limit < math.inf:
         return UNBOUNDED
     bias = math.hypot(*params.bias)
@@ -145,10 +152,10 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """A MEMS gyro, one that has a bias alone, one that is exact, and one as it is built."""
+    """A MEMS gyro, one that has a bias alone, one that is exact, and one as it is built, late and at uneven instants."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
     skewed = ((1e-3, 0.0, 5e-4), (0.0, -2e-3, 0.0), (0.0, 3e-4, 0.0))
     built = mems._replace(
         mounting_error=(2e-3, 0.0, -1e-3), axis_errors=skewed, resolution=1e-4, bias_instability=1e-5, correlation_time=300.0
-    )
+    )._replace(delay=0.03, jitter=1e-3)
     return [mems._replace(limit=math.radians(100.0)), Params(bias=mems.bias), Params(), built]

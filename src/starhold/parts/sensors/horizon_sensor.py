@@ -11,7 +11,7 @@ from starhold.algebra.scalar import Scalar, both, less, maximum, opposite, sqrt,
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, unit
 from starhold.parts import as_built
 from starhold.parts.boresight import field_cosine, unit_boresight
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.orbit import BODIES
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
 from starhold.parts.random import Dice
@@ -49,11 +49,13 @@ class Params(NamedTuple):
     limb_height: Annotated[float, Parameter("m", text="of the limb above that which flight software supposes")] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
+    jitter: Annotated[float, as_built.JITTER] = 0.0
+    delay: Annotated[float, as_built.DELAY] = 0.0
 
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the limb's height
-    (m), the outage (control steps), and the axes of the mounting, () for those of the body."""
+    (m), the outage (control steps); () or the axes of the mounting, the jitter of its instants (s), and how late it is."""
 
     noise: Scalar
     boresight: Vector
@@ -61,6 +63,8 @@ class Numbers(NamedTuple):
     height: Scalar
     outage: Window
     axes: as_built.Axes
+    jitter: as_built.Step = ()
+    late: as_built.Late = ()
 
 
 class Reading(NamedTuple):
@@ -71,7 +75,7 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for a boresight without direction and a bad outage."""
+    """The numbers of a flight. ValueError for a boresight without direction, a bad outage and too long a delay."""
     return Numbers(
         params.noise,
         unit_boresight(params.boresight),
@@ -79,11 +83,20 @@ def prepare(params: Params, period: float) -> Numbers:
         params.limb_height,
         in_steps(params.outage, period),
         as_built.axes_of(params.mounting_error, ZERO),
+        as_built.step_of(params.jitter),
+        as_built.late_by(params.delay, period),
     )
+
+
+def remember(params: Numbers, state: Any) -> Any:
+    """The state at the start where the sensor is late."""
+    return as_built.awaited(NoMemory(), params.late, state, as_built.PLACE)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The direction of the Earth's centre at this control step."""
+    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 4)
+    state = as_built.when_read(state, params.jitter, dice, 3)
     distance = norm(state.position)
     down = as_built.along(params.axes, to_body(state.attitude, scale(-1.0 / distance, state.position)))
     toward = dot(down, params.boresight)
@@ -97,7 +110,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     moved = scale(params.height / (distance * cosine * across), beside)
     shown = unit(add(add(down, moved), dice.vector(0, params.noise)))
     reading: Any = tuple(where(visible, x, 0.0) for x in shown)
-    return Reading(reading, where(visible, 1.0, 0.0)), memory
+    return Reading(reading, where(visible, 1.0, 0.0)), as_built.kept(memory, waiting)
 
 
 def examples() -> list[Params]:

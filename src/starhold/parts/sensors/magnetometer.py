@@ -49,11 +49,12 @@ class Params(NamedTuple):
     resolution: Annotated[float, as_built.resolution("T")] = 0.0
     limit: Annotated[float, as_built.limit("T")] = math.inf
     jitter: Annotated[float, as_built.JITTER] = 0.0
+    delay: Annotated[float, as_built.DELAY] = 0.0
 
 
 class Numbers(NamedTuple):
     """Deviation and bias (T), the scale factor, the field, and the outage (control steps); () or its axes, its step (T),
-    its limit (T), and the jitter of its instants (s)."""
+    its limit (T), the jitter of its instants (s), and how late it is."""
 
     noise: Scalar
     bias: Vector
@@ -64,6 +65,7 @@ class Numbers(NamedTuple):
     step: as_built.Step = ()
     limit: tuple[Scalar, ...] = ()
     jitter: as_built.Step = ()
+    late: as_built.Late = ()
 
 
 class Reading(NamedTuple):
@@ -74,7 +76,8 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known, and for a bad outage."""
+    """The numbers of a flight. ValueError for an epoch at which the field is not known, for a bad outage and too long a
+    delay."""
     field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period)
     return Numbers(
         _deviation(params, period),
@@ -86,16 +89,18 @@ def prepare(params: Params, period: float) -> Numbers:
         as_built.step_of(params.resolution),
         (params.limit,) if params.limit < math.inf else (),
         as_built.step_of(params.jitter),
+        as_built.late_by(params.delay, period),
     )
 
 
-def remember(params: Numbers, state: Any) -> Vector:
-    """No reading yet (T)."""
-    return ZERO
+def remember(params: Numbers, state: Any) -> Any:
+    """No reading yet (T), and the state at the start where it is late."""
+    return as_built.awaited(ZERO, params.late, state, as_built.PLACE)
 
 
-def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Vector]:
+def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The field at this control step, or in an outage the last one before it."""
+    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 4)
     state = as_built.when_read(state, params.jitter, dice, 3)
     true = magnetic_field.field_at(state.position, step, params.field)
     seen = as_built.along(params.axes, to_body(state.attitude, true))
@@ -104,12 +109,12 @@ def measure(state: Any, memory: Vector, params: Numbers, dice: Dice, step: int) 
         shown = as_built.shown(shown, params.step, params.limit[0] if params.limit else math.inf)
     out = is_out(step, params.outage)
     latest: Any = tuple(where(out, old, new) for old, new in zip(memory, shown, strict=True))
-    return Reading(latest, where(out, 0.0, 1.0)), latest
+    return Reading(latest, where(out, 0.0, 1.0)), as_built.kept(latest, waiting)
 
 
 def error(params: Params) -> Errors:
     """The largest error beside noise and without outages, wherever there is no ground."""
-    if params.outage != NEVER or params.limit < math.inf or as_built.is_given(params.jitter):
+    if params.outage != NEVER or params.limit < math.inf or as_built.is_given(params.jitter, params.delay):
         return UNBOUNDED
     skewed = as_built.stretch(as_built.axes_of(params.mounting_error, params.axis_errors))
     share = abs(params.scale_error) * (1.0 + skewed) + skewed

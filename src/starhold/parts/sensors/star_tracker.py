@@ -32,8 +32,7 @@ CARD = Card(
 )
 ROLE = "sensor"
 FIRST = {"attitude_is_new": 0.0}
-MOST = 64
-"""Control periods that a delay may last."""
+SEEN = ("attitude",)
 
 
 class Params(NamedTuple):
@@ -47,7 +46,7 @@ class Params(NamedTuple):
         1.0,
     )
     interval: Annotated[float, Parameter("s", at_least=0.0, text="between updates; each control step if 0")] = 0.0
-    delay: Annotated[float, Parameter("s", at_least=0.0, text="from exposure to reading")] = 0.0
+    delay: Annotated[float, as_built.DELAY] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER
     sun_cone: Annotated[float, blinding.SUN] = 0.0
     moon_cone: Annotated[float, blinding.MOON] = 0.0
@@ -62,15 +61,15 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Deviations (rad), the unit vector of the boresight, control steps from update to update, those of the delay, and those
-    of the outage; the cones that blind, the squared rate limit (rad2/s2), the turn of its mounting, and the jitter of its
-    instants (s), () for none."""
+    """Deviations (rad), the unit vector of the boresight, control steps from update to update, how late it is, and control
+    steps of the outage; the cones that blind, the squared rate limit (rad2/s2), the turn of its mounting, and the jitter of
+    its instants (s), () for none."""
 
     cross: Scalar
     roll: Scalar
     boresight: Vector
     every: Scalar
-    late: int
+    late: as_built.Late
     outage: Window
     cones: blinding.Cones | tuple[()] = ()
     square: tuple[Scalar, ...] = ()
@@ -79,10 +78,9 @@ class Numbers(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The last reading, the attitudes on their way, the newest first, and control steps until the next update."""
+    """The last reading, and control steps until the next update."""
 
     shown: Quaternion
-    waiting: tuple[Quaternion, ...]
     left: Scalar
 
 
@@ -98,9 +96,6 @@ class Reading(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a control step. ValueError for a boresight without direction, too long a delay, a bad outage,
     and cones that blind always."""
-    late = round(params.delay / period)
-    if late > MOST:
-        raise ValueError(f"the delay must be at most {MOST} control periods, {MOST * period:g} s")
     boresight, mounted = unit_boresight(params.boresight), as_built.turn_of(params.mounting_error)
     looks = to_reference(mounted, boresight) if mounted else boresight
     return Numbers(
@@ -108,7 +103,7 @@ def prepare(params: Params, period: float) -> Numbers:
         params.roll,
         boresight,
         float(max(1, round(params.interval / period))),
-        late,
+        as_built.late_by(params.delay, period),
         in_steps(params.outage, period),
         blinding.prepared(
             looks, params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, params.ephemeris, period
@@ -124,15 +119,16 @@ def check_start(params: Numbers, start: Any, craft: Craft) -> None:
     blinding.check(params.cones, start, craft)
 
 
-def remember(params: Numbers, state: Any) -> Memory:
+def remember(params: Numbers, state: Any) -> Any:
     """An update is due, and the attitude at the start is on its way. Until it comes the inertial axes are shown."""
-    return Memory(NO_TURN, (state.attitude,) * params.late, 0.0)
+    return as_built.awaited(Memory(NO_TURN, 0.0), params.late, state, SEEN)
 
 
-def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Memory]:
+def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The last update, a new one where it is due."""
     state = as_built.when_read(state, params.jitter, dice, 3)
-    seen = memory.waiting[-1] if params.late else state.attitude
+    then, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 4)
+    seen = then.attitude
     due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
     if params.cones:
         due = both(due, opposite(blinding.is_blind(state, params.cones, step)))
@@ -147,9 +143,8 @@ def measure(state: Any, memory: Memory, params: Numbers, dice: Dice, step: int) 
         return (normalise(multiply(mounted, (1.0, *error))),)
 
     (shown,) = when(due, fresh, memory.shown)
-    waiting = (state.attitude, *memory.waiting[:-1]) if params.late else ()
     left = where(due, params.every - 1.0, memory.left - 1.0)
-    return Reading(shown, where(due, 1.0, 0.0)), Memory(shown, waiting, left)
+    return Reading(shown, where(due, 1.0, 0.0)), as_built.kept(Memory(shown, left), waiting)
 
 
 def error(params: Params) -> Errors:

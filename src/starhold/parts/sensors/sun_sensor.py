@@ -12,7 +12,7 @@ from starhold.algebra.vector import ZERO, Vector, add, dot, unit
 from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
 from starhold.parts.boresight import field_cosine, unit_boresight
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -52,12 +52,14 @@ class Params(NamedTuple):
     outage: Annotated[Window, OUTAGE] = NEVER
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
     jitter: Annotated[float, as_built.JITTER] = 0.0
+    delay: Annotated[float, as_built.DELAY] = 0.0
     ephemeris: Annotated[int, EPHEMERIS] = 0
 
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the Sun, the control
-    period (s), and the outage (control steps); () or its axes, and the jitter of its instants (s)."""
+    period (s), and the outage (control steps); () or its axes, the jitter of its instants (s), and
+    how late it is."""
 
     noise: Scalar
     boresight: Vector
@@ -67,6 +69,7 @@ class Numbers(NamedTuple):
     outage: Window
     axes: as_built.Axes = ()
     jitter: as_built.Step = ()
+    late: as_built.Late = ()
 
 
 class Reading(NamedTuple):
@@ -77,7 +80,8 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for a boresight without direction, a bad epoch and a bad outage."""
+    """The numbers of a flight. ValueError for a boresight without direction, a bad epoch, a bad outage and too long a
+    delay."""
     cosine = field_cosine(params.half_angle)
     outage = in_steps(params.outage, period)
     axes = as_built.axes_of(params.mounting_error, ZERO)
@@ -91,11 +95,18 @@ def prepare(params: Params, period: float) -> Numbers:
         outage,
         axes,
         as_built.step_of(params.jitter),
+        as_built.late_by(params.delay, period),
     )
+
+
+def remember(params: Numbers, state: Any) -> Any:
+    """The state at the start where the sensor is late."""
+    return as_built.awaited(NoMemory(), params.late, state, as_built.PLACE)
 
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The Sun at this control step."""
+    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 4)
     seen = sun.sun(number_of(step) * params.period, params.sun)
     state = as_built.when_read(state, params.jitter, dice, 3)
     toward = as_built.along(params.axes, to_body(state.attitude, seen.direction))
@@ -105,7 +116,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     # Along the direction itself the noise has no effect.
     shown = unit(add(toward, dice.vector(0, params.noise)))
     reading: Any = tuple(where(visible, x, 0.0) for x in shown)
-    return Reading(reading, where(visible, 1.0, 0.0)), memory
+    return Reading(reading, where(visible, 1.0, 0.0)), as_built.kept(memory, waiting)
 
 
 def examples() -> list[Params]:

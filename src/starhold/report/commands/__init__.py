@@ -155,7 +155,8 @@ class Command(NamedTuple):
     body that scenarios must have, "" for any. file: help for FILE, None for a command without one; listed: what is shown
     without FILE, if that is allowed. read: returns the subject in place of a scenario and a law, from FILE and options.
     proofs: whether a certificate is written, and so whether there is --rocq. kinds: suffixes of the files NAME.*. prove: the
-    study together with a proof of the pointing, where there is --proof.
+    study together with a proof of the pointing, where there is --proof. check: takes the arguments of study, and refuses
+    files that they name before a folder for results is looked at.
     """
 
     summary: str
@@ -174,6 +175,7 @@ class Command(NamedTuple):
     proofs: bool = False
     kinds: tuple[str, ...] = ("csv", "png", "xml")
     prove: Callable[..., Any] | None = None
+    check: Callable[..., Any] | None = None
 
     def prepare(self, *about: Any, **given: Any) -> tuple[Any, ...]:
         """Return the arguments of `study`: the scenario, changed by options, and the law; or those from `read`."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.report.commands import Block, Column, Command, Option, Result, Table, as_given, later
-from starhold.report.commands.replay import TELEMETRY
+from starhold.report.commands.replay import READABLE, TELEMETRY
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import LawEntry, Scenario
@@ -119,5 +119,6 @@ COMMAND = Command(
         "commands": Option("", WHOSE, content=as_given),
     },
     unstable=True,
+    check=READABLE,
     kinds=("csv", "png", "toml"),
 )

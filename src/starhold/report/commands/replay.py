@@ -24,6 +24,8 @@ TELEMETRY = {
     ),
 }
 """The options that name recorded telemetry and its mapping."""
+READABLE = later("studies.telemetry.check")
+"""What refuses telemetry that cannot be read."""
 MOST_PANELS = 6
 """Quantities that a figure shows: those that part first."""
 
@@ -105,5 +107,6 @@ COMMAND = Command(
     options=TELEMETRY
     | {"tolerance": Option("", "share of the largest value; else 0.01", content=later("studies.replay.tolerance_of"))},
     unstable=True,
+    check=READABLE,
     kinds=("csv", "png"),
 )
