@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from starhold.certification.certificate import write
+from starhold.certification.subject import make_subject
 from starhold.checker import check_file, passed
 from starhold.scenario.building import build
-from starhold.scenario.reading import parse
+from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import STUDY
 from starhold.studies.certificates import compare_programs
 from starhold.studies.compare import fly_law, prove
-from starhold.studies.modes import loop_of_mode
+from starhold.studies.modes import loop_of_mode, most_stored, named_modes
 from tests.certification.handed import POINT, bounded, handed, issued
 from tests.missions import BASE, DETUMBLE
 
@@ -107,3 +108,35 @@ def test_a_flight_leaves_the_claims_of_a_mode_when_that_ends():
     assert ("another mode begins", switch) in [(one.how, one.time) for one in flight.left(0, "convergence")]
     assert (flight.left(1, "convergence"), flight.left(2, "hand-over")) == ((), ())
     assert loop_of_mode(loop, 1).law.name == "lyapunov"
+
+
+def test_claims_of_a_mode_assume_the_momentum_at_which_it_ends_or_begins():
+    """In cubesat-mission nadir ends at 3 mN m s, and unload begins by it; for detumble and sun no test is of it."""
+    scenario = load("cubesat-mission")
+    loop = build(scenario, scenario.laws[0])
+    assert [most_stored(loop, place) for place in range(4)] == [math.inf, math.inf, 0.003, 0.003]
+    nadir = named_modes(loop, "mission")["mission: nadir"]
+    begun = make_subject(nadir).total_momentum
+    subject = make_subject(nadir, stored=0.003)
+    own = 0.065 * float(subject.target_rate)
+    assert float(subject.total_momentum) == pytest.approx(0.003 * 1.05 + own, rel=1e-9)
+    assert subject.total_momentum < begun
+    assert make_subject(nadir, stored=1.0).total_momentum == begun
+    assert float(make_subject(nadir, momentum=0.02, stored=0.003).total_momentum) == 0.02
+
+
+@pytest.mark.slow
+def test_the_mission_points_as_it_flies_with_all_its_parts_in_the_claim_once_its_wheels_are_unloaded():
+    scenario = load("cubesat-mission")
+    loop = build(scenario, scenario.laws[0])
+    found = {one.certificate.name: one for one in STUDY.certify(scenario, scenario.laws[0], loop, pointing=True)}
+    run = fly_law(scenario, scenario.laws[0], loop).recording
+    for mode, angle in (("nadir", 0.13), ("unload", 0.53)):
+        one = found[f"mission: {mode}"]
+        (claim,) = (claim for claim in one.certificate.claims if claim.kind == "pointing")
+        assert (claim.outcome, claim.left_out) == ("proved", [])
+        assert math.degrees(claim.numbers["angle"]) < angle
+        left = STUDY.departures(one, loop, run)["pointing"]
+        # Both begin with the momentum of the rotors at separation, and nadir again when that is unloaded.
+        assert any("momentum" in one.how for one in left)
+        assert max(one.time for one in left) < 4850.0

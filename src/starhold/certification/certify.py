@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, isinf
+from math import inf, isfinite, isinf
 from typing import Any
 
 import numpy as np
@@ -29,15 +29,17 @@ class Wanted:
 
     rate: convergence from every attitude and rates up to this (rad/s; inf for any); turn: torque within its limit on every
     turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of an unmodelled torque (N m); momentum:
-    norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; pointing: the pointing
-    bound of the loop as it flies, which takes seconds, and is always claimed with a disturbance; alone: only that; like:
-    that claim, with the start set and the limits of another loop's claim."""
+    norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; stored: what wheels store
+    when a mode ends because of it (N m s); pointing: the pointing bound of the loop as it flies, which takes seconds, and is
+    always claimed with a disturbance; alone: only that; like: that claim, with the start set and the limits of another
+    loop's claim."""
 
     rate: float | None = None
     slew_angle: float | None = None
     inertia_tolerance: float | None = None
     disturbance: float = 0.0
     momentum: float | None = None
+    stored: float = inf
     pointing: bool = False
     alone: bool = False
     like: Claim | None = None
@@ -63,7 +65,7 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     surface nor a single root gets a certificate without claims, which is undecided; so does a surface with wheels, and a
     loop that relies on a lost wheel. For a law that polynomials cannot follow the only claim is undecided, and names the
     operation and its line; likewise where numbers are too far apart in size for floating-point guesses."""
-    subject = make_subject(loop, wanted.disturbance, wanted.momentum)
+    subject = make_subject(loop, wanted.disturbance, wanted.momentum, wanted.stored)
     try:
         # What overflows in a guess is caught where the guess is verified.
         with np.errstate(all="ignore"):

@@ -22,6 +22,8 @@ from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.parts.targets.history import Knots
 
+GATHERED = 0.05
+"""The part of the wheels' momentum at which a mode ends that may be added before it does."""
 SPLINE = "rotation spline"
 """The curve that a tabulated target follows between its knots, see `parts.targets.history.Knots`."""
 
@@ -62,9 +64,12 @@ class Subject:
         return self.target_rate != 0 or self.target_acceleration != 0
 
 
-def make_subject(loop: ClosedLoop, disturbance: float = 0.0, momentum: float | None = None) -> Subject:
+def make_subject(
+    loop: ClosedLoop, disturbance: float = 0.0, momentum: float | None = None, stored: float = np.inf
+) -> Subject:
     """The subject of a closed loop, with bounds over the whole orbit. `momentum`: in claims about wheels the total angular
-    momentum (N m s); if absent what the loop starts with, or what it has at rest on target if that is more."""
+    momentum (N m s); if absent what the loop starts with, or what it has at rest on target if that is more, but with no more
+    than `stored` in the wheels."""
     rate, acceleration = _target_bounds(loop)
     axes, norm = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0)
     if loop.has("gravity-gradient"):
@@ -75,7 +80,7 @@ def make_subject(loop: ClosedLoop, disturbance: float = 0.0, momentum: float | N
     )
     total = fmpq(0)
     if loop.wheels is not None:
-        total = exact(_momentum(loop, rate) if momentum is None else momentum)
+        total = exact(_momentum(loop, rate, stored) if momentum is None else momentum)
     return Subject(loop, exact(disturbance), axes, norm, rate, acceleration, total)
 
 
@@ -186,12 +191,13 @@ def _plain(value: Any) -> Any:
     return np.asarray(cast(Any, value)).tolist() if isinstance(value, tuple) else value
 
 
-def _momentum(loop: ClosedLoop, target_rate: Any) -> float:
-    """Norm of the total angular momentum at the start or at rest on target, whichever is more, rounded up (N m s)."""
+def _momentum(loop: ClosedLoop, target_rate: Any, stored: float) -> float:
+    """Norm of the total angular momentum at the start or at rest on target, whichever is more, rounded up (N m s), with no
+    more than `stored` in the wheels and a part more for what torques add until a mode ends."""
     inertia = tensor(loop.craft.inertia)
     begun = inertia @ loop.start.rate + np.array(loop.rotors) @ np.array(cast(Wheels, loop.wheels).axes)
     still = float(np.linalg.eigvalsh(inertia)[-1]) * above(target_rate)
-    return max(float(np.linalg.norm(begun)), still) * (1.0 + 1e-12)
+    return max(min(float(np.linalg.norm(begun)), stored * (1.0 + GATHERED) + still), still) * (1.0 + 1e-12)
 
 
 # --- bounds on the outside --------------------------------------------------------------------------------------------

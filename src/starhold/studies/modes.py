@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 
 NEXT = "another mode begins"
+STORED = "wheel_momentum_above"
+"""The test of a switch for the wheels' momentum."""
 
 
 class Stretch(NamedTuple):
@@ -145,13 +148,22 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
 
     issued: list[Issued] = []
     for place, (title, mode_loop) in enumerate(named_modes(loop, name).items()):
-        issued.append(Issued(certify(mode_loop, title, wanted), mode_loop, mode=place + 1))
+        kept = replace(wanted, stored=most_stored(loop, place))
+        issued.append(Issued(certify(mode_loop, title, kept), mode_loop, mode=place + 1))
     for one in hand_overs(loop, name):
         certificate = hand_over(one.after, one.before, one.name, one.levels)
         if certificate is not None:
             before, after = one.places
             issued.append(Issued(certificate, one.after, mode=after + 1, before=before + 1))
     return issued
+
+
+def most_stored(loop: ClosedLoop, place: int) -> float:
+    """Return the largest momentum of the wheels (N m s) at which a mode ends because of it; for a mode that does not, at
+    which another one ends to begin it; inf where none does. Claims about the mode assume no more."""
+    ends = [(one.places, one.levels[STORED]) for one in hand_overs(loop, "") if STORED in one.levels]
+    own, others = ([level for places, level in ends if places[side] == place] for side in (0, 1))
+    return max(own or others, default=math.inf)
 
 
 def same_numbers(one: Any, other: Any) -> bool:

@@ -161,7 +161,9 @@ def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
     from starhold.certification.certify import Wanted
 
     table = scenario.table.certify
-    return Wanted(table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum, pointing)
+    return Wanted(
+        table.rate, table.slew_angle, table.inertia_tolerance, table.disturbance, table.momentum, pointing=pointing
+    )
 
 
 def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> dict[str, ClosedLoop]:
