@@ -205,9 +205,10 @@ def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> 
 
 
 @shortly
-def compare(scenario: reading.Scenario | str | Path) -> list[Flight]:
-    """Fly every law of a scenario; each Flight has the run (`run`, a Dataset) and its `metrics` (SI)."""
-    return studies.compare(reading.open_scenario(scenario))
+def compare(scenario: reading.Scenario | str | Path, proof: bool = False) -> list[Flight]:
+    """Fly every law of a scenario; each Flight has the run (`run`, a Dataset), its `metrics` (SI) and its `certificates`.
+    proof: prove how near to the target each loop stays as it flies, too, which takes seconds a law."""
+    return studies.compare(reading.open_scenario(scenario), pointing=proof)
 
 
 @shortly

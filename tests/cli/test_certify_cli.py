@@ -84,6 +84,36 @@ def test_what_nobody_can_prove_is_undecided(tmp_path):
     assert outcomes(tmp_path / "out" / "certificate.json") == {"mpc": {}}
 
 
+def test_compare_begins_with_the_loop_as_it_flies_once_that_is_asked_for(tmp_path):
+    (tmp_path / "small.toml").write_text(CRAFT + PD + MPC)
+
+    def first_rows(*options):
+        words = ("compare", "small.toml", "--pictures", "none", "--force", "-o", "out", *options)
+        rows = starhold(*words, cwd=tmp_path, code=0).stdout.split("Certified on this spacecraft")[1].splitlines()
+        given = json.loads((tmp_path / "out" / "certificate.json").read_text())["certificates"]
+        kinds = {one["name"]: [claim["kind"] for claim in one["claims"]] for one in given}
+        found = {name: next(" ".join(row.split()) for row in rows if row.startswith(f"  {name} ")) for name in kinds}
+        return found, kinds, [one["subject"].get("no_pointing") for one in given]
+
+    rows, kinds, reasons = first_rows()
+    assert rows["pd"] == "pd not looked for pointing as it flies: --proof, or starhold certify, looks for it"
+    memory = "the law keeps a memory from call to call"
+    assert rows["mpc"] == f"mpc not proved pointing as it flies: {memory}"
+    assert ("pointing" in kinds["pd"], reasons) == (False, ["not looked for", memory])
+    rows, kinds, reasons = first_rows("--proof")
+    assert rows["pd"].startswith("pd proved within ")
+    assert ("pointing" in kinds["pd"], reasons) == (True, [None, memory])
+    starhold("check", "out/certificate.json", cwd=tmp_path, code=0)
+
+
+def test_certify_says_why_nothing_is_proved_of_the_loop_as_it_flies(tmp_path):
+    (tmp_path / "weak.toml").write_text(CRAFT + WEAK)
+    done = starhold("certify", "weak.toml", "-o", "out", cwd=tmp_path)
+    (subject,) = (one["subject"] for one in json.loads((tmp_path / "out" / "certificate.json").read_text())["certificates"])
+    assert subject["no_pointing"] not in ("", "not looked for")
+    assert f"  not proved: pointing as it flies: {subject['no_pointing']}" in done.stdout.splitlines()
+
+
 @pytest.mark.parametrize(
     ("line", "key"),
     [

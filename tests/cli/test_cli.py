@@ -104,6 +104,8 @@ REFUSED = {
         ("short.toml -o " + 5000 * "x", "cannot write there: File name too long"),
         ("short.toml --law slidding", "did you mean sliding?"),
         ("l2-deficit --law deficit_6", "did you mean deficit"),
+        ("short.toml --proof --no-certify", "run: --proof: found --no-certify too"),
+        ("short.toml --proof --law-process ./law", "run: --proof: found --law-process too"),
     ],
     "laws": [("lyapunow", "did you mean lyapunov?")],
     "scenarios": [("three", "three-laws")],

@@ -11,6 +11,7 @@ from starhold.certification.certificate import Certificate, Claim, Obligation
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, methods, sentence
+from starhold.report.answer import proofs
 from starhold.report.page import render
 from starhold.report.proved import section
 from starhold.scenario.building import build
@@ -100,8 +101,18 @@ def test_a_refuted_claim_shows_the_state_that_refutes_it() -> None:
 
 def test_a_law_without_claims_says_so() -> None:
     found = told(certificates()[2])
-    assert outcomes(found) == []
     assert "Nothing is claimed" in found.text
+    assert "Pointing as it flies: the law keeps a memory from call to call." in found.text
+
+
+def test_pages_begin_with_why_nothing_is_claimed_of_the_loop_as_it_flies() -> None:
+    given = parse(CRAFT + PD, "test")
+    certificate = certify(build(given, given.laws[0]), "pd")
+    found = told(certificate)
+    assert plain(found.text).index("not looked for") < plain(found.text).index("Converges")
+    for text in (found.text, Reader(proofs([replace(flown.flights()[0], certificates=(certificate,))])).text):
+        assert "not looked for" in plain(text)
+        assert "--proof, or starhold certify, looks for it" in plain(text)
 
 
 def test_flights_without_certificates_have_no_section() -> None:

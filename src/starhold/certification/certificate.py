@@ -99,6 +99,8 @@ WITHOUT, ORBIT = "without:", "orbit-within:"
 more than a share."""
 BESIDE = ("sampling", "control-limit", "saturated-axis")
 """Kinds of claims about a control loop that state no ultimate bound, and accompany one that does."""
+NOT_SOUGHT = "not looked for"
+"""Why a certificate lacks the claim about the loop as it flies, where none was sought."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,6 +126,12 @@ class Certificate:
             return "refuted"
         ends = any(claim.kind not in BESIDE for claim in decided)
         return "proved" if ends and found == {"proved"} else "undecided"
+
+    @property
+    def unflown(self) -> str:
+        """Why no claim is about the loop as it flies: `NOT_SOUGHT`, or why none was proved; empty where there is such a
+        claim, or none could be expected."""
+        return str(self.subject.get("no_pointing", ""))
 
     @property
     def proofs(self) -> list[Proof]:

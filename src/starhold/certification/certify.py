@@ -10,7 +10,7 @@ import numpy as np
 from starhold.algebra.polynomial import Polynomial, UnreadableError, constants, reciprocal
 from starhold.algebra.vector import dot
 from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, WHEELS
-from starhold.certification.certificate import EXACT, Certificate, Claim, Obligation
+from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, Claim, Obligation
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.evidence.pointing import POINTS
@@ -46,6 +46,9 @@ class Wanted:
 
 
 BEST = Wanted()
+TIMED = "the law reads the time, of which no claim speaks"
+REMEMBERS = "the law keeps a memory from call to call"
+LOST = "the allocation relies on a lost wheel"
 APART = "inertia, gains and period are too far apart in size"
 ASSUMPTIONS = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
 """Assumptions of all claims without a proof."""
@@ -69,27 +72,32 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
     try:
         # What overflows in a guess is caught where the guess is verified.
         with np.errstate(all="ignore"):
-            claims = _claims(subject, wanted)
+            claims, unflown = _claims(subject, wanted)
     except UnreadableError as reason:
         # Nothing is known of such a law, whatever else was requested.
-        claims = [undecided("convergence", EVERYWHERE, subject, str(reason))]
+        unflown = str(reason)
+        claims = [undecided("convergence", EVERYWHERE, subject, unflown)]
     except (OverflowError, ZeroDivisionError, np.linalg.LinAlgError) as reason:
-        claims = [undecided("convergence", EVERYWHERE, subject, f"{APART}: {reason}")]
-    about = described(subject, [claim.kind for claim in claims])
+        unflown = f"{APART}: {reason}"
+        claims = [undecided("convergence", EVERYWHERE, subject, unflown)]
+    kinds = [claim.kind for claim in claims]
+    about = described(subject, kinds) | ({} if "pointing" in kinds else {"no_pointing": unflown})
     return Certificate(name or loop.law.name, about, named(claims, loop, above(subject.total_momentum)))
 
 
-def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
+def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
+    """Return the claims, and why none of them is about the loop as it flies, if none is."""
     loop, claims = subject.loop, list[Claim]()
     if CLOCK in loop.law.reads:
-        return [undecided("convergence", EVERYWHERE, subject, "the law reads the time, of which no claim speaks")]
+        return [undecided("convergence", EVERYWHERE, subject, TIMED)], TIMED
     sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
     if loop.remembers and loop.law.lyapunov is not None:
-        claims.append(undecided("convergence", EVERYWHERE, subject, "the law keeps a memory from call to call"))
-    if sound and not loop.remembers and wanted.alone:
+        claims.append(undecided("convergence", EVERYWHERE, subject, REMEMBERS))
+    unflown = REMEMBERS if loop.remembers else "" if sound else LOST
+    if not unflown and wanted.alone:
         claim, reason = pointed(subject, wanted.like)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
-    elif sound and not loop.remembers:
+    elif not unflown:
         pointing = wanted.pointing or wanted.disturbance > 0.0
         told = wanted.slew_angle, wanted.rate, wanted.inertia_tolerance
         proved, failed = proved_claims(subject, *told, pointing)
@@ -103,10 +111,13 @@ def _claims(subject: Subject, wanted: Wanted) -> list[Claim]:
                 claims.append(proved.get("sliding") or undecided("sliding", torque, subject, failed[SLIDING]))
             claims.extend(_unshown(subject, wanted, proved, "the law declares no V to show it with"))
         claims.extend(between_samples(subject, proved, failed))
+        unflown = failed.get(POINTS, "no proof was found") if pointing else NOT_SOUGHT
+        if pointing and loop.wheels is not None:
+            whose = "that of the start; certify.momentum states another" if wanted.momentum is None else "as stated"
+            unflown += f", with a total momentum of up to {above(subject.total_momentum):.4g} N m s ({whose})"
         if "pointing" in proved or wanted.disturbance:
-            reason = failed.get(POINTS, "no proof was found")
-            claims.append(proved.get("pointing") or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
-    return claims
+            claims.append(proved.get("pointing") or undecided("pointing", {"torque": wanted.disturbance}, subject, unflown))
+    return claims, unflown
 
 
 def between_samples(subject: Subject, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:

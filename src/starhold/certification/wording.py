@@ -71,8 +71,8 @@ def ranked(certificate: Certificate) -> list[Claim]:
 
 def strongest(claims: Sequence[Claim]) -> list[Claim]:
     """The claims, those about the motion before those about its linear form; of these the proved first, then those that
-    leave out the fewest parts of the loop."""
-    return sorted(claims, key=lambda claim: (claim.kind == "sampling", claim.outcome != "proved", len(claim.left_out)))
+    leave out the fewest parts of the loop, of these the one about the loop as it flies."""
+    return sorted(claims, key=lambda c: (c.kind == "sampling", c.outcome != "proved", len(c.left_out), c.kind != "pointing"))
 
 
 def grouped(certificate: Certificate) -> dict[str, list[Claim]]:

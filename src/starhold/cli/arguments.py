@@ -27,6 +27,7 @@ Rocq = Annotated[bool, typer.Option("--rocq", help="also write the proofs as lem
 Why = Annotated[bool, typer.Option("--why", help="state how each claim was shown and what it assumes")]
 Unstable = Annotated[bool, typer.Option("--allow-unstable", help="accept gains that are known to be unstable")]
 Certified = Annotated[bool, typer.Option("--certify/--no-certify", help="prove what the laws guarantee, or only fly")]
+Proof = Annotated[bool, typer.Option("--proof", help="also prove how near to the target the loop stays; this takes seconds")]
 CheckStep = Annotated[bool, typer.Option("--check-step", help="fly again with half the step: what changes?")]
 
 

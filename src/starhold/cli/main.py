@@ -25,6 +25,7 @@ from starhold.cli.arguments import (
     Force,
     Output,
     Pictures,
+    Proof,
     RunOutput,
     ScenarioFile,
     Unstable,
@@ -54,6 +55,7 @@ def run(
     force: Force = False,
     allow_unstable: Unstable = False,
     certify: Certified = True,
+    proof: Proof = False,
     check_step: CheckStep = False,
     pictures: Pictures = Drawn.ALL,
     law_process: Annotated[
@@ -62,10 +64,11 @@ def run(
     ] = None,
 ) -> None:
     """Fly one law: run.nc, summary.json, figures and report.html."""
-    if law_process is not None and check_step:
-        raise InputError("run", "--check-step", "--law-process too", "one of the two")
+    for option, is_given in (("--check-step", check_step), ("--proof", proof)):
+        if law_process is not None and is_given:
+            raise InputError("run", option, "--law-process too", "one of the two")
     flights = _fly(
-        file, law, output, force, allow_unstable, certify, check_step, pictures, nested=False, process=law_process
+        file, law, output, force, allow_unstable, certify, proof, check_step, pictures, nested=False, process=law_process
     )
     if flights[0].lost is not None:
         raise typer.Exit(DIVERGED)
@@ -78,11 +81,12 @@ def compare(
     force: Force = False,
     allow_unstable: Unstable = False,
     certify: Certified = True,
+    proof: Proof = False,
     check_step: CheckStep = False,
     pictures: Pictures = Drawn.ALL,
 ) -> None:
     """Fly every law of a file on the same problem: ranked table, figures and report.html."""
-    flights = _fly(file, None, output, force, allow_unstable, certify, check_step, pictures, nested=True)
+    flights = _fly(file, None, output, force, allow_unstable, certify, proof, check_step, pictures, nested=True)
     if all(flight.lost is not None for flight in flights):
         raise typer.Exit(DIVERGED)
 
@@ -94,6 +98,7 @@ def _fly(
     force: bool,
     allow_unstable: bool,
     certify: bool,
+    proof: bool,
     check_step: bool,
     pictures: Drawn,
     nested: bool,
@@ -101,6 +106,8 @@ def _fly(
 ) -> list[Flight]:
     """Fly one law of a file (the first if `law` is None) or, nested, all of them, each into a folder of its own. Where a
     process gives the commands, nothing is proved or timed."""
+    if proof and not certify:
+        raise InputError("compare" if nested else "run", "--proof", "--no-certify too", "one of the two")
     from starhold.scenario.reading import load
 
     # Read before the modules that fly and print are loaded, so that its errors are reported at once.
@@ -158,7 +165,7 @@ def _fly(
 
     with Painter(scenario, flights, folder, pictures is Drawn.ALL) as painter:
         if certify and process is None:
-            flights = [studies.prove(scenario, *trio) for trio in zip(entries, loops, flights, strict=True)]
+            flights = [studies.prove(scenario, *trio, pointing=proof) for trio in zip(entries, loops, flights, strict=True)]
         if any(flight.certificates for flight in flights):
             from starhold.cli.show_certificates import print_proved
 

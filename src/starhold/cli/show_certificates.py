@@ -27,6 +27,7 @@ from starhold.cli.console import console
 from starhold.cli.show import print_rows, printable
 from starhold.report.commands import Column, coloured
 from starhold.report.commands import Table as Rows
+from starhold.report.text import unflown_text
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -46,6 +47,9 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
     console.print(f"[bold]{_safe(certificate.name)}[/bold]: {coloured(certificate.outcome)}")
     if not certificate.claims:
         console.print(f"  no claim: {_safe(unclaimed(subject))}")
+    word, said = unflown_text(certificate)
+    if said:
+        console.print(f"  {coloured(word)}: {_safe(said)}")
     for heading, claims in grouped(certificate).items():
         console.print(f"  [dim]{_safe(heading)}:[/dim]")
         table = _grid()
@@ -69,7 +73,8 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
 
 
 def print_proved(flights: Sequence[Flight]) -> None:
-    """Print the claim of each law that leaves out the least, the names of the others, and how long they cover a flight."""
+    """Print of each law whether anything is proved of the loop as it flies, the claim that leaves out the least, the names
+    of the others, and how long they cover a flight."""
     console.print("\nCertified on this spacecraft (for details: starhold certify --why):")
     table = _grid()
     for flight in flights:
@@ -88,8 +93,12 @@ def _grid() -> Table:
 
 
 def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[tuple[str, str, str]]:
-    """At most three rows about a certificate: its first claim, the names of the others, and the bounds of the flight."""
-    claims, name = ranked(certificate), certificate.name
+    """At most four rows about a certificate: why no claim is about the loop as it flies, its first claim, the names of the
+    others, and the bounds of the flight."""
+    claims, name, (word, said) = ranked(certificate), certificate.name, unflown_text(certificate)
+    if said:
+        yield name, coloured(word), said
+        name = ""
     if not claims:
         yield name, coloured("undecided"), "no claim"
         return
@@ -101,8 +110,10 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
         named.setdefault(claim.outcome, []).append(HEADINGS[claim.kind])
     if others:
         yield "", "[dim]and[/dim]", "; ".join(f"{outcome}: {', '.join(kinds)}" for outcome, kinds in named.items())
-    proved = {claim.kind for claim in claims if claim.outcome == "proved"}
-    begins = {kind: left for kind, left in (flight.departures[place] if flight.departures else {}).items() if kind in proved}
+    # Of claims that are left together, the reasons of the one shown first are given.
+    proved = [claim.kind for claim in strongest(claims) if claim.outcome == "proved"]
+    departures = flight.departures[place] if flight.departures else {}
+    begins = {kind: departures[kind] for kind in proved if kind in departures}
     if begins and all(begins.values()):
         last = max(begins, key=lambda kind: begins[kind][0].time)
         yield "", "[yellow]left[/yellow]", _uncovered(flight, begins[last])

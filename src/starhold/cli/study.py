@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from starhold.cli.arguments import REFUTED, UNDECIDED, Drawn, Force, Pictures, Rocq, Unstable, results_in
+from starhold.cli.arguments import REFUTED, UNDECIDED, Drawn, Force, Pictures, Proof, Rocq, Unstable, results_in
 from starhold.errors import InputError
 from starhold.report.commands import Command, command
 
@@ -149,8 +149,7 @@ def _parameters(declared: Command) -> dict[str, Any]:
         shown = typer.Option(*flags, metavar=metavar, help=option.help)
         kinds[key] = Annotated[kind if option.default else kind | None, shown]
     if declared.prove is not None:
-        shown = typer.Option("--proof", help="also prove how near to the target the loop stays; this takes seconds")
-        kinds["proof"] = Annotated[bool, shown]
+        kinds["proof"] = Proof
     if declared.suffix:
         subject = "SCENARIO" if declared.read is None else "SYSTEM"
         kinds["output"] = Annotated[Path | None, results_in(f"{subject}-{declared.suffix}")]

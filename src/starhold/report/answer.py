@@ -12,7 +12,7 @@ from starhold.report.campaign_units import plain_measure
 from starhold.report.commands import Cell, Column, Table
 from starhold.report.commands.verify import amount
 from starhold.report.tables import Markup, note, pill, swatch, table_html
-from starhold.report.text import lost_text, unknown_text
+from starhold.report.text import lost_text, unflown_text, unknown_text
 from starhold.studies.requirements import LOST
 from starhold.studies.verification import verdicts_of_flight
 
@@ -152,12 +152,19 @@ def columns_list(flights: Sequence[Flight]) -> str:
 
 
 def proofs(flights: Sequence[Flight]) -> str:
-    """State the strongest proof about each law in a sentence; empty where none was attempted."""
-    lines = [_strongest(number, flight, len(flights)) for number, flight in enumerate(flights) if flight.certificates]
+    """State the strongest proof about each law in a sentence, and before it why there is none about the loop as it flies;
+    empty where none was attempted."""
+    certified = [(number, flight) for number, flight in enumerate(flights) if flight.certificates]
+    lines = [f"{_unflown(flight)}{_strongest(number, flight, len(flights))}" for number, flight in certified]
     if not lines:
         return ""
     more = '<button class="link" type="button" data-open="proofs">All claims</button>'
     return f'<section class="card proved"><h2>Proved</h2>{"".join(lines)}{more}</section>'
+
+
+def _unflown(flight: Flight) -> str:
+    texts = dict.fromkeys(unflown_text(certificate) for certificate in flight.certificates)
+    return "".join(f"<p>{pill(word)} {escape(flight.name)}: {escape(text)}.</p>" for word, text in texts if word)
 
 
 def _strongest(number: int, flight: Flight, count: int) -> str:

@@ -9,7 +9,7 @@ from starhold.certification.certificate import FILE, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.wording import HEADINGS, evidence, grouped, methods, recheck, statement, unclaimed
 from starhold.report.tables import Markup, listed, pill, swatch, table_html
-from starhold.report.text import left_text, number_text
+from starhold.report.text import left_text, number_text, unflown_text
 from starhold.studies.flight import Flight
 
 NOTE = (
@@ -75,6 +75,9 @@ def _law(flight: Flight, number: int, place: int) -> str:
     if not claims:
         why = escape(unclaimed(certificate.subject))
         claims = f'<p class="note">Nothing is claimed, so nothing is proved: {why}.</p>'
+    word, text = unflown_text(certificate)
+    if word:
+        claims = f"<p>{pill(word)} {escape(_sentence_case(text))}.</p>{claims}"
     if certificate.law:
         claims += (
             f'<p class="note">Program of the law, in its C code and its run too: SHA-256 <code>{certificate.law}</code>.</p>'

@@ -325,6 +325,8 @@ def _certificates(review: Review) -> Iterator[Piece]:
             for claim in one.claims
             if claim.outcome != "proved"
         ]
+        if one.unflown:
+            points.append(Open(f"{name}, {HEADINGS['pointing']} is not proved: {one.unflown}."))
         if not one.claims:
             points.append(Open(f"{name}: nothing is claimed, so nothing is proved: {unclaimed(subject)}."))
             continue

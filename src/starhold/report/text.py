@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from starhold.certification.certificate import Certificate
     from starhold.studies.flight import Flight
 
 ROUNDING = 1e-13
@@ -47,6 +48,17 @@ def left_text(flight: Flight, certificate: int, kind: str) -> str:
     left, moment = flight.left(certificate, kind), flight.metric_set.moment
     groups = {time: _how([one.how for one in left if one.time == time]) for time in (one.time for one in left)}
     return "; ".join(f"{'from the start' if time == 0.0 else f'at {moment(time, 4)}'} {how}" for time, how in groups.items())
+
+
+def unflown_text(certificate: Certificate) -> tuple[str, str]:
+    """Return, in a word and in a sentence, why no claim of a certificate is about the loop as it flies; both are empty where
+    one is."""
+    from starhold.certification.certificate import NOT_SOUGHT
+
+    why = certificate.unflown
+    if why == NOT_SOUGHT:
+        return why, "pointing as it flies: --proof, or starhold certify, looks for it"
+    return ("not proved", f"pointing as it flies: {why}") if why else ("", "")
 
 
 def _how(departures: Sequence[str]) -> str:

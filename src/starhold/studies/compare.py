@@ -46,11 +46,11 @@ def costing(flight: Flight, costs: dict[str, float]) -> Flight:
     return replace(flight, metrics=flight.metrics | costs)
 
 
-def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight) -> Flight:
+def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight, pointing: bool = False) -> Flight:
     """Return the flight with the certificates of its law, and how it leaves their claims; without either where the law's
-    nominal model is not the craft."""
+    nominal model is not the craft. pointing: also look for the claim about the loop as it flies, which takes seconds."""
     study = study_of(scenario.body)
-    certified = [] if loop.nominal is not None else study.certify(scenario, entry, loop)
+    certified = [] if loop.nominal is not None else study.certify(scenario, entry, loop, pointing)
     left = tuple(study.departures(issued, loop, flight.recording) for issued in certified)
     return replace(flight, certificates=tuple(issued.certificate for issued in certified), departures=left)
 
@@ -114,11 +114,12 @@ def metric_set_of(run: Recording) -> MetricSet:
     return study_of(run.attrs["body"]).metric_set(run)
 
 
-def compare(scenario: Scenario, notice: Notice | None = None) -> list[Flight]:
-    """Fly every law of the scenario, in the order of the file."""
+def compare(scenario: Scenario, notice: Notice | None = None, pointing: bool = False) -> list[Flight]:
+    """Fly every law of the scenario, in the order of the file; pointing: as `prove` has it."""
     loops = [(entry, build(scenario, entry)) for entry in scenario.laws]
     return [
-        timed(scenario, loop, prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice))) for entry, loop in loops
+        timed(scenario, loop, prove(scenario, entry, loop, fly_law(scenario, entry, loop, notice), pointing))
+        for entry, loop in loops
     ]
 
 
