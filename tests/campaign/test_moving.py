@@ -33,6 +33,7 @@ ROTATIONS = {"distribution": "rotations"}
 LOST = {"fault": [{"time": 2.0, "wheel": 2, "lost": True, "delay": 1.0, "action": "reallocate"}]}
 LQR = {"type": "lqr", "form": "II", "q": 1.0, "r": 0.5}
 BANDWIDTH = {"type": "pd", "form": "bandwidth", "bandwidth": 0.3, "damping": 0.8}
+SETTLING = {"type": "pd", "form": "settling", "time": "60 s"}
 CASES = {
     "inertia beside wheels": (WHEEL, FOUR, {"spacecraft.inertia": SHARE}),
     "inertia beside wheels, told": (WHEEL, FOUR, {"spacecraft.inertia": TOLD}),
@@ -51,6 +52,11 @@ CASES = {
     "riccati, told": (LQR, {}, {"spacecraft.inertia": TOLD}),
     "weights": (LQR, {}, {"law.lqr.q": SHARE}),
     "bandwidth": (BANDWIDTH, {}, {"spacecraft.inertia": TOLD, "law.pd.bandwidth": SHARE}),
+    "settling": (
+        SETTLING,
+        {"spacecraft": SMALL["spacecraft"] | {"torque_limit": 1.0}},
+        {"spacecraft.inertia": TOLD, "law.pd.damping": uniform(0.6, 0.9)},
+    ),
     "all": (
         WHEEL,
         FOUR | PARTS,

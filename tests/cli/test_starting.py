@@ -1,6 +1,7 @@
 """What commands load, record and draw before they print and after: counted, for counts tell the same on every machine."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -103,14 +104,48 @@ def test_nothing_is_drawn_unasked(asked, drawn, tmp_path):
     assert {"run.nc", "summary.json", "certificate.json"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
-@pytest.mark.parametrize("option", ["--version", "--help"])
-def test_what_tells_of_the_program_loads_next_to_nothing(option, tmp_path):
-    code = f"import sys; sys.argv[1:] = [{option!r}]\nfrom starhold.cli.main import run_command\nrun_command()\n"
-    tell = "import json; print(json.dumps(sorted(sys.modules)), file=sys.stderr)"
-    done = subprocess.run([sys.executable, "-c", code + tell], cwd=tmp_path, capture_output=True, text=True)
-    modules = json.loads(done.stderr)
-    assert done.stdout.startswith("starhold " if option == "--version" else "Usage: ")
+def loaded(folder, words=(), **environment):
+    """What a command that only tells of the program prints, and the modules that it loads."""
+    code = f"import sys; sys.argv = ['starhold', *{words!r}]\nfrom starhold.cli.main import run_command\nrun_command()\n"
+    tell = "import json; print(json.dumps([name for name in sys.modules if sys.modules[name]]), file=sys.stderr)"
+    given = {"cwd": folder, "env": {**os.environ, **environment}, "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, "-c", code + tell], **given)
+    return done.stdout, json.loads(done.stderr)
+
+
+def words_after(folder, typed):
+    """What a shell offers in place of the last word, and the modules loaded to find it."""
+    words = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+    said, modules = loaded(folder, _STARHOLD_COMPLETE="complete_bash", **words)
+    return said.split(), modules
+
+
+def assert_light(modules):
     assert not packages(modules) & {*LARGE, "numpy", "pydantic", "rich", "multiprocessing", "llvmlite", "flint", "h5py"}
     # And one light file for each study.
     studies = [name for name in modules if name.startswith("starhold.report.commands.")]
     assert len([name for name in modules if name.startswith("starhold") and name not in studies]) < 19
+
+
+@pytest.mark.parametrize("option", ["--version", "--help"])
+def test_what_tells_of_the_program_loads_next_to_nothing(option, tmp_path):
+    said, modules = loaded(tmp_path, [option])
+    assert said.startswith("starhold " if option == "--version" else "Usage: ")
+    assert_light(modules)
+
+
+COMPLETED = [
+    ("starhold ru", {"run"}, set()),
+    ("starhold export ", {"c", "oem"}, {"run"}),
+    ("starhold run three-laws --", {"--law", "--pictures"}, {"--seed"}),
+    ("starhold campaign x --runs 5 --", {"--sampling", "--seed"}, {"--pictures"}),
+    ("starhold compare x --force --pictures p", {"page"}, {"none"}),
+]
+
+
+@pytest.mark.parametrize(("typed", "offered", "others"), leading(COMPLETED, 3))
+def test_completion_offers_what_fits_and_loads_next_to_nothing(typed, offered, others, tmp_path):
+    words, modules = words_after(tmp_path, typed)
+    assert offered <= {*words}
+    assert not others & {*words}
+    assert_light(modules)

@@ -14,6 +14,7 @@ from starhold.algebra.vector import ZERO
 from starhold.laws.catalogue import catalogue
 from starhold.laws.interface import Measurement, NoMemory
 from starhold.parts.craft import make_craft, tensor
+from starhold.trace.calling import Compiled
 from tests.refusals import refused
 from tests.tiers import fewer, leading
 
@@ -133,6 +134,44 @@ def test_a_time_that_the_torque_does_not_allow_is_refused_with_one_that_it_does(
     assert found["settling_time"] <= 1.05 * least
     with pytest.raises(sh.InputError, match="too short"):
         sh.scenario(BODY | {"law": [asked(law, 0.9 * least)]})
+
+
+FOUND_TOGETHER = {
+    "pd": {"damping": 0.8},
+    # Wheels that can hardly store what one of the turns asks for, and a layer so thin that more steps are needed.
+    "lyapunov": {"momentum": 0.064, "wheel_momentum": (0.01, 0.0, -0.02)},
+    "sliding": {"boundary_layer": 2e-4, "switching_gain": 0.01},
+    "mrp": {},
+}
+
+
+@pytest.mark.parametrize("name", leading(FOUND_TOGETHER, 2))
+def test_searches_side_by_side_find_what_each_finds_alone(name, monkeypatch):
+    law, random = catalogue()[name], np.random.default_rng(5)
+    given = {"momentum": math.inf, "attitude": (0.85, 0.5, -0.1, 0.1), "rate": (0.0, 0.002, 0.0)} | FOUND_TOGETHER[name]
+    spec = law.forms["settling"](180.0, torque=0.05, attitude_tolerance=2e-3, rate_tolerance=2e-4, **given)
+    crafts = [make_craft(np.array([2.0, 3.0, 4.0]) * random.uniform(0.8, 1.2, 3)) for _ in range(11)]
+    cases = [(craft, spec._replace(time=180.0 + 3.0 * place)) for place, craft in enumerate(crafts)]
+    alone = [law.design(*case) for case in cases]
+    # Each is searched for twice, so no slew flies alone.
+    monkeypatch.setattr(Compiled, "__call__", lambda self, *_: pytest.fail("a slew flies alone"))
+    flown, plainly = [], Compiled.over
+    monkeypatch.setattr(Compiled, "over", lambda self, columns: flown.append(columns.shape[1]) or plainly(self, columns))
+    together = law.design_all(cases + cases)
+    assert together == alone + alone
+    assert len({*alone}) == len(alone)
+    assert sum(flown) > 5 * len(flown)
+
+
+def test_the_one_search_among_many_that_finds_nothing_says_why():
+    law = catalogue()["pd"]
+    spec = law.forms["settling"](200.0, 0.7, 0.05, math.inf, (0.8, 0.5, 0.3, 0.1), (0.0, 0.0, 0.0), None, 2e-3, 2e-4)
+    craft = make_craft((2.0, 3.0, 4.0))
+    with pytest.raises(ValueError, match=r"30 s to settle is too short: 0\.05 N m of torque allow about") as alone:
+        law.design(craft, spec._replace(time=30.0))
+    with pytest.raises(ValueError, match="30 s to settle is too short") as among:
+        law.design_all([(craft, spec), (craft, spec._replace(time=30.0)), (craft, spec._replace(time=220.0))])
+    assert str(among.value) == str(alone.value)
 
 
 @pytest.mark.slow

@@ -1,5 +1,5 @@
 """Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once; gains by
-their law's own formula, lane by lane."""
+their law's own formula, at once where the law has a way, else lane by lane."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -102,13 +102,12 @@ class Moving:
             if path[0] == "law" and self.scenario.laws[path[1]] is self.law:
                 spec = put(spec, path[2:], _rows(every[key]))
         lanes = len(next(iter(columns.values())))
-        rows: list[list[float]] = []
-        for lane in range(lanes):
-            craft, inputs = (mapped(value, partial(_at, lane)) for value in (nominal, spec))
-            gains = law.design(craft, inputs)
-            if not self.scenario.allow_unstable:
+        cases = [(mapped(nominal, partial(_at, lane)), mapped(spec, partial(_at, lane))) for lane in range(lanes)]
+        every = law.design_all(cases)
+        if not self.scenario.allow_unstable:
+            for gains, (craft, _) in zip(every, cases, strict=True):
                 law.check(gains, craft)
-            rows.append([number for _, number in named(gains, "gains")])
+        rows = [[number for _, number in named(gains, "gains")] for gains in every]
         names = [name for name, _ in named(self.base.loop.gains, "gains")]
         return dict(zip(names, np.array(rows).T, strict=True))
 

@@ -10,6 +10,7 @@ import traceback
 import warnings
 from pathlib import Path
 from threading import Event
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
@@ -310,6 +311,10 @@ def run_command() -> int:
         # This path avoids the modules that parse options.
         print(_version())
         return 0
+    if os.environ.get("_STARHOLD_COMPLETE", "").startswith("complete_"):
+        # A shell waits for names and needs no values, so the library that converts them is not loaded: completion takes a
+        # value that cannot be converted for absent.
+        sys.modules["pydantic"] = cast(ModuleType, None)
     try:
         app(standalone_mode=True)
     except SystemExit as ending:

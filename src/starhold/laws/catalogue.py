@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -81,6 +81,11 @@ class Law(Part):
     def design(self, craft: Any, spec: Any) -> Any:
         """Gains from the inputs of a design form."""
         return self.module.design(craft, spec)
+
+    def design_all(self, cases: Sequence[tuple[Any, Any]]) -> list[Any]:
+        """The gains of many crafts and inputs of one form, at once where the law has a way."""
+        together = getattr(self.module, "design_all", None)
+        return [self.design(*case) for case in cases] if together is None else together(cases)
 
     def explain(self, craft: Any, spec: Any) -> list[tuple[str, Any]]:
         """Figures of merit of a design, name and value; none for a law without `explain`."""

@@ -2,10 +2,11 @@
 
 A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(measurement, gains, craft, memory) -> (torque,
 memory)` and `examples()`. It may add `lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft,
-spec)`, and `complete(spec, start)` for inputs that the scenario gives), `check(gains, craft)` that refuses gains that
-cannot be stable, `remember(gains, craft, period)` for a memory that is not empty, and `record(memory, period)` for its
-recorded quantities, a NamedTuple whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque has to
-come from outside the spacecraft, as that of magnetorquers does and that of wheels does not.
+spec)`, `complete(spec, start)` for inputs that the scenario gives, and `design_all(cases)` for many pairs of craft and
+spec, if that is faster than one after another), `check(gains, craft)` that refuses gains that cannot be stable,
+`remember(gains, craft, period)` for a memory that is not empty, and `record(memory, period)` for its recorded
+quantities, a NamedTuple whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque has to come from
+outside the spacecraft, as that of magnetorquers does and that of wheels does not.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
 
 FORMS = response.FORMS
 complete = response.complete
-design, explain = response.designs(Gains, torque, share=0.5)
+design, explain, design_all = response.designs(Gains, torque, share=0.5)
 
 
 def examples() -> list[Gains]:

@@ -52,7 +52,7 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
 
 FORMS = response.FORMS
 complete = response.complete
-design, explain = response.designs(Gains, torque)
+design, explain, design_all = response.designs(Gains, torque)
 
 
 def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,8 @@ from starhold.algebra.vector import Matrix, Vector, add, apply, cross, gyroscopi
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, Start
 from starhold.parts.craft import Craft, tensor, vector
 from starhold.synthesis import response
-from starhold.synthesis.response import Turn, largest_moment, settle, slew_figures
+from starhold.synthesis.response import largest_moment, slew_figures
+from starhold.synthesis.slews import Search
 
 CARD = Card(
     title="Sliding mode",
@@ -87,11 +87,7 @@ def complete(spec: Layered | Settling, start: Callable[[], Start]) -> Layered | 
     return spec._replace(switching_gain=spec.torque / (2.0 * math.sqrt(3.0)))
 
 
-def design(craft: Craft, spec: Layered | Settling) -> Gains:
-    """Return gains of this bandwidth and damping, or the least slope that settles in time; ValueError where the torque does
-    not allow it."""
-    if isinstance(spec, Settling):
-        return _settled(craft, spec)[0]
+def _layered(craft: Craft, spec: Layered) -> Gains:
     apart = spec.damping + math.sqrt(spec.damping**2 - 1.0)
     slope, moments = 2.0 * spec.bandwidth / apart, tensor(craft.inertia)
     most = largest_moment(craft)
@@ -104,8 +100,7 @@ def design(craft: Craft, spec: Layered | Settling) -> Gains:
     return Gains((slope, slope, slope), reach, layer)
 
 
-@lru_cache(maxsize=64)
-def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
+def _search(craft: Craft, spec: Settling) -> Search:
     reach = spec.switching_gain
     if reach is None:
         raise ValueError("switching_gain must be given")
@@ -119,7 +114,7 @@ def _settled(craft: Craft, spec: Settling) -> tuple[Gains, Turn]:
             reach / (spec.boundary_layer * least) if spec.boundary_layer > 0.0 else 0.0
         )
 
-    return settle(torque, gains_of, fastest, craft, spec)
+    return Search(gains_of, fastest, craft, spec)
 
 
 def explain(craft: Craft, spec: Layered | Settling) -> list[tuple[str, Any]]:
@@ -163,6 +158,9 @@ def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: NoMemor
     switching = (switch(s[0], gains.boundary_layer), switch(s[1], gains.boundary_layer), switch(s[2], gains.boundary_layer))
     equivalent = equivalent_torque(measurement, gains.surface_gain, craft)
     return subtract(equivalent, times(gains.switching_gain, switching)), memory
+
+
+design, design_all, _settled = response.settling(torque, Settling, _search, _layered)
 
 
 def examples() -> list[Gains]:
