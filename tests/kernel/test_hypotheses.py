@@ -79,7 +79,7 @@ def case(law=None, V=None, theorem="converges", taken=(), J=(1.0,) * 3, s=None, 
         "body": straight_line(body, rate=V3, torque=V3, craft=PLANT),
         "turning": straight_line(turning, q=Q4, rate=V3),
     }
-    if theorem.startswith("converges"):
+    if theorem.startswith(("converges", "points")):
         programs["lyapunov"] = straight_line(V or energy(), measurement=ASKED, craft=PLANT)
     if s is not None:
         programs["surface"] = straight_line(s, measurement=ASKED)

@@ -58,7 +58,9 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
     options = {"maxfev": 400, "initial_simplex": begun}
     optimize: Any = import_module("scipy.optimize")
-    found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
+    # Where no trial is finite, their differences are not numbers.
+    with np.errstate(invalid="ignore"):
+        found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
     least, X, shares = shape(found.x)
     if not isfinite(least):
         return None
