@@ -1,4 +1,4 @@
-"""Loops that lean on their wheels' momentum: false claims that stand where one part of what is shown of the lean is left out."""
+"""Loops that lean on their wheels' momentum: false claims that stand where a part of what is shown of that is left out."""
 
 from fractions import Fraction
 from functools import cache
@@ -22,7 +22,7 @@ from tests.tiers import leading
 
 K, LEAN, LEVEL = 0.02, 0.005, Fraction("0.0005")
 SLOW, SWINGING = (0.005, 0.14), (0.1, 0.06)
-"""A target's rate (rad/s) and a law's damping (N m s): the slow torque turns more slowly than the loop swings, or as fast."""
+"""A target's rate (rad/s) and a law's damping (N m s): the slow torque turns slowly, or as fast as the loop swings."""
 
 
 def leaning_law(damping):
@@ -36,11 +36,11 @@ def leaning_law(damping):
 
 
 def lyapunov(damping):
-    def V(m, craft):
+    def level(m, craft):
         crossed = damping / 4.0 * dot(m.rate, vector_part(m.attitude))
         return 0.5 * dot(m.rate, m.rate) + 2.0 * K * (1.0 - m.attitude[0]) + crossed
 
-    return V
+    return level
 
 
 @cache
@@ -114,7 +114,7 @@ DROPPED = {
     "the slow torque is nowhere": (SLOW, {"leant": AT_REST, "soft": Fraction(0)}, NARROW, 100.0),
     "the place to lean to does not move": (SWINGING, {"soft": Fraction(0)}, {"ellipsoid"}, 1.3),
 }
-"""A loop, what is left out of the kernel, why the whole kernel refuses it, and how many times farther than claimed it flies."""
+"""A loop, what is left out of the kernel, why the whole one refuses the claim, and how many times farther it then flies."""
 
 
 @pytest.mark.parametrize("part", leading(DROPPED))
