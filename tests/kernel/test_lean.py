@@ -43,14 +43,19 @@ def lyapunov(damping):
     return level
 
 
-@cache
-def claimed(rate, damping, dropped):
-    """What the kernel as it is shows of a body with an inertia of 1 under such a law."""
+def begun(rate, damping):
+    """A claim, not yet shown, about a body with an inertia of 1 under such a law, its programs and its loop."""
     claim, programs = case(
         leaning_law(damping), lyapunov(damping), "points", taken=["moving target", "wheels"], period=0.5, outside=1e-8,
         error=0.0, target_rate=rate, target_acceleration=0.0, momentum=LEAN * K / rate, level=float(LEVEL), highest=1.0,
     )  # fmt: skip
-    held = Held(AttitudeLoop(read(claim, programs)))
+    return claim, programs, Held(AttitudeLoop(read(claim, programs)))
+
+
+@cache
+def claimed(rate, damping, dropped):
+    """What the kernel as it is shows of such a body."""
+    claim, programs, held = begun(rate, damping)
     chain = Chain(held, "", float(LEVEL))
     tube = held.tube(held.region(Fraction(chain.descend())))
     angle, fastest = chain.tighten(tube, AT_REST)
@@ -133,3 +138,12 @@ def test_with_all_of_it_no_flight_is_farther_than_claimed(loop, times):
     claim, programs = claimed(*loop, "")
     assert failing(claim, programs) == set()
     assert times < farthest(claim, programs) <= 1.0
+
+
+def test_the_place_to_lean_to_moves_in_a_period_as_far_as_is_said():
+    """On target the momentum turns over at the target's rate, and the torque with it: no less would be enough."""
+    rate, damping = SWINGING
+    held = begun(rate, damping)[2]
+    *_, (_, moved) = held.linear(held.tube(held.region(held.s / 2**40)), AT_REST)
+    true = 2.0 * LEAN * np.sin(rate * float(held.h) / 2.0)
+    assert 0.98 * float(moved) < true <= float(moved)
