@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from math import prod
 
 from .loops import AXES, RATES, TURNS
-from .numbers import RefusedError, Rows, demand, norm, reach, root, scalar, transpose, up
-from .polynomials import Poly, most, var
+from .numbers import RefusedError, Rows, added, demand, norm, reach, root, scalar, transpose, up
+from .polynomials import Poly, most
 
 STATE = (*RATES, *TURNS)
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE = "|w", "|q"
 """Under which the sizes have those of |w| and |q|."""
+TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
+"""What x, y and z are in each place of the matrix of (x, y, z) x: the permutation symbol."""
 Sizes = dict[str, Fraction]
 Radii = tuple[Fraction, Fraction]
 """Bounds of |w| and |q| of a motion."""
@@ -40,19 +41,30 @@ def least_form(p: Poly, region: Region) -> Rows:
     """Return the matrix of a form that p is not below: two factors of x are taken out of every monomial, what is left lies
     in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
     sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
-    middle, radius = scalar(0, 6), scalar(0, 6)
+    ratios = {name: sizes[name].as_integer_ratio() for name in p.names}
+    found: dict[tuple[int, int], tuple[list[Fraction], list[Fraction]]] = {}
     for m, c in p.terms.items():
         own, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
         demand(set(own[-2:]) <= set(place) and len(own) > 1, "the torque is not zero at rest on target")
         # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
         *left, i, k = own
-        high = c * prod(sizes[name] for name in left)
+        upper, lower = c.as_integer_ratio()
+        for name in left:
+            n, d = ratios[name]
+            upper, lower = upper * n, lower * d
         even = all(left.count(name) % 2 == 0 for name in left) and (power == 0 or region.least >= 0)
-        low = -high if not even else Fraction(0) if left else high * region.least**power
-        ends = up(-min(low, high)), up(max(low, high))
-        for a, b in ((place[i], place[k]), (place[k], place[i])):
-            middle[a][b] += (ends[1] - ends[0]) / 4
-            radius[a][b] += (ends[1] + ends[0]) / 4
+        size = Fraction(abs(upper), lower)
+        high = up(size)
+        low = high if not even else Fraction(0) if left else up(-size * region.least**power)
+        below, above = found.setdefault((place[i], place[k]), ([], []))
+        below.append(high if c < 0 else low)
+        above.append(low if c < 0 else high)
+    middle, radius = scalar(0, 6), scalar(0, 6)
+    for (i, k), ends in found.items():
+        below, above = map(added, ends)
+        for a, b in ((i, k), (k, i)):
+            middle[a][b] += (above - below) / 4
+            radius[a][b] += (above + below) / 4
     for i, row in enumerate(radius):
         middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
     return middle
@@ -73,11 +85,10 @@ def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
         c = rows[1][0].terms.get((names[2],))
         if c is None:
             continue
-        x, y, z = map(var, names)
-        turn = [[Poly({}), -z, y], [z, Poly({}), -x], [-y, x, Poly({})]]
-        rest = [[p - c * q for p, q in zip(a, b, strict=True)] for a, b in zip(rows, turn, strict=True)]
-        if not any((name,) in p.terms for row in rest for p in row for name in names):
-            rows = rest
+        alone = [(name,) for name in names]
+        own = [[[p.terms.get(m, 0) for m in alone] for p in row] for row in rows]
+        if own == [[[c * x for x in axis] for axis in row] for row in TURNED]:
+            rows = [[Poly({m: x for m, x in p.terms.items() if m not in alone}) for p in row] for row in rows]
             found += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
     return found + stretch([[most(p, sizes) for p in row] for row in rows])
 
