@@ -16,8 +16,8 @@ from starhold.kernel.numbers import RefusedError
 from starhold.kernel.regions import AT_REST
 from tests.kernel.certificates import failing
 from tests.kernel.flights import Around, Surroundings, along, turn
+from tests.kernel.handmade import case
 from tests.kernel.oracle import Oracle, run
-from tests.kernel.test_hypotheses import case
 from tests.tiers import leading
 
 K, LEAN, LEVEL = 0.02, 0.005, Fraction("0.0005")

@@ -129,9 +129,9 @@ def test_a_blinded_head_leaves_the_filter_to_the_gyro():
 def test_a_loop_without_cones_has_the_numbers_it_had():
     given = scenario(GYRO, FIRST, FILTER)
     loop = build(given, given.laws[0])
-    assert len(numbers_of(loop.setup().sensors[1])) == 9
+    assert len(numbers_of(loop.setup().sensors[1])) == 8
     coned = scenario(GYRO, FIRST | {"sun_cone": "40 deg"}, FILTER, orbit=ORBIT)
-    assert len(numbers_of(build(coned, coned.laws[0]).setup().sensors[1])) > 9
+    assert len(numbers_of(build(coned, coned.laws[0]).setup().sensors[1])) > 8
 
 
 @pytest.mark.parametrize(

@@ -108,7 +108,8 @@ def test_star_tracker_is_out():
 
 def test_receiver():
     state = next(states())
-    found = [gnss.measure(state, (), gnss.Params(5.0, 0.2), Dice((1, 2), step, 0), step)[0] for step in range(1000)]
+    params = gnss.prepare(gnss.Params(5.0, 0.2), 1.0)
+    found = [gnss.measure(state, (), params, Dice((1, 2), step, 0), step)[0] for step in range(1000)]
     for name, deviation in (("position", 5.0), ("velocity", 0.2)):
         errors = np.array([getattr(one, name) for one in found]) - getattr(state, name)
         assert errors.std(axis=0) == pytest.approx(deviation, rel=0.06)

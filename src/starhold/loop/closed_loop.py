@@ -231,7 +231,8 @@ class ClosedLoop:
         needed, now = list[str](), next(iter(self.used("estimator")), None)
         while now is not None:
             needed, now = [*needed, now.called], there.get(now.started_by)
-        return replace(self, parts=tuple(f for f in self.parts if not f.watches or f.called in needed))
+        kept = tuple(f for f in self.parts if not f.watches or f.called in needed)
+        return self if kept == self.parts else replace(self, parts=kept)
 
     def composition(self) -> Composition:
         """The parts whose equations this loop is made of."""

@@ -162,8 +162,8 @@ def most_stored(loop: ClosedLoop, place: int) -> float:
     """Return the largest momentum of the wheels (N m s) at which a mode ends because of it; for a mode that does not, at
     which another one ends to begin it; inf where none does. Claims about the mode assume no more."""
     ends = [(one.places, one.levels[STORED]) for one in hand_overs(loop, "") if STORED in one.levels]
-    own, others = ([level for places, level in ends if places[side] == place] for side in (0, 1))
-    return max(own or others, default=math.inf)
+    ending, beginning = ([level for places, level in ends if places[side] == place] for side in (0, 1))
+    return max(ending or beginning, default=math.inf)
 
 
 def same_numbers(one: Any, other: Any) -> bool:

@@ -55,7 +55,7 @@ class Search:
 
     @cached_property
     def form(self) -> Any:
-        """What its slews' kernels depend on beside the gains."""
+        """All that the kernels of its slews depend on beside the gains."""
         return self.spec.wheel_momentum is not None, _form(self.craft)
 
     @cached_property
@@ -90,16 +90,16 @@ def settle(torque: Callable[..., Any], searches: Sequence[Search]) -> list[tuple
 
     ValueError states the shortest time where the torque or the momentum does not allow the required one."""
     trials = [_least(search.spec) for search in searches]
-    asked = {place: next(trial) for place, trial in enumerate(trials)}
+    wanted = {place: next(trial) for place, trial in enumerate(trials)}
     found = dict[int, tuple[Any, Turn]]()
-    while asked:
-        answers = fly(torque, [(searches[place], *trial) for place, trial in asked.items()])
-        for place, answer in zip([*asked], answers, strict=True):
+    while wanted:
+        answers = fly(torque, [(searches[place], *trial) for place, trial in wanted.items()])
+        for place, answer in zip([*wanted], answers, strict=True):
             trial = trials[place]
             try:
-                asked[place] = trial.throw(answer) if isinstance(answer, ValueError) else trial.send(answer)
+                wanted[place] = trial.throw(answer) if isinstance(answer, ValueError) else trial.send(answer)
             except StopIteration as end:
-                del asked[place]
+                del wanted[place]
                 x, slew = end.value
                 found[place] = searches[place].gains_of(x), slew
     return [found[place] for place in range(len(searches))]

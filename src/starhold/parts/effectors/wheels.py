@@ -360,13 +360,14 @@ def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
     return authority(at_top_speed(as_known(params)), kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
 
 
-def shared_as(params: Wheels, known: Wheels) -> Wheels:
-    """The wheels with a torque shared out, and their momentum told, as of those that laws take them for, if these are as
-    many."""
+def shared_as(params: Wheels, known: Wheels, like: Wheels | None = None) -> Wheels:
+    """The wheels with a torque allocated, and their momentum measured, as for those that laws take them for, if these are
+    as many. like: those of a loop of the same form, for numbers that are recorded, which cannot be compared."""
     if len(params.axes) != len(known.axes):
         return params
     axes = as_known(known).axes
-    return params._replace(least=known.least, known_axes=() if axes == params.axes else axes)
+    same = axes == params.axes if like is None else not like.known_axes
+    return params._replace(least=known.least, known_axes=() if same else axes)
 
 
 def axial_inertia(params: Wheels) -> NDArray[np.float64]:

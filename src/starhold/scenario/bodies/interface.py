@@ -148,11 +148,11 @@ class Body(Protocol):
         true = self.moved(scenario, loop, values)
         supposed = self.moved(scenario.known, replace(loop, craft=loop.known), known)
 
-        def shared(one: Fitted, other: Fitted) -> Fitted:
+        def shared(one: Fitted, other: Fitted, like: Fitted) -> Fitted:
             share = one.part.hook("shared_as")
-            return one if share is None else replace(one, params=share(one.params, other.params))
+            return one if share is None else replace(one, params=share(one.params, other.params, like.params))
 
-        parts = (shared(*pair) for pair in zip(true.parts, supposed.parts, strict=True))
+        parts = (shared(*three) for three in zip(true.parts, supposed.parts, loop.parts, strict=True))
         return true._replace(nominal=supposed.craft, parts=tuple(parts))
 
     def admitted(self, scenario: Scenario, values: Mapping[str, Any]) -> Any:

@@ -132,8 +132,8 @@ def effectors_of(scenario: Scenario) -> tuple[Fitted, ...]:
     """Return the effectors of a scenario's tables, which allocate a torque by the law's model of them. Beside the functions
     of its role, each has `sure_torque(params, kind)`, the torque (N m) that it can always give, in norm or about each axis
     at once; `capacity(own, params)`, the momentum (N m s) that it can still store; `axial_inertia(params)`, the part of the
-    body's inertia (3, 3; kg m2) due to rotors about their axes; and `shared_as(params, known)`, its numbers with the
-    allocation among those that laws know.
+    body's inertia (3, 3; kg m2) due to rotors about their axes; and `shared_as(params, known, like)`, its numbers with
+    the allocation among those that laws know.
     """
     made, supposed = (cast(Made, one.made).effectors for one in (scenario, scenario.known))
     if made is supposed or len(made) != len(supposed):
