@@ -12,7 +12,7 @@ from starhold.algebra.quaternion import vector_part
 from starhold.algebra.vector import Matrix, Vector, add, apply, gyroscopic_torque, scale, subtract
 from starhold.laws import matrix_pd
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, tracking_torque
-from starhold.parts.craft import Craft, compact, tensor
+from starhold.parts.craft import Craft, compact, tensor, vector
 from starhold.synthesis.riccati import (
     OUT_OF_RANGE,
     closed_form,
@@ -143,15 +143,15 @@ def design_all(cases: Sequence[tuple[Craft, Any]]) -> list[Gains]:
     order = np.argsort(moments, axis=0, kind="stable")
     if isinstance(cases[0][1], FormII):
         order = np.broadcast_to(np.arange(3)[:, None], order.shape)
-    gains = np.empty((2, *moments.shape))
     with np.errstate(all="ignore"):
-        for gain, sorted_gain in zip(gains, closed_form(np.take_along_axis(moments, order, 0), q, r), strict=True):
-            np.put_along_axis(gain, order, sorted_gain, 0)
+        sorted_gains = np.array(closed_form(np.take_along_axis(moments, order, 0), q, r))
+        # Back from the order of the axes to that of the body.
+        gains: Array = np.take_along_axis(sorted_gains, np.argsort(order, axis=0)[None], 1)
         fine = (np.vstack([q, r]) > 0.0).all() and all(spread(part).max() <= MOST_SPREAD for part in (q[:3], q[3:], r))
         # What is to be refused, `design` refuses with its reason.
         if not (fine and (gains > 0.0).all() and np.isfinite(2.0 * gains).all()):
             return [design(*case) for case in cases]
-    return [Gains(*pair) for pair in zip(*([*map(tuple, gain.T.tolist())] for gain in gains), strict=True)]
+    return [Gains(vector(k_rate), vector(k_attitude)) for k_rate, k_attitude in zip(gains[0].T, gains[1].T, strict=True)]
 
 
 class Solution(NamedTuple):
