@@ -51,6 +51,7 @@ CASES = {
     "dipole": (LYAPUNOV, MAGNET, {"part.residual-dipole.dipole": SHARE, "spacecraft.inertia": TOLD}),
     "riccati, told": (LQR, {}, {"spacecraft.inertia": TOLD}),
     "weights": (LQR, {}, {"law.lqr.q": SHARE}),
+    "weights about axes": (LQR | {"form": "III"}, {}, {"law.lqr.r": SHARE, "spacecraft.inertia": TOLD}),
     "bandwidth": (BANDWIDTH, {}, {"spacecraft.inertia": TOLD, "law.pd.bandwidth": SHARE}),
     "settling": (
         SETTLING,

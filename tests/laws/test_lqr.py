@@ -313,3 +313,35 @@ def test_least_balance_is_the_least_of_all():
         best = min(minimize(length, start, method="Nelder-Mead", options=tight).fun for start in starts)
         # A change of log y by s moves its q by s and its r by -s.
         assert moved @ moved <= 2.0 * best * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("form", [lqr.FormII, lqr.FormIII])
+def test_gains_of_many_runs_have_the_bits_of_each_alone(form, monkeypatch):
+    random = np.random.default_rng(3)
+    crafts = [make_craft(np.array([2.0, 3.0, 4.0])[random.permutation(3)] * random.uniform(0.9, 1.1, 3)) for _ in range(40)]
+    weights = [(tuple(10.0 ** random.uniform(-5, 5, 6)), tuple(10.0 ** random.uniform(-5, 5, 3))) for _ in crafts]
+    # Equal moments, too.
+    cases = [(craft, form(*pair)) for craft, pair in zip(crafts, weights, strict=True)]
+    cases.append((make_craft((2.0, 2.0, 2.0)), form((1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (1.0, 2.0, 3.0))))
+    alone = [lqr.design(*case) for case in cases]
+    single, made = lqr.design, []
+    monkeypatch.setattr(lqr, "design", lambda *case: made.append(case) or single(*case))
+    assert np.array([gains[:2] for gains in lqr.design_all(cases)]).tobytes() == np.array([g[:2] for g in alone]).tobytes()
+    assert made == []
+    # Beside an inertia that turns the axes, or weights that are balanced, each is designed alone.
+    mixed = [cases[0], (crafts[1], form(*weights[1], BALANCES.index("least")))]
+    if form is lqr.FormIII:
+        mixed.append((make_craft([[2.0, 0.1, 0.0], [0.1, 3.0, 0.0], [0.0, 0.0, 4.0]]), form(*weights[2])))
+    assert lqr.design_all(mixed) == [single(*case) for case in mixed]
+    assert made == mixed
+
+
+@pytest.mark.parametrize(("q", "r"), [((1, 1, 1, 1, -1, 1), 1.0), ((1, 1, 1, 1e-7, 1, 1e7), 1.0), ((1e200,) * 6, 1e-200)])
+def test_what_one_of_many_is_refused_for_is_what_it_is_refused_for_alone(q, r):
+    craft = make_craft((2.0, 3.0, 4.0))
+    bad = craft, lqr.FormII(tuple(map(float, q)), (r, r, r))
+    with pytest.raises(ValueError, match=r".") as alone:
+        lqr.design(*bad)
+    with pytest.raises(ValueError, match=r".") as among:
+        lqr.design_all([(craft, lqr.FormII((1.0,) * 6, (1.0,) * 3)), bad])
+    assert str(among.value) == str(alone.value)

@@ -1,15 +1,15 @@
 """Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once; gains by
 their law's own formula, at once where the law has a way, else lane by lane."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import partial
-from typing import Any, TypeAlias
+from itertools import repeat
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import leaves, mapped, put
+from starhold.algebra.structure import leaves, mapped, put, rebuild
 from starhold.campaign.dispersions import Dispersion
 from starhold.loop.kernels import numbers_of
 from starhold.scenario.reading import LawEntry, Scenario
@@ -102,18 +102,24 @@ class Moving:
             if path[0] == "law" and self.scenario.laws[path[1]] is self.law:
                 spec = put(spec, path[2:], _rows(every[key]))
         lanes = len(next(iter(columns.values())))
-        cases = [(mapped(nominal, partial(_at, lane)), mapped(spec, partial(_at, lane))) for lane in range(lanes)]
+        cases = list(zip(_each(nominal, lanes), _each(spec, lanes), strict=True))
         every = law.design_all(cases)
         if not self.scenario.allow_unstable:
             for gains, (craft, _) in zip(every, cases, strict=True):
                 law.check(gains, craft)
-        rows = [[number for _, number in named(gains, "gains")] for gains in every]
+        rows = [[leaf for leaf in leaves(gains) if isinstance(leaf, float)] for gains in every]
         names = [name for name, _ in named(self.base.loop.gains, "gains")]
         return dict(zip(names, np.array(rows).T, strict=True))
 
 
-def _at(lane: int, leaf: Any) -> Any:
-    return float(leaf[lane]) if isinstance(leaf, np.ndarray) and leaf.ndim else leaf
+def _each(value: Any, lanes: int) -> Iterable[Any]:
+    """Return a structure with arrays (lanes,) as that of each lane, with numbers."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return value.astype(float).tolist()
+    parts = [_each(part, lanes) for part in cast(Any, value)] if isinstance(value, tuple) else []
+    if all(isinstance(part, repeat) for part in parts):
+        return repeat(value, lanes)
+    return [rebuild(value, row) for row in zip(*parts, strict=True)]
 
 
 def _rows(new: Array) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from starhold.algebra.quaternion import vector_part
 from starhold.algebra.vector import Matrix, Vector, add, apply, gyroscopic_torque, scale, subtract
 from starhold.laws import matrix_pd
 from starhold.laws.interface import Card, Gain, Measurement, NoMemory, tracking_torque
-from starhold.parts.craft import Craft, compact, tensor
+from starhold.parts.craft import Craft, compact, tensor, vector
 from starhold.synthesis.riccati import (
     OUT_OF_RANGE,
     closed_form,
@@ -22,7 +23,17 @@ from starhold.synthesis.riccati import (
     scipy_axes,
     solve_riccati,
 )
-from starhold.synthesis.weights import BALANCES, balance, check_axes, check_spreads, kappa, positive, positive_definite
+from starhold.synthesis.weights import (
+    BALANCES,
+    MOST_SPREAD,
+    balance,
+    check_axes,
+    check_spreads,
+    kappa,
+    positive,
+    positive_definite,
+    spread,
+)
 
 CARD = Card(
     title="Closed-form LQR",
@@ -119,6 +130,28 @@ def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
         if not np.isfinite(gain).all() or not (isinstance(spec, Numeric) or (np.diagonal(gain) > 0.0).all()):
             raise ValueError(OUT_OF_RANGE)
     return Gains(compact(k_rate), compact(k_attitude), share)
+
+
+def design_all(cases: Sequence[tuple[Craft, Any]]) -> list[Gains]:
+    """Return the gains of many crafts and inputs of one form, each those of `design`: at once for forms II and III with
+    diagonal inertias and weights as given, whose axes do not touch one another."""
+    closed = all(isinstance(spec, FormII | FormIII) and not spec.balance for _, spec in cases)
+    if not (closed and all(isinstance(craft.inertia[0], float) for craft, _ in cases)):
+        return [design(*case) for case in cases]
+    moments = np.array([craft.inertia for craft, _ in cases]).T
+    q, r = (np.array(list(weights), dtype=float).T for weights in zip(*((spec.q, spec.r) for _, spec in cases), strict=True))
+    order = np.argsort(moments, axis=0, kind="stable")
+    if isinstance(cases[0][1], FormII):
+        order = np.broadcast_to(np.arange(3)[:, None], order.shape)
+    with np.errstate(all="ignore"):
+        sorted_gains = np.array(closed_form(np.take_along_axis(moments, order, 0), q, r))
+        # Back from the order of the axes to that of the body.
+        gains: Array = np.take_along_axis(sorted_gains, np.argsort(order, axis=0)[None], 1)
+        fine = (np.vstack([q, r]) > 0.0).all() and all(spread(part).max() <= MOST_SPREAD for part in (q[:3], q[3:], r))
+        # What is to be refused, `design` refuses with its reason.
+        if not (fine and (gains > 0.0).all() and np.isfinite(2.0 * gains).all()):
+            return [design(*case) for case in cases]
+    return [Gains(vector(k_rate), vector(k_attitude)) for k_rate, k_attitude in zip(gains[0].T, gains[1].T, strict=True)]
 
 
 class Solution(NamedTuple):

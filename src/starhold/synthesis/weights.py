@@ -112,14 +112,21 @@ def positive_definite(given: Any, size: int, name: str) -> Array:
     return 0.5 * array + 0.5 * array.T
 
 
+def spread(values: Array) -> Array:
+    """Return the largest over the smallest of the numbers along the first axis; what is below 1e-16 of the largest counts as
+    that."""
+    most = values.max(axis=0)
+    return most / np.maximum(values.min(axis=0), 1e-16 * most)
+
+
 def check_spreads(rate: Array, attitude: Array, cost: Array, *, kind: str = "") -> None:
     """Raise ValueError where eigenvalues of q's rate part, of its attitude part or of r, each (3,), differ by more than
     MOST_SPREAD; `kind` stands before the name in the message."""
     for name, part, values in (("q", "rate", rate), ("q", "attitude", attitude), ("r", "torque", cost)):
         # Of a full matrix the least eigenvalue is known to the rounding of the largest: a thousandth is forgiven.
-        spread = values.max() / max(values.min(), 1e-16 * values.max())
-        if not spread <= 1.001 * MOST_SPREAD:
-            reason = f"{kind}{name}: the weights of the {part} differ by a factor of {spread:.3g}"
+        factor = float(spread(values))
+        if not factor <= 1.001 * MOST_SPREAD:
+            reason = f"{kind}{name}: the weights of the {part} differ by a factor of {factor:.3g}"
             raise ValueError(f"{reason}; at most {MOST_SPREAD:g} is allowed")
 
 
