@@ -91,7 +91,7 @@ def settle(torque: Callable[..., Any], searches: Sequence[Search]) -> list[tuple
     ValueError states the shortest time where the torque or the momentum does not allow the required one."""
     trials = [_least(search.spec) for search in searches]
     wanted = {place: next(trial) for place, trial in enumerate(trials)}
-    found = dict[int, tuple[Any, Turn]]()
+    settled = dict[int, tuple[Any, Turn]]()
     while wanted:
         answers = fly(torque, [(searches[place], *trial) for place, trial in wanted.items()])
         for place, answer in zip([*wanted], answers, strict=True):
@@ -101,8 +101,8 @@ def settle(torque: Callable[..., Any], searches: Sequence[Search]) -> list[tuple
             except StopIteration as end:
                 del wanted[place]
                 x, slew = end.value
-                found[place] = searches[place].gains_of(x), slew
-    return [found[place] for place in range(len(searches))]
+                settled[place] = searches[place].gains_of(x), slew
+    return [settled[place] for place in range(len(searches))]
 
 
 def _least(spec: Any) -> Trials[tuple[float, Turn]]:
