@@ -96,10 +96,10 @@ def test_compare_begins_with_the_loop_as_it_flies_once_that_is_asked_for(tmp_pat
         return found, kinds, [one["subject"].get("no_pointing") for one in given]
 
     rows, kinds, reasons = first_rows()
-    assert rows["pd"] == "pd not looked for pointing as it flies: --proof, or starhold certify, looks for it"
+    assert rows["pd"] == "pd not sought pointing as it flies: --proof, or starhold certify, looks for it"
     memory = "the law keeps a memory from call to call"
     assert rows["mpc"] == f"mpc not proved pointing as it flies: {memory}"
-    assert ("pointing" in kinds["pd"], reasons) == (False, ["not looked for", memory])
+    assert ("pointing" in kinds["pd"], reasons) == (False, ["not sought", memory])
     rows, kinds, reasons = first_rows("--proof")
     assert rows["pd"].startswith("pd proved within ")
     assert ("pointing" in kinds["pd"], reasons) == (True, [None, memory])
@@ -110,7 +110,7 @@ def test_certify_says_why_nothing_is_proved_of_the_loop_as_it_flies(tmp_path):
     (tmp_path / "weak.toml").write_text(CRAFT + WEAK)
     done = starhold("certify", "weak.toml", "-o", "out", cwd=tmp_path)
     (subject,) = (one["subject"] for one in json.loads((tmp_path / "out" / "certificate.json").read_text())["certificates"])
-    assert subject["no_pointing"] not in ("", "not looked for")
+    assert subject["no_pointing"] not in ("", "not sought")
     assert f"  not proved: pointing as it flies: {subject['no_pointing']}" in done.stdout.splitlines()
 
 

@@ -109,9 +109,9 @@ def test_pages_begin_with_why_nothing_is_claimed_of_the_loop_as_it_flies() -> No
     given = parse(CRAFT + PD, "test")
     certificate = certify(build(given, given.laws[0]), "pd")
     found = told(certificate)
-    assert plain(found.text).index("not looked for") < plain(found.text).index("Converges")
+    assert plain(found.text).index("not sought") < plain(found.text).index("Converges")
     for text in (found.text, Reader(proofs([replace(flown.flights()[0], certificates=(certificate,))])).text):
-        assert "not looked for" in plain(text)
+        assert "not sought" in plain(text)
         assert "--proof, or starhold certify, looks for it" in plain(text)
 
 

@@ -99,7 +99,7 @@ WITHOUT, ORBIT = "without:", "orbit-within:"
 more than a share."""
 BESIDE = ("sampling", "control-limit", "saturated-axis")
 """Kinds of claims about a control loop that state no ultimate bound, and accompany one that does."""
-NOT_SOUGHT = "not looked for"
+NOT_SOUGHT = "not sought"
 """Why a certificate lacks the claim about the loop as it flies, where none was sought."""
 
 

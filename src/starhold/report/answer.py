@@ -18,6 +18,7 @@ from starhold.studies.verification import verdicts_of_flight
 
 if TYPE_CHECKING:
     from starhold.analysis.ranking import MetricSet
+    from starhold.certification.certificate import Certificate
     from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
     from starhold.studies.verification import RequirementVerdict
@@ -155,27 +156,34 @@ def proofs(flights: Sequence[Flight]) -> str:
     """State the strongest proof about each law in a sentence, and before it why there is none about the loop as it flies;
     empty where none was attempted."""
     certified = [(number, flight) for number, flight in enumerate(flights) if flight.certificates]
-    lines = [f"{_unflown(flight)}{_strongest(number, flight, len(flights))}" for number, flight in certified]
+    names = [f"<strong>{swatch(n)}{escape(one.name)}</strong> " if len(flights) > 1 else "" for n, one in certified]
+    lines = [f"{_unflown(one, name)}{_strongest(one, name)}" for (_, one), name in zip(certified, names, strict=True)]
     if not lines:
         return ""
     more = '<button class="link" type="button" data-open="proofs">All claims</button>'
     return f'<section class="card proved"><h2>Proved</h2>{"".join(lines)}{more}</section>'
 
 
-def _unflown(flight: Flight) -> str:
-    texts = dict.fromkeys(unflown_text(certificate) for certificate in flight.certificates)
-    return "".join(f"<p>{pill(word)} {escape(flight.name)}: {escape(text)}.</p>" for word, text in texts if word)
+def _about(certificate: Certificate, flight: Flight) -> str:
+    return certificate.name.removeprefix(flight.name).strip(": ")
 
 
-def _strongest(number: int, flight: Flight, count: int) -> str:
+def _unflown(flight: Flight, whose: str) -> str:
+    subjects: dict[tuple[str, str], list[str]] = {}
+    for certificate in flight.certificates:
+        subjects.setdefault(unflown_text(certificate), []).append(_about(certificate, flight))
+    reasons = {said: f"{', '.join(names)}: " if len(subjects) > 1 else "" for said, names in subjects.items() if all(said)}
+    return "".join(f"<p>{pill(word)} {whose}{escape(about + text)}.</p>" for (word, text), about in reasons.items())
+
+
+def _strongest(flight: Flight, whose: str) -> str:
     claims = [(claim, place) for place, one in enumerate(flight.certificates) for claim in one.claims]
-    whose = f"<strong>{swatch(number)}{escape(flight.name)}</strong> " if count > 1 else ""
     if not claims:
         return f"<p>{pill('undecided')} {whose}nothing is claimed: {escape(unclaimed(flight.certificates[0].subject))}.</p>"
     claim = strongest([claim for claim, _ in claims])[0]
     place = next(place for other, place in claims if other is claim)
     certificate = flight.certificates[place]
-    about = certificate.name.removeprefix(flight.name).strip(": ")
+    about = _about(certificate, flight)
     left = flight.left(place, claim.kind)
     when = ""
     if left and claim.outcome == "proved":

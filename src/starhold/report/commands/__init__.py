@@ -21,7 +21,7 @@ OUTCOMES = {
     **dict.fromkeys(("met", "proved", "settled", "kept", "agrees", "holds", "passed"), "green"),
     **dict.fromkeys(("missed", "refuted", "diverged", "exceeded", "differs", "fails", "failed"), "red"),
     **dict.fromkeys(("not decided", "undecided", "not settled", "close", "depends"), "yellow"),
-    **dict.fromkeys(("not checked", "not proved", "not looked for"), "yellow"),
+    **dict.fromkeys(("not checked", "not proved", "not sought"), "yellow"),
     **dict.fromkeys(("not claimed", "does not apply"), "dim"),
 }
 """The colour of each outcome: good, bad, open or of no account."""
