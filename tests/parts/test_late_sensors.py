@@ -10,8 +10,10 @@ from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.errors import InputError
+from starhold.parts.catalogue import parts
+from starhold.parts.contract import UNBOUNDED
 from starhold.parts.random import Dice, Silent
-from starhold.parts.sensors import gnss, gyro, horizon_sensor, magnetometer
+from starhold.parts.sensors import gnss, gyro
 from tests.parts.trackers import ARCSEC, FILTER, FIRST, GYRO, errors, scenario
 
 PERIOD, INERTIA = 0.1, np.array([2.0, 3.0, 4.0])
@@ -136,10 +138,20 @@ def test_jitter_moves_the_instant_along_the_change(sensor, field, before, after,
     assert np.std(off) == pytest.approx(0.01, rel=0.1)
 
 
-def test_a_claim_bounds_no_sensor_that_is_late():
-    for sensor in (gyro, magnetometer):
-        assert sensor.error(sensor.Params(delay=0.1)).rate == sensor.error(sensor.Params(jitter=0.1)).field == math.inf
-    assert horizon_sensor.Params().delay == 0.0
+LATE = [p for p in parts("sensor").values() if {"delay", "jitter"} & {*p.module.Params._fields}]
+
+
+@pytest.mark.parametrize("part", LATE, ids=lambda part: part.name)
+@pytest.mark.parametrize("key", ["delay", "jitter"])
+def test_a_claim_bounds_no_sensor_that_is_late(part, key):
+    """What declares the error of readings calls it unbounded, whatever else the sensor has; a claim leaves out one that
+    declares none, with its noise."""
+    tell = part.hook("error")
+    for params in part.module.examples():
+        late = params._replace(**{key: 1e-9})
+        assert tell is None or tell(late) == UNBOUNDED
+    assert tell is not None or part.hook("noise") is None
+    assert {"gyro", "magnetometer", "star-tracker"} <= {p.name for p in LATE}
 
 
 def test_too_long_a_dead_time_is_refused():

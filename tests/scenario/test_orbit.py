@@ -175,3 +175,11 @@ def test_an_orbit_that_comes_down_after_the_run_is_warned_of():
         orbit(FALLING, "6000.0")
     with pytest.warns(UserWarning, match=r"orbit\.velocity: 708 times the speed of escape"):
         orbit('position = ["7000 km", 0, 0]\nvelocity = [0, "7557 km/s", 0]')
+
+
+def test_a_plain_altitude_in_thousandths_of_a_metre_is_refused():
+    """500 km times a thousand is farther than the Moon; with its unit it is taken, and so is a geostationary one."""
+    with pytest.raises(InputError, match=r"orbit\.altitude: found 500000000.0; .*is 500000 m meant\?$"):
+        orbit("altitude = 500000e3\ninclination = 0")
+    for text in ('altitude = "500000 km"', "altitude = 35786e3"):
+        orbit(f"{text}\ninclination = 0")

@@ -153,6 +153,7 @@ def test_the_noise_of_a_magnetometer_is_a_deviation_or_a_density():
 
 PARTS = rows("""
 magnetometer | noise | 50.0 | "50 nT" or "50 T"
+magnetometer | noise | 1e-4 | "0.0001 nT" or "0.0001 T"
 gyro | noise | 0.15 | "0.15 deg/sqrt(h)" or "0.15 rad/s"
 gyro | bias | [10.0, 0.0, 0.0] | "10 deg/s" or "10 rad/s"
 residual-dipole | dipole | [6000.0, 0.0, 0.0] | "6000 mA m^2" or "6000 A m^2"
@@ -173,6 +174,7 @@ wheels.momentum_limit | 4000.0 | 4000 | mN m s | N m s
 spacecraft.torque_limit | 2000.0 | 2000 | mN m | N m
 environment.torque_noise | 20.0 | 20 | mN m | N m
 initial.rate | [10.0, 0.0, 0.0] | 10 | deg/s | rad/s
+settling.rate_tolerance | 10.0 | 10 | deg/s | rad/s
 """)
 
 

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.loop.kernels import make_step
+from starhold.parts.effectors.wheels import gives_allocated_torque
 from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly
 from tests.making import built, flown
@@ -125,5 +126,23 @@ def test_no_claim_is_made_of_wheels_that_are_askew_and_large_turns_are_refused()
     for turns, proved in (([None] * 4, True), (TURNS, False)):
         claims = sh.certify(scenario(turns), "wheel")[0].claims
         assert any(claim.outcome == "proved" for claim in claims) == proved
+    given = scenario([None] * 4).with_({"nominal": {"wheel": [{"axis": axis} for axis in AXES[::-1].tolist()]}})
+    with refused("nominal", "no [nominal], for certification"):
+        sh.certify(given, "wheel")
     with refused("mounting_error", "at most 0.5"):
         scenario([[2.0, 0.0, 0.0], None, None, None])
+
+
+def test_no_claim_is_made_of_a_lost_wheel_that_turns_on_askew():
+    """The others give the torque that is shared out, and the law cancels the lost one's momentum along another axis."""
+    lost = {"fault": [{"time": 20.0, "wheel": 4, "lost": True}], "law[1].fault_action": "reallocate"}
+    for turn in (None, TURNS[3]):
+        given = scenario([None, None, None, turn]).with_(lost)
+        after = built(given).events[-1].parts
+        (wheels,) = (fitted.params for fitted in after if fitted.part.name == "wheels")
+        assert gives_allocated_torque(wheels) == (turn is None)
+        # What is claimed of straight ones takes seconds to prove.
+        assert turn is None or not any(one.claims for one in sh.certify(given, "wheel"))
+        working = np.array([axis for axis, limit in zip(wheels.axes, wheels.torque_limit, strict=True) if limit])
+        rows = np.array([row for row, limit in zip(wheels.least, wheels.torque_limit, strict=True) if limit])
+        assert np.abs(working.T @ rows + np.eye(3)).max() < 1e-12

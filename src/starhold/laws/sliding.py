@@ -51,7 +51,9 @@ class Layered(NamedTuple):
     those of the surface and of the layer. Exact about every axis for a diagonal inertia, whose reaching torques are in
     proportion to the moments; else exact about the axis of the largest moment, and faster about the others."""
 
-    bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
+    bandwidth: Annotated[
+        float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="natural frequency, the least of all axes")
+    ]
     switching_gain: Annotated[float, Gain("N m", above=0.0, text="switching torque about the axis of the largest moment")]
     damping: Annotated[float, Gain("1", at_least=1.0, text="damping ratio; 1: a double root")] = 1.0
 

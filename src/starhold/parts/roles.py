@@ -179,7 +179,8 @@ class Effector(Protocol):
         ...
 
     def gives_allocated_torque(self, params: Any, /) -> bool:
-        """Whether, within its limits, the torque on the body is the one allocated to it; true where it is absent."""
+        """Whether, within its limits, the torque on the body is the one allocated to it, and its momentum the one that laws
+        are told; true where it is absent."""
         ...
 
     def record(self, state: Any, command: Any, body: State, params: Any, /) -> Any:

@@ -27,6 +27,8 @@ LOWEST = 1.0 / 64.0
 AIR = 5e4
 """Altitude (m) below which nothing orbits the Earth; any altitude up to geostationary, a thousand times too small, is below
 it."""
+FARTHEST = 4e8
+"""Plain altitude (m) about the Earth above which the unit is taken to be wrong."""
 FASTEST = 10.0
 """The ratio of speed to the escape speed of the Sun, a planet or the Moon above which the unit is taken to be wrong."""
 STRAIGHT = 1e-9
@@ -147,7 +149,11 @@ class Orbit(Table):
         if isinstance(altitude, int | float) and orbit.surface is not None and altitude < LOWEST * orbit.surface:
             low = f"{LOWEST * orbit.surface:.6g} or more about this body"
             raise at_key("altitude", ask_for_unit(altitude, "m", low, "km"), altitude)
-        if orbit.altitude is not None and orbit.altitude < AIR and body_of(orbit.gravitational_parameter) == "Earth":
+        earth = body_of(orbit.gravitational_parameter) == "Earth"
+        if isinstance(altitude, int | float) and altitude > FARTHEST and earth:
+            far = f"within {FARTHEST:g}, where the Moon is; is {1e-3 * altitude:g} m meant?"
+            raise at_key("altitude", f"a plain number is in m, {far}", altitude)
+        if orbit.altitude is not None and orbit.altitude < AIR and earth:
             allowed = f"one above the atmosphere, which {orbit.altitude:.6g} m is inside; is {orbit.altitude:.6g} km meant?"
             raise at_key("altitude", allowed, altitude)
         return orbit

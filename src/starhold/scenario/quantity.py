@@ -15,7 +15,13 @@ from starhold.scenario.units import shown, to_either, to_number
 
 LEAST, MOST = 1e-30, 1e30
 """The least and the greatest size of nonzero quantities in files; for a vector or matrix the size of its largest entry."""
-PLAIN = {"rad": (math.tau, "deg"), "T": (1e-3, "nT"), "T/sqrt(Hz)": (1e-6, "nT/sqrt(Hz)"), "A m^2": (5e3, "mA m^2")}
+PLAIN = {
+    "rad": (math.tau, "deg"),
+    "rad/s": (math.tau, "deg/s"),
+    "T": (1e-3, "nT"),
+    "T/sqrt(Hz)": (1e-6, "nT/sqrt(Hz)"),
+    "A m^2": (5e3, "mA m^2"),
+}
 """By unit: the largest plain number that is accepted, and the unit that was probably meant with a larger one."""
 MOST_WHOLE = 2**53
 """Up to this size floats represent every whole number."""

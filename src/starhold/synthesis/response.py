@@ -36,7 +36,9 @@ class Bandwidth(NamedTuple):
     """The form takes the natural frequency and damping of the linear loop: exact about the axis of the largest moment of
     inertia, more about the others."""
 
-    bandwidth: Annotated[float, Gain("rad/s", above=0.0, text="natural frequency, the least of all axes")]
+    bandwidth: Annotated[
+        float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="natural frequency, the least of all axes")
+    ]
     damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
 
 

@@ -376,8 +376,11 @@ def axial_inertia(params: Wheels) -> NDArray[np.float64]:
 
 
 def gives_allocated_torque(wheels: Wheels) -> bool:
-    """Whether, within the wheels' limits, the torque on the body is the allocated one: not so while a lost wheel is
-    still counted on."""
+    """Whether, within the wheels' limits, the torque on the body is the allocated one, and the momentum that laws are told
+    is theirs: not so while a lost wheel is still counted on, nor of wheels that are mounted otherwise than laws take them,
+    were it one that is lost and turns on."""
+    if wheels.known_axes:
+        return False
     working = [(axis, row) for axis, row, limit in zip(wheels.axes, wheels.least, wheels.torque_limit, strict=True) if limit]
     axes, rows = (
         (np.array(part).reshape(-1, 3) for part in zip(*working, strict=True)) if working else (np.zeros((1, 3)),) * 2

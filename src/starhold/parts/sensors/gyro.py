@@ -42,9 +42,7 @@ class Params(NamedTuple):
             text="standard deviation of the mean over a second: the angle random walk",
         ),
     ] = 0.0
-    bias: Annotated[Vector, Parameter("rad/s", shape=(3,), spread=False, plain=(math.tau, "deg/s"), text="at the start")] = (
-        ZERO
-    )
+    bias: Annotated[Vector, Parameter("rad/s", shape=(3,), spread=False, text="at the start")] = ZERO
     bias_walk: Annotated[
         float,
         Parameter(

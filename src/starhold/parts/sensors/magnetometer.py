@@ -35,7 +35,9 @@ FIRST = {"magnetic_field": ZERO, "magnetic_field_is_new": 0.0}
 class Params(NamedTuple):
     """The errors of the magnetometer, and the epoch."""
 
-    noise: Annotated[float, Parameter("T", at_least=0.0, text="standard deviation of each component")] = 0.0
+    noise: Annotated[
+        float, Parameter("T", at_least=0.0, plain=(1e-5, "nT"), text="standard deviation of each component")
+    ] = 0.0
     bias: Annotated[Vector, Parameter("T", shape=(3,), spread=False, text="added to the field, body axes")] = ZERO
     scale_error: Annotated[float, Parameter("1", at_least=-0.5, at_most=0.5, text="of the scale factor")] = 0.0
     epoch: Annotated[Date, EPOCH] = START

@@ -126,7 +126,7 @@ class Initial(Pointing):
 
     rate: Annotated[
         Any,
-        *quantity(Gain("rad/s", shape=(3,), spread=False, plain=(math.tau, "deg/s"), text="angular velocity, body axes")),
+        *quantity(Gain("rad/s", shape=(3,), spread=False, text="angular velocity, body axes")),
     ] = (0.0, 0.0, 0.0)
     relative_to: Annotated[Literal["inertial", "target"], Field(description="what attitude and rate are relative to")] = (
         "inertial"
@@ -214,7 +214,8 @@ class Rotor(Table):
     ] = None
     static_friction: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="largest, of a slow rotor"))] = None
     stribeck_speed: Annotated[
-        float | None, *quantity(Gain("rad/s", above=0.0, text="at which friction is largest, the static one"))
+        float | None,
+        *quantity(Gain("rad/s", above=0.0, plain=(2e3, "rpm"), text="at which friction is largest, the static one")),
     ] = None
     power_limit: Annotated[
         float | None, *quantity(Gain("W", above=0.0, text="of the motor as it drives the rotor: torque times speed"))
