@@ -148,7 +148,7 @@ def times(a: Rows, b: Rows) -> Rows:
 
 def plus(a: Rows, b: Rows, c: Fraction | int = 1) -> Rows:
     """Return a + c b."""
-    return [[x + c * y for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
+    return [[x + c * y if y else x for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
 
 
 def transpose(a: Sequence[Sequence[Fraction]]) -> Rows:

@@ -87,7 +87,7 @@ def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
             continue
         alone = [(name,) for name in names]
         own = [[[p.terms.get(m, 0) for m in alone] for p in row] for row in rows]
-        if own == [[[c * x for x in axis] for axis in row] for row in TURNED]:
+        if own == [[[(0, c, -c)[x] for x in axis] for axis in row] for row in TURNED]:
             rows = [[Poly({m: x for m, x in p.terms.items() if m not in alone}) for p in row] for row in rows]
             found += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
     return found + stretch([[most(p, sizes) for p in row] for row in rows])
