@@ -218,7 +218,7 @@ def test_angles_and_norms_are_inputs_too(tmp_path):
 
 
 def test_lost_runs_have_a_time_and_no_metrics(tmp_path):
-    over = {"initial.rate": {"distribution": "shell", "low": 1.0, "high": 12.0}}
+    over = {"initial.rate": {"distribution": "shell", "low": 1.0, "high": "12 rad/s"}}
     found = fly(tmp_path / "c", over=over, law="pd", requirement=[{"metric": "lost", "share": 0.5}])
     frame = found.frame()
     lost = frame["diverged_at"].notna()

@@ -65,7 +65,7 @@ def test_the_plot_shows_norm_components_and_the_limits_that_matter() -> None:
     assert plot.panels[0].levels == pytest.approx((math.degrees(0.2),))
     assert plot.panels[1].levels == pytest.approx((-0.5, 0.5))
     assert plot.panels[0].curves[0][0] == pytest.approx(math.degrees(math.hypot(0.04, 0.03, 0.02)))
-    far = limited(LIMITS.replace("0.2", "20"))[0]
+    far = limited(LIMITS.replace("0.2", "6"))[0]
     assert collect(flights, 2000, far).further[0].panels[0].levels == ()
     assert collect(flights, 2000, limited("[transient]\n")[0]).further[0].panels[1].levels == ()
 
