@@ -17,7 +17,7 @@ test: $(VENV)/.test
 
 # A part of the tests for the time between two changes: under a minute.
 test-fast: $(VENV)/.test
-	$(BIN)/python -m pytest -n 2 --dist loadfile -q tests/algebra tests/analysis tests/loop tests/parts tests/synthesis tests/scenario --ignore tests/parts/test_wheels.py --ignore tests/parts/test_one_file.py --ignore tests/parts/test_parts_against_oracles.py
+	$(BIN)/python -m pytest -n 2 --dist loadfile -q tests/algebra tests/analysis tests/loop tests/parts tests/synthesis tests/scenario --ignore tests/parts/test_wheels.py --ignore tests/parts/test_one_file.py --ignore tests/parts/test_bounds_attacked.py --ignore tests/parts/test_watching_estimators.py --ignore tests/parts/test_parts_against_oracles.py
 
 test-all: check
 	STARHOLD_TESTS=whole $(BIN)/python -m pytest -n 2 --dist loadfile -m ""
