@@ -15,7 +15,7 @@ RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
 SPEED, ANGLE = "|w", "|q"
 """Under which the sizes have those of |w| and |q|."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
-"""What x, y and z are in each place of the matrix of (x, y, z) x: the permutation symbol."""
+"""The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
 Radii = tuple[Fraction, Fraction]
 """Bounds of |w| and |q| of a motion."""

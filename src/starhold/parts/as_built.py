@@ -123,7 +123,7 @@ class Timing(NamedTuple):
 
 
 PLACE = ("attitude", "position")
-"""What sensors of directions see."""
+"""Sensors of directions show these fields of the state."""
 Late: TypeAlias = Timing | tuple[()]
 
 

@@ -25,7 +25,7 @@ TELEMETRY = {
 }
 """The options that name recorded telemetry and its mapping."""
 READABLE = later("studies.telemetry.check")
-"""What refuses telemetry that cannot be read."""
+"""This function refuses telemetry that cannot be read."""
 MOST_PANELS = 6
 """Quantities that a figure shows: those that part first."""
 
