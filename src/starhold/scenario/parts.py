@@ -28,7 +28,6 @@ from starhold.scenario.schema import columns
 from starhold.scenario.starting import check_starts
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
-ONE = "one of each, or an estimator that fuses them all"
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts in [[part]] tables; laws and bodies have tables of their own."""
 SINGLE = {"estimator": "one estimator for the law; others with watches = true", "target": "one target"}
