@@ -8,6 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,6 @@ def write_text(path: Path, text: str) -> None:
 
 def filled(package: str, template: str, values: Mapping[str, Any]) -> str:
     """Return the text of a template of a package with values in place of each @KEY@."""
-    from importlib import resources
 
     text = (resources.files(package) / "templates" / f"{template}.txt").read_text(encoding="utf-8")
     return re.sub(r"@(\w+)@", lambda match: str(values.get(match[1], match[0])), text)

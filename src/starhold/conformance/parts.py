@@ -14,7 +14,7 @@ from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtr
 from starhold.certification.unmodelled import COMMANDED, envelope_of
 from starhold.conformance.bench import PERIOD, sample_loop
 from starhold.conformance.units import SYSTEMS, rescale, rescale_params
-from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, require, run
+from starhold.conformance.verdicts import STEPS, NotApplicableError, Verdict, agree, find, require, run
 from starhold.errors import InputError
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
@@ -26,7 +26,6 @@ from starhold.parts.part import Fitted, Part
 from starhold.parts.random import Dice, Silent
 from starhold.scenario.bodies import bodies
 from starhold.scenario.bodies.any_body import tables_of
-from starhold.scenario.checking import nearest
 from starhold.scenario.parts import ROLES, part_model, read_parts
 from starhold.scenario.tables import shared_values
 from starhold.scenario.writing import part_table
@@ -42,18 +41,12 @@ def examine_part(part: Part) -> Iterator[Verdict]:
 def find_part(given: str) -> Part:
     """The part that is installed under a name, or stands in a file. InputError where there is none."""
     installed = {part.name: part for role in ("body", *ROLES) for part in parts(role).values()}
-    path = Path(given)
-    if given in installed and not path.is_file():
-        return installed[given]
-    try:
+
+    def read(path: Path) -> Part:
         role = role_of(read_module(path))
         return from_file(path, parts(role) if role in ROLES else {}, as_part)
-    except FileNotFoundError:
-        allowed = f"a Python file that holds a part, or a part by name: {nearest(given, list(installed))}"
-        raise InputError(given, "", "no such file", allowed) from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else ""
-        raise InputError(given, "", reason or "", "a Python file that holds a part" if reason else str(error)) from None
+
+    return find(given, installed, read, "part")
 
 
 def loop_with(part: Part, params: Any) -> ClosedLoop:

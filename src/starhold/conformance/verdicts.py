@@ -1,7 +1,8 @@
 """A check's verdict, and the helpers that the checks of parts of all roles share."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from starhold.algebra.structure import flatten
 from starhold.certification.certificate import Certificate
@@ -11,9 +12,11 @@ from starhold.laws.interface import Card, fields
 from starhold.loop.kernels import fly_plainly
 from starhold.parts.catalogue import error_line
 from starhold.parts.part import Part
+from starhold.scenario.checking import nearest
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
+Found = TypeVar("Found")
 STEPS = 40
 """Control steps of a flight that checks fly."""
 
@@ -50,6 +53,23 @@ def run(checks: Iterable[Callable[..., None]], part: Part) -> Iterator[Verdict]:
             yield Verdict(name, "failed", error_line(reason, part.file))
         else:
             yield Verdict(name, "passed", "")
+
+
+def find(given: str, installed: Mapping[str, Found], read: Callable[[Path], Found], what: str) -> Found:
+    """Give what is installed under a name, or what `read` finds in the file of this name; what: its kind in errors.
+
+    InputError where there is none."""
+    path = Path(given)
+    if given in installed and not path.is_file():
+        return installed[given]
+    try:
+        return read(path)
+    except FileNotFoundError:
+        allowed = f"a Python file that holds a {what}, or a {what} by name: {nearest(given, list(installed))}"
+        raise InputError(given, "", "no such file", allowed) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else ""
+        raise InputError(given, "", reason or "", f"a Python file that holds a {what}" if reason else str(error)) from None
 
 
 def require(condition: bool, reason: str) -> None:

@@ -70,7 +70,7 @@ def export_aem(
     object_name: str = "SPACECRAFT",
     object_id: str = "0000-000A",
     frame: str = OF_J2000,
-    version: Version = "2.0",
+    version: Literal["1.0", "2.0"] = "2.0",
 ) -> Path:
     """Write the attitudes of a run as a CCSDS attitude ephemeris message, and return its path.
 

@@ -5,6 +5,11 @@ from __future__ import annotations
 import math
 
 from starhold.algebra.vector import Vector, scale
+from starhold.parts.contract import Parameter
+
+BORESIGHT = Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")
+"""The declaration of a boresight, common to all sensors."""
+THIRD: Vector = (0.0, 0.0, 1.0)
 
 
 def unit_boresight(boresight: Vector) -> Vector:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from starhold.certification.certificate import FILE as CERTIFICATES
-from starhold.certification.certificate import KERNEL
+from starhold.certification.certificate import KERNEL, kernel_bundle
 from starhold.certification.certificate import write as write_certificates
 from starhold.errors import InputError
 from starhold.files import atomic_write, claim, clear_unfinished, write_text
@@ -216,7 +216,6 @@ def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -
 
 
 def _write_kernel(folder: Path) -> None:
-    from starhold.certification.certificate import kernel_bundle
 
     with atomic_write(folder / KERNEL) as hidden:
         hidden.write_bytes(kernel_bundle())

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from rich.markup import escape
 
+from starhold.campaign.again import hashes
 from starhold.certification.assumptions import WITHOUT, texts
 from starhold.certification.wording import (
     HEADINGS,
@@ -24,10 +26,18 @@ from starhold.certification.wording import (
     strongest,
     unclaimed,
 )
+from starhold.report import campaign_tables as tables
+from starhold.report.answer import facts
+from starhold.report.body import report_of
+from starhold.report.campaign_units import Wording, flown_text, headline
 from starhold.report.commands import Cell, Column, Table
+from starhold.report.commands import budget as command
+from starhold.report.commands.verify import NUMBERS, numbers
 from starhold.report.credibility import factors_of
 from starhold.report.document import Figure, Listing, Piece, Section
+from starhold.report.linear_loop import NOTE, Known, margins_table
 from starhold.report.text import lost_text, value_text
+from starhold.studies.body import study_of
 
 if TYPE_CHECKING:
     from starhold.campaign.verify import Review
@@ -92,7 +102,6 @@ def sections_of(review: Review) -> tuple[list[Section], Points]:
 
 def _safe(text: str) -> str:
     """Return text without style marks."""
-    from rich.markup import escape
 
     return escape(text)
 
@@ -123,8 +132,6 @@ def _outcome(review: Review, points: int) -> Iterator[Piece]:
 
 
 def _mission(review: Review) -> Iterator[Piece]:
-    from starhold.campaign.again import hashes
-    from starhold.report.answer import facts
 
     evidence = review.evidence
     scenario, entry, flight = evidence.scenario, evidence.entry, evidence.flight
@@ -168,7 +175,6 @@ def _assumptions(review: Review) -> Iterator[Piece]:
 
 
 def _requirements(review: Review) -> Iterator[Piece]:
-    from starhold.report.commands.verify import NUMBERS, numbers
 
     if not review.verdicts:
         yield Open("Nothing is required: the scenario has no [[requirement]] table.")
@@ -193,7 +199,6 @@ def _requirements(review: Review) -> Iterator[Piece]:
 
 
 def _pointing(review: Review) -> Iterator[Piece]:
-    from starhold.report.body import report_of
 
     evidence = review.evidence
     scenario, flight = evidence.scenario, evidence.flight
@@ -213,7 +218,6 @@ def _pointing(review: Review) -> Iterator[Piece]:
 
 
 def _budget(review: Review) -> Iterator[Piece]:
-    from starhold.report.commands import budget as command
 
     evidence = review.evidence
     if not review.has_budget:
@@ -264,8 +268,6 @@ def _margins(review: Review) -> Iterator[Piece]:
     if isinstance(linear, str):
         yield Open(f"There are no margins: {linear}.")
         return
-    # It needs much of SciPy.
-    from starhold.report.linear_loop import NOTE, Known, margins_table
 
     table = margins_table([Known.of(0, evidence.entry.name, linear)])
     yield table._replace(columns=table.columns[1:], rows=[row[1:] for row in table.rows])
@@ -277,8 +279,6 @@ def _margins(review: Review) -> Iterator[Piece]:
 
 
 def _campaign(review: Review) -> Iterator[Piece]:
-    from starhold.report import campaign_tables as tables
-    from starhold.report.campaign_units import Wording, flown_text, headline
 
     if not review.has_campaign:
         yield Open("No campaign is flown, so nothing is known for other parameters: the scenario has no [campaign] table.")
@@ -305,7 +305,6 @@ def _certificates(review: Review) -> Iterator[Piece]:
     if isinstance(issued, str):
         yield Open(f"Nothing is certified: {issued}.")
         return
-    from starhold.studies.body import study_of
 
     rows: list[list[Any]] = []
     points: list[Open] = []

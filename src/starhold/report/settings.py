@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from pydantic import BaseModel
 
 from starhold.report.tables import listed, titled
 from starhold.report.text import number_text
@@ -22,7 +23,6 @@ MANY = 9
 
 def settings(scenario: Scenario) -> str:
     """Return all tables of a scenario, those of its parts included."""
-    from pydantic import BaseModel
 
     parts: list[str] = []
     written = read_toml(scenario.text, scenario.where)
@@ -53,7 +53,6 @@ def _taken(scenario: Scenario) -> set[str]:
 def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> str:
     """Show one table of the scenario with the descriptions of its schema, and numbers with units as in the file; keys
     without a value are left out, unless parts supply a default."""
-    from pydantic import BaseModel
 
     properties = type(table).model_json_schema()["properties"]
     rows: list[tuple[str, ...]] = []

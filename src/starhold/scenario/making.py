@@ -29,7 +29,7 @@ def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
 
 def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterator[Scenario]:
     """Yield the scenario with each change in turn; errors name the change."""
-    names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
+    names = names_of(scenario)
     tables = read_toml(scenario.text, scenario.where)
     for change in changes:
         # Short enough for one line: only the first of many changes.
@@ -43,6 +43,11 @@ def variants(scenario: Scenario, changes: Iterable[Mapping[str, Any]]) -> Iterat
             yield scenario._of(plain(other, where, ""))  # pyright: ignore[reportPrivateUsage]
         except InputError as error:
             raise InputError(where, error.key, error.given, error.allowed) from None
+
+
+def names_of(scenario: Scenario) -> dict[str, list[str]]:
+    """Return the names of laws and parts, by the arrays of their tables."""
+    return {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
 
 
 def path_of(key: Any, names: Mapping[str, Sequence[str]], where: str) -> list[str | int]:

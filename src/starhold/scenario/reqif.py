@@ -12,6 +12,7 @@ from typing import Any
 
 from starhold.errors import InputError
 from starhold.scenario.checking import show
+from starhold.scenario.requirement import key_of
 
 _TAGS = re.compile(r"<[^>]*>")
 _HOUSE = uuid.UUID("6f0c2b0e-95a7-4a2f-9a44-0f4f3b5b7a11")
@@ -48,8 +49,6 @@ def read(data: bytes, where: str) -> list[dict[str, str]]:
 
 def _rows(content: Any) -> list[tuple[Any, dict[str, str]]]:
     """Return the objects with their rows; see `read`."""
-    from starhold.scenario.requirement_files import key_of
-
     names = {one.identifier: one.long_name or one.identifier for one in _definitions(content)}
     words = {
         value.identifier: value.long_name or value.identifier
@@ -110,8 +109,6 @@ def written(rows: Sequence[Mapping[str, str]], title: str, original: bytes | Non
 
 def keyed(row: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """Return the row by keys of requirements, where columns are such keys."""
-    from starhold.scenario.requirement_files import key_of
-
     return ((key_of(name) or name, text) for name, text in row.items())
 
 
@@ -126,8 +123,6 @@ def _name(*parts: str) -> str:
 
 def _put(content: Any, one: Any, column: str, text: str, where: str) -> None:
     """Set this text of an object in the column; its type gets an attribute for it if it has none."""
-    from starhold.scenario.requirement_files import key_of
-
     kind = next(kind for kind in content.spec_types if kind.identifier == one.spec_object_type)
     named = (d for d in kind.attribute_definitions or () if column in (d.long_name, key_of(d.long_name or "")))
     definition = next(named, None) or _defined(content, kind, column, where)

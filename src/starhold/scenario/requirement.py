@@ -4,6 +4,7 @@ unit of their metric, so they stay as in the file; `studies.requirements` reads 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeAlias, cast
@@ -117,6 +118,25 @@ class RequirementTable(Table):
     def called(self) -> str:
         """Its id, by default the metric's name."""
         return self.id or str(self.metric)
+
+
+KEYS = tuple(name for name in RequirementTable.model_fields if name not in ("attributes", "file"))
+"""The columns of requirements; any other is an attribute."""
+ALIASES = {
+    "identifier": "id",
+    "object_identifier": "id",
+    "reqif.foreignid": "id",
+    "object_text": "text",
+    "reqif.text": "text",
+}
+"""Other tools' names for some of them, in lower case with underscores."""
+
+
+def key_of(column: str) -> str | None:
+    """Return the key of a requirement for a column of this name, or None."""
+    name = re.sub(r"[\s-]+", "_", column.strip().casefold())
+    name = ALIASES.get(name, name)
+    return name if name in KEYS else None
 
 
 def column_of(table: RequirementTable) -> str:

@@ -14,29 +14,12 @@ from starhold.errors import InputError
 from starhold.files import atomic_write
 from starhold.scenario import reqif
 from starhold.scenario.checking import show, validate
-from starhold.scenario.requirement import RequirementTable
+from starhold.scenario.requirement import KEYS, RequirementTable, key_of
 
-KEYS = tuple(name for name in RequirementTable.model_fields if name not in ("attributes", "file"))
-"""The columns of requirements; any other is an attribute."""
-ALIASES = {
-    "identifier": "id",
-    "object_identifier": "id",
-    "reqif.foreignid": "id",
-    "object_text": "text",
-    "reqif.text": "text",
-}
-"""Other tools' names for some of them, in lower case with underscores."""
 NUMBERS = ("at_most", "at_least", "after", "share", "confidence")
 LISTS = ("window", "axis", "direction")
 _COMMA = re.compile(r"(?<=\d),(?=\d)")
 SUFFIXES = (".csv", ".reqif")
-
-
-def key_of(column: str) -> str | None:
-    """Return the key of a requirement for a column of this name, or None."""
-    name = re.sub(r"[\s-]+", "_", column.strip().casefold())
-    name = ALIASES.get(name, name)
-    return name if name in KEYS else None
 
 
 def read_requirement_file(path: Path) -> list[dict[str, Any]]:

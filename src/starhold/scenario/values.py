@@ -18,7 +18,7 @@ from starhold.laws.modes import Modes, mode_laws
 from starhold.laws.monitors import Monitor
 from starhold.parts.part import Fitted
 from starhold.scenario.checking import cut, nearest, read_toml, show
-from starhold.scenario.making import path_of
+from starhold.scenario.making import names_of, path_of
 from starhold.scenario.modes import CONDITIONS, Condition, ModeTable
 from starhold.scenario.parts import part_model
 from starhold.scenario.quantity import declared, plain, reader
@@ -139,10 +139,9 @@ def _filled(place: Place, raw: Any, shape: Sequence[int], name: str) -> Any:
 
 def locate(scenario: Scenario, key: str) -> Place:
     """Return the place of a key. InputError where there is no such key, or where runs of a campaign may not differ in it."""
-    names = {"law": [entry.name for entry in scenario.laws], "part": [fitted.called for fitted in scenario.parts]}
     key_text = f'campaign.over."{cut(key, 200)}"'
     try:
-        path = path_of(key, names, scenario.where)
+        path = path_of(key, names_of(scenario), scenario.where)
         if path[0] in SHARED:
             raise _no("a key that all runs share", "a key of the craft, its surroundings, laws or parts")
         return _locate(scenario, key, tuple(path))

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import linalg, stats
 
+from starhold.scenario.checking import read_toml
 from starhold.scenario.reading import Scenario
 from starhold.studies.fitting import Array, Free
 
@@ -57,7 +58,6 @@ class Posterior(NamedTuple):
 
     def over(self, scenario: Scenario, free: Free, values: Array) -> Scenario:
         """The scenario with a campaign over the numbers that are told, together, but for whole matrices."""
-        from starhold.scenario.checking import read_toml
 
         tables = dict[str, Any](read_toml(scenario.text, scenario.where).get("campaign", {}))
         dropped = {place.key for place in free.places}

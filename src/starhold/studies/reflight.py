@@ -23,8 +23,9 @@ from starhold.loop.kernels import Arguments, Numbers, make_program, numbers_of
 from starhold.loop.programs import one
 from starhold.scenario.building import build
 from starhold.scenario.checking import read_toml
-from starhold.scenario.making import changed, plain, variants
+from starhold.scenario.making import changed, names_of, path_of, plain, variants
 from starhold.scenario.reading import LawEntry, Scenario
+from starhold.scenario.writing import toml_text
 from starhold.simulation.lane import recorded
 from starhold.studies.flat import Flat
 from starhold.studies.questions import Asked, ask
@@ -326,11 +327,7 @@ MARK = "\ue000"
 
 def _pieces(scenario: Scenario, dials: Values) -> Iterator[Piece]:
     """Return the scenario as a file with blanks for the values at the keys of the dials."""
-    from starhold.scenario.making import path_of
-    from starhold.scenario.writing import toml_text
-
     tables = read_toml(scenario.text, scenario.where)
-    names = {"law": [entry.name for entry in scenario.laws], "part": [part.called for part in scenario.parts]}
     last: list[str] = []
     for key in dials:
         changes = _changes(scenario, {key: f"{MARK}{key}{MARK}"})
@@ -339,7 +336,7 @@ def _pieces(scenario: Scenario, dials: Values) -> Iterator[Piece]:
             continue
         for name, value in changes.items():
             here: Any = tables
-            *way, end = path_of(name, names, scenario.where)
+            *way, end = path_of(name, names_of(scenario), scenario.where)
             for part in way:
                 here = here[part] if isinstance(part, int) else here.setdefault(part, {})
             if value is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,6 @@ from starhold.scenario.checking import show
 from starhold.scenario.making import variants
 from starhold.scenario.reading import Scenario, open_scenario
 from starhold.simulation.batched import Flying, fly_batched
-from starhold.simulation.lane import Progress
 from starhold.studies.compare import build, metrics_of, name_samples
 from starhold.studies.frames import frame_of
 
@@ -28,7 +27,7 @@ def sweep(
     changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
     law: str | None = None,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> DataFrame:
     """Fly a scenario with other values and measure each run: a row each, with the changed keys, `law` and the `metrics`.
 

@@ -12,6 +12,7 @@ from starhold.scenario.checking import read_toml
 from starhold.scenario.json_schema import json_schema
 from starhold.scenario.parts import installed
 from starhold.scenario.reading import builtin_names, parse
+from starhold.scenario.writing import law_table, part_table, toml_text
 
 TABLES = (".csv", ".aem", ".reqif")
 """How files of numbers end; others that a scenario names are Python."""
@@ -127,7 +128,6 @@ def _meaning(item: Any) -> dict[str, Any]:
 def choices() -> dict[str, Any]:
     """The laws and parts to pick from, each with a line about it and a table to put into a file, and the built-in
     scenarios."""
-    from starhold.scenario.writing import law_table, part_table, toml_text
 
     laws = [
         {"name": name, "text": law.card.summary, "table": law_table(law, law.examples()[0])}

@@ -10,7 +10,7 @@ from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar, both, less, maximum, opposite, sqrt, where
 from starhold.algebra.vector import ZERO, Vector, add, dot, norm, scale, unit
 from starhold.parts import as_built
-from starhold.parts.boresight import field_cosine, unit_boresight
+from starhold.parts.boresight import BORESIGHT, THIRD, field_cosine, unit_boresight
 from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.orbit import BODIES
 from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
@@ -38,11 +38,7 @@ class Params(NamedTuple):
     """The errors of the sensor, and where it looks."""
 
     noise: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis")] = 0.0
-    boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")] = (
-        0.0,
-        0.0,
-        1.0,
-    )
+    boresight: Annotated[Vector, BORESIGHT] = THIRD
     half_angle: Annotated[
         float, Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view; half a turn scans all around")
     ] = math.pi

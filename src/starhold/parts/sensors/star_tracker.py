@@ -11,7 +11,7 @@ from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, wh
 from starhold.algebra.structured import when
 from starhold.algebra.vector import ZERO, Vector, add, along_axis, dot, scale, subtract
 from starhold.parts import as_built, blinding
-from starhold.parts.boresight import unit_boresight
+from starhold.parts.boresight import BORESIGHT, THIRD, unit_boresight
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.ephemeris import EPHEMERIS
@@ -40,11 +40,7 @@ class Params(NamedTuple):
 
     cross: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis across the boresight")]
     roll: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about the boresight")]
-    boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")] = (
-        0.0,
-        0.0,
-        1.0,
-    )
+    boresight: Annotated[Vector, BORESIGHT] = THIRD
     interval: Annotated[float, Parameter("s", at_least=0.0, text="between updates; each control step if 0")] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER

@@ -11,7 +11,7 @@ from starhold.algebra.scalar import Scalar, both, less, less_equal, opposite, wh
 from starhold.algebra.vector import ZERO, Vector, add, dot, unit
 from starhold.algebra.words import number_of
 from starhold.parts import as_built, sun
-from starhold.parts.boresight import field_cosine, unit_boresight
+from starhold.parts.boresight import BORESIGHT, THIRD, field_cosine, unit_boresight
 from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
@@ -39,11 +39,7 @@ class Params(NamedTuple):
     """The errors of the sensor, its boresight, and the epoch."""
 
     noise: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis")] = 0.0
-    boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")] = (
-        0.0,
-        0.0,
-        1.0,
-    )
+    boresight: Annotated[Vector, BORESIGHT] = THIRD
     half_angle: Annotated[
         float,
         Parameter("rad", above=0.0, at_most=math.pi, text="of the field of view, from the boresight; half a turn sees all"),
