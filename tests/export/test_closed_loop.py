@@ -62,7 +62,8 @@ def _nothing(measurement: Any, gains: Any, craft: Any, memory: Any) -> Any:
 
 
 LOOPS = ["sliding", "wheel", "l2", "estimator", "mpc", "hysteresis, axis", "target from a table", "pid, example 0, noise",
-         "lyapunov", "modal", "pd", "estimator on [sensor]", "orbital target", "lqr, example 1, noise"]  # fmt: skip
+         "lyapunov", "modal", "pd", "estimator on [sensor]", "orbital target", "lqr, example 1, noise",
+         "a law that reads validity"]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", leading(LOOPS, 4))

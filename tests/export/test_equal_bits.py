@@ -29,6 +29,7 @@ MADE = [
     "hysteresis, axis",
     "orbital target",
     "every function, the time",
+    "a law that reads validity",
     "pid, example 0, noise",
     "super-twisting, example 0, noise",
     "modes that watch",

@@ -9,7 +9,7 @@ import numpy as np
 
 from starhold.algebra.polynomial import Polynomial, UnreadableError, constants, reciprocal
 from starhold.algebra.vector import dot
-from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, WHEELS
+from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, VALID_ESTIMATE, WHEELS
 from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, Claim, Obligation
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.isotropic import ISOTROPIC
@@ -19,7 +19,7 @@ from starhold.certification.subject import Subject, above, described, direction,
 from starhold.certification.unmodelled import named
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import CLOCK
+from starhold.parts.contract import CLOCK, IS_VALID
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
 
@@ -176,6 +176,8 @@ def undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str)
         assumptions = [*HELD_AND_PUSHED]
     if kind == "inertia":
         assumptions[1] = "inertia-near"
+    if IS_VALID in subject.loop.law.reads:
+        assumptions.append(VALID_ESTIMATE)
     return Claim(kind, numbers, {}, tuple(assumptions), (Obligation("form", EXACT, "undecided", {"reason": reason}),))
 
 

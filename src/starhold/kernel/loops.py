@@ -30,6 +30,8 @@ SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
 """How the sign of the quaternion that is fed back is chosen: otherwise it never changes."""
 HANDED = "handed over"
 """The loop takes over from another one in any of the states that the claim says its set holds."""
+IS_VALID = "measurement.is_valid"
+"""This input tells a program whether the estimate that it is given is valid, as it is in every loop here."""
 NONE = [Poly({})] * 3
 Matrix: TypeAlias = Sequence[Sequence[Poly | Fraction]]
 Wired: TypeAlias = Mapping[str, Poly]
@@ -108,6 +110,8 @@ class AttitudeLoop(Loop):
             "wheel_momentum": self.stored, "magnetic_field": variables("b"),
         }  # fmt: skip
         self.told = {name: p for field, value in fields.items() for name, p in wired(f"measurement.{field}", value).items()}
+        # A statement about programs that read it says so.
+        self.told[IS_VALID] = poly(1)
         self.sphere = dot(self.q, self.q) - 1
         self.still: dict[str, int] = dict.fromkeys(self.driven, 0)
         self.on_target, self.opposite = ({"q0": q0, "q1": 0, "q2": 0, "q3": 0} for q0 in (1, -1))

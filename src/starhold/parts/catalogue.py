@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 from starhold.errors import is_interrupt
 from starhold.files import read_bytes
 from starhold.parts import roles
-from starhold.parts.contract import CLOCK, Card
+from starhold.parts.contract import GIVEN, Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import ROLES
 
@@ -96,7 +96,7 @@ def telling(readings: Iterable[str]) -> list[Fitted]:
     """Installed sensors that give these readings, one for each or for several, with parameters of their examples.
     LookupError where there is none."""
     chosen: dict[str, Fitted] = {}
-    for reading in (one for one in readings if one != CLOCK):
+    for reading in (one for one in readings if one not in GIVEN):
         sensors = (one for one in parts("sensor").values() if not one.table and reading in one.module.Reading._fields)
         sensor = next(sensors, None)
         if sensor is None:

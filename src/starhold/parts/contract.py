@@ -21,6 +21,13 @@ from starhold.parts.craft import compact
 CLOCK = "time"
 """The reading that every loop gives to a law that declares it: seconds since the start. No sensor is needed for it."""
 
+IS_VALID = "is_valid"
+"""Whether an estimate can be relied on, which all estimators tell; a law that declares it as a reading gets that of its
+estimate, and 1 where there is no estimator."""
+
+GIVEN = (CLOCK, IS_VALID)
+"""Readings that no sensor has to give."""
+
 
 FIX = "fix"
 """The reading that an estimator gets which another one starts: the other's estimate, to be used once it is valid."""

@@ -17,7 +17,7 @@ from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_be_inactive, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, error_line, from_file, parts, read_module, role_of
-from starhold.parts.contract import CLOCK
+from starhold.parts.contract import GIVEN, IS_VALID
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -28,7 +28,6 @@ from starhold.scenario.schema import columns
 from starhold.scenario.starting import check_starts
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
-ONE = "one of each, or an estimator that fuses them all"
 ROLES = tuple(role for role in PACKAGES if role != "body")
 """Roles of parts in [[part]] tables; laws and bodies have tables of their own."""
 SINGLE = {"estimator": "one estimator for the law; others with watches = true", "target": "one target"}
@@ -169,7 +168,7 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
             raise InputError(where, _key(one), given, f"an orbit about {about}, the body of its model")
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
-            if need not in {*readings, CLOCK}:
+            if need not in {*readings, *GIVEN}:
                 raise InputError(where, key, f"no {need}, which {one.name} needs", _measuring(need))
     _check_estimates(loop, where)
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
@@ -186,11 +185,12 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
 def _check_estimates(loop: ClosedLoop, where: str) -> None:
     """InputError where a law needs what no estimator gives, or another body than the one that is orbited."""
     there = [name for fitted in loop.used("estimator") for name in fitted.part.module.Estimate._fields]
-    for name in getattr(loop.law.module, "ESTIMATES", ()):
+    says = [IS_VALID] if loop.used("estimator") and IS_VALID in loop.law.reads else []
+    for name in (*getattr(loop.law.module, "ESTIMATES", ()), *says):
         if name not in there:
             giving = [one for one, part in parts("estimator").items() if name in part.module.Estimate._fields]
             allowed = f"an estimator that gives {name}, such as {' or '.join(giving)}"
-            raise InputError(where, f"law {loop.law.name}", f"no {name}, which a condition or a monitor needs", allowed)
+            raise InputError(where, f"law {loop.law.name}", f"no {name}, which it needs", allowed)
     about = loop.law.about
     if about and (not loop.has("two-body") or body_of(loop.craft.gravity) != about):
         given = f"no orbit about {about}, which conditions on the Sun or a station need"
