@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -125,7 +125,8 @@ class Job:
             histogram = histogram + bins
             extremes.append((least, most))
 
-        measured = self.measure(law, columns, runs, pool, take, self._telling(law))
+        progress = None if self.progress is None else by_lots(partial(self.progress, law))
+        measured = self.measure(law, columns, runs, pool, take, progress)
 
         def finish() -> Chunk:
             rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **measured()}
@@ -140,21 +141,6 @@ class Job:
             return Chunk(law, first, rows, {name: histogram}, {f"{name}{LEAST}": merged[0], f"{name}{MOST}": merged[1]})
 
         return finish
-
-    def _telling(self, law: str) -> Progress | None:
-        """Return the function that reports how many runs of a block are flown, lot by lot."""
-        if self.progress is None:
-            return None
-        tell, reported, whole = self.progress, [0], [0]
-
-        def progress(done: int, lanes: int) -> None:
-            now = whole[0] + done
-            tell(law, now - reported[0])
-            reported[0] = now
-            if done == lanes:
-                whole[0] += lanes
-
-        return progress
 
     def measure(
         self,
@@ -209,6 +195,21 @@ class Job:
             return meter.metrics(flown.notes, flown.windows, lost), flown.windows
 
         return finish
+
+
+def by_lots(tell: Callable[[int], None]) -> Progress:
+    """Return the function that reports how many more runs are flown, lot by lot, to one that is called with this number."""
+    reported, whole = 0, 0
+
+    def progress(done: int, lanes: int) -> None:
+        nonlocal reported, whole
+        now = whole + done
+        tell(now - reported)
+        reported = now
+        if done == lanes:
+            whole += lanes
+
+    return progress
 
 
 def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scenario:
