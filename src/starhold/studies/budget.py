@@ -212,10 +212,12 @@ def faultless(scenario: Scenario) -> Scenario:
 
 
 def without(scenario: Scenario, entry: LawEntry, away: Sequence[Source]) -> ClosedLoop:
-    """Return the loop of a law without some sources."""
+    """Return the loop of a law without some sources; estimators go on to assume that they are there."""
     changes = {key: value for source in away for key, value in source.without.items()}
     gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
-    return build(scenario.with_(changes), _without_effectors(entry, gone))
+    changed, assuming = scenario.with_(changes), {f.called: f for f in scenario.parts if f.part.role == "estimator"}
+    parts = tuple(assuming.get(fitted.called, fitted) for fitted in changed.parts)
+    return build(replace(changed, parts=parts), _without_effectors(entry, gone))
 
 
 def check_budget(scenario: Scenario) -> tuple[Requirement, ...]:
