@@ -196,7 +196,8 @@ def study(
     still, rows = flown[0], list[Contribution]()
     for name, errors in zip(names, flown, strict=True):
         kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
-        moved = errors if kind != "source" else tuple(_less(a, b) for a, b in zip(errors, still, strict=True))
+        less = (0.0, 0.0) if kind != "source" else still
+        moved = (None if a is None or b is None else a - b for a, b in zip(errors, less, strict=True))
         rows.append(Contribution(name, kind, _figures(clock, *moved)))
     combined = {
         index: {axis: root_sum_square([row.figures[index][axis] for row in rows[:-1]]) for axis in axes}
@@ -379,10 +380,6 @@ def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock,
         raise InputError(scenario.where, f"law.{entry.name}", reason, "a law that holds the attitude")
     errors = noted.reshape(-1, len(instants), size)[:runs]
     return errors[..., :3], errors[..., 3:] if knows else None
-
-
-def _less(errors: Array | None, still: Array | None) -> Array | None:
-    return None if errors is None or still is None else errors - still
 
 
 def _figures(clock: _Clock, errors: Array | None, knowledge: Array | None) -> dict[str, dict[str, Figures]]:
