@@ -83,7 +83,7 @@ COMPOSED = {
     "two numbers of three": (part('type = "gyro"\nbias = [0, 1]\n'), "part[1].bias", "3 numbers"),
     "a name twice": (GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n'), "part[2].name", "a name that"),
     "too late a tracker": (
-        part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 100\n'),
+        part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 50\n'),
         "part star-tracker",
         "the delay must be at most 64 control periods",
     ),

@@ -38,21 +38,33 @@ SEEN = ("attitude",)
 class Params(NamedTuple):
     """The errors of the star tracker."""
 
-    cross: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis across the boresight")]
-    roll: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about the boresight")]
+    cross: Annotated[
+        float,
+        Parameter(
+            "rad", at_least=0.0, plain=(0.1, "arcsec"), text="standard deviation about each axis across the boresight"
+        ),
+    ]
+    roll: Annotated[
+        float, Parameter("rad", at_least=0.0, plain=(0.1, "arcsec"), text="standard deviation about the boresight")
+    ]
     boresight: Annotated[Vector, Parameter("1", shape=(3,), spread=False, text="where it looks, body axes")] = (
         0.0,
         0.0,
         1.0,
     )
-    interval: Annotated[float, Parameter("s", at_least=0.0, text="between updates; each control step if 0")] = 0.0
+    interval: Annotated[
+        float, Parameter("s", at_least=0.0, plain=(300.0, "ms"), text="between updates; each control step if 0")
+    ] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER
     sun_cone: Annotated[float, blinding.SUN] = 0.0
     moon_cone: Annotated[float, blinding.MOON] = 0.0
     limb_cones: Annotated[tuple[float, float], blinding.LIMB] = blinding.NONE
     rate_limit: Annotated[
-        float, Parameter("rad/s", above=0.0, text="above which stars smear and there is no reading; none if absent")
+        float,
+        Parameter(
+            "rad/s", above=0.0, plain=(0.5, "deg/s"), text="above which stars smear and there is no reading; none if absent"
+        ),
     ] = math.inf
     epoch: Annotated[Date, EPOCH] = START
     jitter: Annotated[float, as_built.JITTER] = 0.0
