@@ -21,7 +21,7 @@ from starhold.kernel.theorems.noise import BESIDE
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS
 from starhold.parts.effectors.wheel_motion import at_top_speed
-from starhold.parts.effectors.wheels import BAND
+from starhold.parts.effectors.wheels import BAND, gives_allocated_torque
 
 
 def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = None) -> list[str]:
@@ -63,8 +63,11 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
     if claim["theorem"] == POINTS:
         envelope = known.envelope(BESIDE in told)._replace(momentum=above(exact(told.get("momentum", 0))))
-        least |= {name: exact(x) for name, x in pushes(loop, envelope).numbers.items()}
-        least["outside"] += 0 if OUTSIDE in claim["taken"] else known.modelled_norm
+        pushed = pushes(loop, envelope).numbers
+        yield from (f"{name} has no bound" for name, x in pushed.items() if not isfinite(x))
+        least |= {name: exact(x) for name, x in pushed.items() if isfinite(x)}
+        if "outside" in least and OUTSIDE not in claim["taken"]:
+            least["outside"] += known.modelled_norm
         # What is not stated is zero.
         told = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | told
     wheeled = any(name.startswith(("motors", "stored")) for name in told)
@@ -119,3 +122,5 @@ def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
         yield "the sign of the quaternion is chosen in another way"
     if theorem != SAMPLED and (WHEELS in taken) != (own.loop.wheels is not None):
         yield "only one of the two has wheels"
+    if WHEELS in taken and own.loop.wheels is not None and not gives_allocated_torque(own.loop.wheels):
+        yield "its wheels do not give the torque that is allocated to them"
