@@ -49,7 +49,7 @@ BEST = Wanted()
 TIMED = "the law reads the time, of which no claim speaks"
 REMEMBERS = "the law keeps a memory from call to call"
 LOST = "the allocation relies on a lost wheel"
-APART_MOUNTED = "the allocation takes wheels to be mounted otherwise than they are"
+ASKEW = "the allocation takes wheels to be mounted otherwise than they are"
 APART = "inertia, gains and period are too far apart in size"
 ASSUMPTIONS = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
 """Assumptions of all claims without a proof."""
@@ -91,10 +91,11 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
     loop, claims = subject.loop, list[Claim]()
     if CLOCK in loop.law.reads:
         return [undecided("convergence", EVERYWHERE, subject, TIMED)], TIMED
-    sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
+    wheels = loop.wheels
+    unsound = "" if wheels is None or gives_allocated_torque(wheels) else ASKEW if wheels.known_axes else LOST
     if loop.remembers and loop.law.lyapunov is not None:
         claims.append(undecided("convergence", EVERYWHERE, subject, REMEMBERS))
-    unflown = REMEMBERS if loop.remembers else "" if sound else APART_MOUNTED if loop.wheels.known_axes else LOST
+    unflown = REMEMBERS if loop.remembers else unsound
     if not unflown and wanted.alone:
         claim, reason = pointed(subject, wanted.like)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
