@@ -104,7 +104,7 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
     together, and where the target depends on the law's mode.
     """
     estimators = loop.used("estimator")
-    wanted = {name for f in estimators for name in f.part.needs} or {"attitude", "rate"}
+    wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
     told = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
     if not sensors or not told or loop.target.part.flag("BY_MODE"):
@@ -272,5 +272,5 @@ def _is_idle(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
     """Return whether all readers of a sensor are parts whose torque is bounded for any reading."""
     if fitted.part.role != "sensor" or _shown(fitted) & {*loop.start._fields, *loop.law.reads}:
         return False
-    readers = [f for f in loop.parts if _shown(fitted) & {*f.part.reads, *f.part.needs}]
+    readers = [f for f in loop.parts if _shown(fitted) & {*f.part.reads, *f.needs}]
     return all(f.part.role == "effector" and _pushes(f, envelope)[0] is not None for f in readers)
