@@ -25,7 +25,8 @@ from starhold.scenario.assumed import with_assumed
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.csv_files import csv_lines, number_in
 from starhold.scenario.schema import columns
-from starhold.scenario.sensing import check_sensors, check_starts
+from starhold.scenario.sensing import check_sensors
+from starhold.scenario.starting import check_starts
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
 ROLES = tuple(role for role in PACKAGES if role != "body")
