@@ -165,6 +165,21 @@ def test_errors_are_as_large_as_the_filter_says():
     assert ((low < totals) & (totals < high)).all(), totals / 240.0
 
 
+def test_directions_correct_no_attitude_that_was_made_of_them():
+    """The step at which another estimator starts the filter leaves its attitude and the stated deviation as they are."""
+    truth, shown = flight(3, seed=5)
+    begun = tuple((truth[0][0] * Rotation.from_rotvec([0.01, 0.0, -0.01])).as_quat(scalar_first=True))
+    for readings in shown:
+        readings.fix = SimpleNamespace(attitude=begun, is_valid=1.0)
+    alone = PARAMS._replace(cross=math.inf, roll=math.inf, start_deviation=0.02)
+    (first, _), _, (third, _) = filtered(shown, alone)
+    assert first.attitude == pytest.approx(begun, abs=1e-15)
+    assert first.attitude_deviation == pytest.approx((0.02,) * 3)
+    assert first.is_valid == third.is_valid == 1.0
+    assert (truth[2][0].inv() * turn_of(third.attitude)).magnitude() < 0.01
+    assert max(third.attitude_deviation) < 0.01
+
+
 OBSERVER = {"altitude": "520 km", "inclination": "97.5 deg", "raan": "25 deg", "epoch": "2027-03-20T09:00:00Z"}
 SENSORS = (
     GYRO | {"bias": [3e-4, -2e-4, 1e-4]},
