@@ -33,7 +33,7 @@ from tests.missions import DETUMBLE, POINT
 from tests.tiers import fewer
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
-ROTOR = "[[wheel]]\naxis = {}\ninertia = 1e-5\ntorque_limit = 1.0\nmomentum_limit = 5.0\nmomentum = {}\n"
+ROTOR = "[[wheel]]\naxis = {}\ninertia = 5e-5\ntorque_limit = 1.0\nmomentum_limit = 0.5\nmomentum = {}\n"
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
 
 

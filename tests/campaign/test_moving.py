@@ -103,7 +103,9 @@ def test_scenarios_and_equations_made_do_not_grow_with_the_runs(monkeypatch):
     made = []
     for module, name in ((lane_making, "build"), (moving, "Compiled")):
         plainly = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *given, name=name, plainly=plainly: (made.append(name), plainly(*given))[1])
+        monkeypatch.setattr(
+            module, name, lambda *given, name=name, plainly=plainly, **more: (made.append(name), plainly(*given, **more))[1]
+        )
     plan, lanes = lanes_of(*CASES["all"])
     assert made.count("Compiled") == 1
     begun = made.count("build")

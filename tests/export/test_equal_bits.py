@@ -33,6 +33,7 @@ MADE = [
     "pid, example 0, noise",
     "super-twisting, example 0, noise",
     "modes that watch",
+    "directions",
 ]
 """Loops with a memory, or with an input of their own."""
 

@@ -227,6 +227,14 @@ BROKEN = {
                              'FIRST = {"spin": 0.0}'),
     "an equation ends the program": ("sensor", "    return Reading(", "    raise SystemExit\n    return Reading(",
                              "mine.py, line 27: SystemExit"),
+    "needs that fail": ("estimator", "def remember", "def needs(params):\n    return params.sahre\n\n\ndef remember",
+                        "part mine: mine.py, line 27: AttributeError"),
+    "needs by its numbers": ("estimator", "def remember", "def needs(params):\n    return ('sun',)\n\n\ndef remember",
+                             "no sun, which mine needs; allowed: a sensor that measures sun, such as"),
+    "needs of more": ("estimator", "def remember", "def needs(params, period):\n    return ()\n\n\ndef remember",
+                      "needs(params, period) must be needs(params)"),
+    "about another body": ("environment", "def torque", "def about(params):\n    return 'Mars'\n\n\ndef torque",
+                           "found an orbit about Earth; allowed: an orbit about Mars"),
     "its start fails": ("effector", "State(0.0, 0.0)", "State(0.0, nought)", "mine.py, line 36: NameError"),
 }  # fmt: skip
 

@@ -109,7 +109,7 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
     assert declaring == {
         "residual-dipole", "solar-pressure", "magnetometer", "sun-sensor", "triad", "magnetic-unloading", "magnetorquers",
         "ground-station", "sun", "yaw-steering", "star-tracker", "coarse-sun-sensors", "quest", "slew",
-        "magnetometer-filter",
+        "magnetometer-filter", "mekf",
         "ground-strip",
     }  # fmt: skip
     assert declaring - {
@@ -120,6 +120,7 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
         "quest",
         "slew",
         "magnetometer-filter",
+        "mekf",
         "ground-strip",
     } == set(epochs(scenario()))
 

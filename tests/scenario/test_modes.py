@@ -32,6 +32,8 @@ def goal(params, state, step, before):
 def examples():
     return [Params()]
 """
+STATION = '{ type = "ground-station", latitude = "60 deg", longitude = "20 deg" }'
+SLEW = '\nslew = { rate = "1 deg/s", acceleration = "0.02 deg/s^2" }'
 TEXT = BASE + DETUMBLE + POINT + 'back = { rate_above = "5 deg/s" }\n'
 
 
@@ -83,6 +85,8 @@ def test_a_mode_that_nothing_leads_to_is_refused():
         ('{ type = "constant-torque", torque = [0, 0, 0] }', "of the role environment; allowed: a target"),
         ('{ mood = "inertial" }', "mode[2].target.mood: found an unknown key"),
         ('"nadir"', 'mode[2].target: found "nadir"; allowed: a table'),
+        (STATION, "no two-body, which targets-of-modes needs"),
+        (STATION + SLEW, "no two-body, which targets-of-modes needs"),
     ],
 )
 def test_a_target_that_a_mode_cannot_have_is_told_in_one_line(given, told):

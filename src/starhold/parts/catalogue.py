@@ -55,6 +55,8 @@ BOUNDS: dict[str, tuple[str, ...]] = {
     "recursion": ("params", "noise", "period", "rate"),
 }
 """Functions of a part of any role that bound what it does, and their arguments."""
+BY_NUMBERS: dict[str, tuple[str, ...]] = {"needs": ("params",), "about": ("params",)}
+"""Functions of a part of any role in place of `NEEDS` and `ABOUT`, where these depend on its parameters."""
 
 AnyPart = TypeVar("AnyPart", bound=Part)
 
@@ -171,7 +173,7 @@ def as_part(module: ModuleType, path: Path | None = None) -> Part:
 def _check_equations(part: Part) -> None:
     """ValueError for an equation, or a bound, that does not take the arguments of its role."""
     acts = part.role in ("actuator", "effector")
-    wanted = BOUNDS | {"error": ("params", "envelope") if acts else ("params",)}
+    wanted = BOUNDS | BY_NUMBERS | {"error": ("params", "envelope") if acts else ("params",)}
     protocol: Any = getattr(roles, part.role.capitalize())
     declarations: dict[str, Any] = {**vars(protocol)}
     for name, declared in declarations.items():

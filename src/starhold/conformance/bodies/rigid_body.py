@@ -44,14 +44,15 @@ def loop_with(part: Part, params: Any) -> ClosedLoop:
     loop = sample_loop(law, law.examples()[0])
     if part.role == "target":
         loop = loop.without("target")
-    needs = () if part.role == "estimator" else part.needs
+    fitted = Fitted(part, params)
+    needs = () if part.role == "estimator" else fitted.needs
     others = [one for role in PACKAGES for one in parts(role).values() if one.name in needs and not loop.has(one.name)]
     loop = loop.with_parts(*(Fitted(one, one.examples()[0]) for one in others))
     try:
-        loop = loop.with_parts(*telling(part.needs if part.role == "estimator" else part.reads))
+        loop = loop.with_parts(*telling(fitted.needs if part.role == "estimator" else part.reads))
     except LookupError as error:
         raise NotApplicableError(str(error)) from None
-    return loop.with_parts(Fitted(part, params))
+    return loop.with_parts(fitted)
 
 
 def is_pure(law: Law) -> None:

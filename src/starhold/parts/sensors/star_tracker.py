@@ -16,7 +16,7 @@ from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, P
 from starhold.parts.craft import Craft
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out, steps_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -52,9 +52,7 @@ class Params(NamedTuple):
         0.0,
         1.0,
     )
-    interval: Annotated[
-        float, Parameter("s", at_least=0.0, plain=(300.0, "ms"), text="between updates; each control step if 0")
-    ] = 0.0
+    interval: Annotated[float, INTERVAL] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER
     sun_cone: Annotated[float, blinding.SUN] = 0.0
@@ -82,7 +80,7 @@ class Numbers(NamedTuple):
     boresight: Vector
     every: Scalar
     late: as_built.Late
-    outage: Window
+    outage: Silence
     cones: blinding.Cones | tuple[()] = ()
     square: tuple[Scalar, ...] = ()
     mounted: as_built.Turn = ()
@@ -114,7 +112,7 @@ def prepare(params: Params, period: float) -> Numbers:
         params.cross,
         params.roll,
         boresight,
-        float(max(1, round(params.interval / period))),
+        steps_of(params.interval, period),
         as_built.late_by(params.delay, period),
         in_steps(params.outage, period),
         blinding.prepared(
