@@ -67,9 +67,9 @@ class Moving:
         """The arguments of the equation: the flying craft, the nominal model, the parameters of parts, and what those parts
         prepare that no equation follows."""
         hooks, every = self.scenario.hooks, self.by_key(columns)
-        true, told = hooks.drawn(self.scenario, every), self.by_key(columns, known=True)
-        alike = self.scenario.known is self.scenario and len(told) == len(every)
-        supposed = true if alike else hooks.drawn(self.scenario.known, told)
+        true, known = hooks.drawn(self.scenario, every), self.by_key(columns, known=True)
+        alike = self.scenario.known is self.scenario and len(known) == len(every)
+        supposed = true if alike else hooks.drawn(self.scenario.known, known)
         parts, ready = dict[str, Any](), dict[str, Any]()
         for key, path in self._paths.items():
             if path[0] == "part":
