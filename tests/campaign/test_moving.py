@@ -26,6 +26,7 @@ PARTS = {
         {"type": "mekf", "noise": 1e-5, "bias": 1e-4, "bias_walk": 1e-6, "cross": 1e-5, "roll": 1e-4},
     ],
 }
+ASSUMING = PARTS | {"part": [*PARTS["part"][:2], {"type": "mekf", "noise": 1e-5, "bias": 1e-4, "bias_walk": 1e-6}]}
 MAGNET = {
     "orbit": {"altitude": "500 km", "inclination": "50 deg", "eccentricity": 0.0},
     "part": [{"type": "residual-dipole", "dipole": [0.01, 0.02, 0.03]}],
@@ -66,6 +67,11 @@ CASES = {
         {"orbit.position": normal(1e4), "orbit.velocity[3]": normal(50.0), "initial.rate": normal(0.01)},
     ),
     "filter": (LYAPUNOV, PARTS, {"part.mekf.noise": SHARE, "part.mekf.cross": SHARE, "part.star-tracker.roll": SHARE}),
+    "a tracker's noise that the filter assumes": (
+        LYAPUNOV,
+        ASSUMING,
+        {"part.star-tracker.cross": TOLD, "part.star-tracker.mounting_error": normal(0.01), "part.gyro.bias": normal(1e-3)},
+    ),
     "riccati, told": (LQR, {}, {"spacecraft.inertia": TOLD}),
     "weights": (LQR, {}, {"law.lqr.q": SHARE}),
     "weights about axes": (LQR | {"form": "III"}, {}, {"law.lqr.r": SHARE, "spacecraft.inertia": TOLD}),

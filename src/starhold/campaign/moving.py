@@ -14,6 +14,8 @@ from starhold.algebra.structure import leaves, mapped, put, rebuild
 from starhold.campaign.dispersions import Dispersion
 from starhold.loop.kernels import numbers_of
 from starhold.parts.part import Fitted
+from starhold.scenario.assumed import with_assumed
+from starhold.scenario.checking import read_toml
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.studies.flat import Flat, named
 from starhold.trace.calling import Compiled, record_call
@@ -75,6 +77,10 @@ class Moving:
             if path[0] == "part":
                 fitted = self.scenario.parts[path[1]]
                 parts[fitted.called] = put(parts.get(fitted.called, fitted.params), path[2:], _rows(every[key]))
+        if parts:
+            fitted = [replace(one, params=parts.get(one.called, one.params)) for one in self.scenario.parts]
+            tables = read_toml(self.scenario.text, self.scenario.where)["part"]
+            parts = {one.called: one.params for one in with_assumed(fitted, tables) if _differ(one.params)}
         for one in self.base.loop.parts:
             if one.name in parts and self._is_apart(replace(one, params=parts[one.name])):
                 lanes = _each(parts[one.name], len(next(iter(columns.values()))))
@@ -145,6 +151,11 @@ class Moving:
             for gains, (craft, _) in zip(every, cases, strict=True):
                 law.check(gains, craft)
         return dict(named(_joined(every), "gains"))
+
+
+def _differ(value: Any) -> bool:
+    """Return whether lanes differ in a number of a structure."""
+    return any(isinstance(leaf, np.ndarray) for leaf in leaves(value))
 
 
 def _each(value: Any, lanes: int) -> Iterable[Any]:
