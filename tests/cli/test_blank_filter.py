@@ -5,6 +5,7 @@ from typer.testing import CliRunner
 
 from starhold.cli.main import app
 from starhold.scenario.reading import builtin_text
+from tests.texts import toml
 
 BLANK = """
 from typing import Annotated, NamedTuple
@@ -40,21 +41,11 @@ def examples():
     return [Params()]
 """
 PARTS = '[sensor]\nrate_noise = 1e-6\n[[part]]\nfile = "blank.py"\n'
-MODES = """
-[[law]]
-name = "mission"
-type = "modes"
-[[law.mode]]
-name = "detumble"
-type = "b-dot"
-k = 1e-3
-until = { rate_below = "0.5 deg/s" }
-[[law.mode]]
-name = "point"
-type = "pd"
-k_rate = 0.006
-k_attitude = 0.0008
-"""
+MODES = toml("""
+[[law]] name = "mission"; type = "modes"
+[[law.mode]] name = "detumble"; type = "b-dot"; k = 1e-3; until = { rate_below = "0.5 deg/s" }
+[[law.mode]] name = "point"; type = "pd"; k_rate = 0.006; k_attitude = 0.0008
+""")
 
 
 @pytest.mark.slow

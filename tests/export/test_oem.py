@@ -12,24 +12,15 @@ from starhold.parts.craft import EARTH
 from starhold.parts.epoch import days_of
 from starhold.scenario.element_sets import READERS
 from tests.running import starhold
+from tests.texts import toml
 
-TEXT = """
+TEXT = toml("""
 name = "own"
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-[orbit]
-altitude = "500 km"
-inclination = "97 deg"
-epoch = "2027-03-20T12:00:00Z"
-[simulation]
-duration = 1200.0
-control_period = 5
-record_every = 12
-[[law]]
-type = "pd"
-k_rate = 0.1
-k_attitude = 0.01
-"""
+[spacecraft] inertia = [2.0, 3.0, 4.0]
+[orbit] altitude = "500 km"; inclination = "97 deg"; epoch = "2027-03-20T12:00:00Z"
+[simulation] duration = 1200.0; control_period = 5; record_every = 12
+[[law]] type = "pd"; k_rate = 0.1; k_attitude = 0.01
+""")
 ORBIT = """altitude = "500 km"
 inclination = "97 deg"
 epoch = "2027-03-20T12:00:00Z"

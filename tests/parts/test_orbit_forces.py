@@ -19,6 +19,7 @@ from starhold.parts.epoch import days_of
 from starhold.parts.plates import BOX
 from starhold.parts.sun import EARTH, PRESSURE
 from tests.making import flown, hub
+from tests.texts import toml
 
 MASS, TURN = 12.0, (0.6, 0.0, 0.8, 0.0)
 BODY = Rotation.from_quat(TURN, scalar_first=True)
@@ -160,28 +161,15 @@ def test_thrusters_push_by_their_impulse():
     assert run["propellant"][-1] == pytest.approx(MASS * -math.expm1(-total / exhaust), rel=total / exhaust)
 
 
-TEXT = """
+TEXT = toml("""
 name = "decay"
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-mass = "12 kg"
-[orbit]
-altitude = "320 km"
-inclination = "51 deg"
-[simulation]
-duration = 10.0
-control_period = 0.5
-[[part]]
-type = "drag"
-plates = [[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
-moves_orbit = "yes"
-table = "air.csv"
-flux = 100
-[[law]]
-type = "pd"
-k_rate = 0.5
-k_attitude = 0.1
-"""
+[spacecraft] inertia = [2.0, 3.0, 4.0]; mass = "12 kg"
+[orbit] altitude = "320 km"; inclination = "51 deg"
+[simulation] duration = 10.0; control_period = 0.5
+[[part]] type = "drag"; plates = [[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+moves_orbit = "yes"; table = "air.csv"; flux = 100
+[[law]] type = "pd"; k_rate = 0.5; k_attitude = 0.1
+""")
 CSV = "height,flux,density\n" + "\n".join(",".join(map(str, row)) for row in TABLE)
 
 

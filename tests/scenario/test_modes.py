@@ -16,6 +16,7 @@ from starhold.scenario.values import locate
 from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
 from tests.refusals import refused, replaced, rows
+from tests.texts import toml
 
 TURNED = """
 from typing import NamedTuple
@@ -129,20 +130,12 @@ def test_the_schema_takes_modes():
         assert not schema.is_valid(tomllib.loads(replaced(TEXT, old, new)))
 
 
-RODS = """
-[orbit]
-altitude = "500 km"
-inclination = "97 deg"
-[[part]]
-type = "magnetometer"
-[[part]]
-type = "magnetorquers"
-dipole_limit = 0.2
-[[part]]
-type = "thrusters"
-torque = 0.01
-lever = 0.1
-[[law]]"""
+RODS = toml("""
+[orbit] altitude = "500 km"; inclination = "97 deg"
+[[part]] type = "magnetometer"
+[[part]] type = "magnetorquers"; dipole_limit = 0.2
+[[part]] type = "thrusters"; torque = 0.01; lever = 0.1
+[[law]]""")
 
 
 @pytest.mark.parametrize(
