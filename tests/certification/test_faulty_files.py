@@ -1,4 +1,4 @@
-"""What a file of certificates says of itself is checked: its claims' kinds and proofs, its outcome, its programs' digests."""
+"""What a file of certificates says is checked: kinds and proofs of its claims, its outcome, digests of its programs."""
 
 import copy
 import json

@@ -13,7 +13,7 @@ from starhold.parts.contract import Envelope
 from starhold.parts.craft import make_craft
 from starhold.parts.effectors import magnetic_unloading, wheels
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
-from starhold.parts.environments import constant_torque, drag, residual_dipole, solar_pressure, torque_table
+from starhold.parts.environments import drag
 from starhold.parts.orbit import BODIES, Elements, from_elements, highest_speed, lowest
 from starhold.parts.plates import BOX, largest_torque
 from starhold.parts.sensors import magnetometer
@@ -47,38 +47,32 @@ def state_at(random, place):
     return State(tuple((attitude / np.linalg.norm(attitude)).tolist()), ZERO, *place, ZERO)
 
 
-def shares(part, params, seed):
-    """The torques at random places, times and attitudes, as shares of the bound."""
-    random, numbers = np.random.default_rng(seed), part.prepare(params, 1.0) if hasattr(part, "prepare") else params
+def shares(params, seed):
+    """The torques at random places and attitudes, as shares of the bound."""
+    random, numbers = np.random.default_rng(seed), drag.prepare(params, 1.0)
     for _ in range(20):
         place, around = orbit(random)
-        bound = part.bound(params, around)
+        bound = drag.bound(params, around)
         assert bound.per_rate == 0.0
         for _ in range(COUNT // 10):
-            state, step = state_at(random, place), int(random.integers(10**6))
-            memory = part.update(part.remember(numbers), state, numbers, None, step) if hasattr(part, "update") else None
-            yield float(np.linalg.norm(part.torque(state, numbers, CRAFT, memory))) / bound.torque
+            state = state_at(random, place)
+            torque = drag.torque(state, numbers, CRAFT, drag.update(None, state, numbers, None, 0))
+            yield float(np.linalg.norm(torque)) / bound.torque
 
 
 EPOCHS = [(2025.0, 1.0, 3.0, 18.0, 0.0, 0.0), (2029.0, 9.0, 21.0, 12.0, 30.0, 15.0)]
-SIDES = tuple((*row, 0.2, 0.1) for row in BOX)
-WING = (*SIDES, (0.2, 0.6, 0.0, 0.8, 0.0, 0.4, 0.0, 0.8, 0.05), (0.2, 1.0, 1.0, 1.0, 0.0, -0.4, 0.1, 0.1, 0.9))
-BOUNDED = [
-    (residual_dipole, residual_dipole.Params((0.005, -0.003, 0.004), EPOCHS[0]), 0.5),
-    (residual_dipole, residual_dipole.Params((0.0, 1.0, 0.3), EPOCHS[1]), 0.5),
-    (drag, drag.Params(BOX, density=1.5e-12), 0.5),
-    (drag, drag.Params(tuple(row[:7] for row in WING), scale_height=2e6), 0.3),
-    (drag, drag.Params(BOX[:1], scale_height=5e6, rotation=30.0), 0.1),
-    (solar_pressure, solar_pressure.Params(SIDES, EPOCHS[0]), 0.4),
-    (solar_pressure, solar_pressure.Params(WING, EPOCHS[1]), 0.25),
-    (solar_pressure, solar_pressure.Params(SIDES[2:3], EPOCHS[0]), 0.6),
-    (constant_torque, constant_torque.examples()[1], 0.99),
+WING = (*BOX, (0.2, 0.6, 0.0, 0.8, 0.0, 0.4, 0.0), (0.2, 1.0, 1.0, 1.0, 0.0, -0.4, 0.1))
+DRAG = [
+    (drag.Params(BOX, density=1.5e-12), 0.5),
+    (drag.Params(WING, scale_height=2e6), 0.3),
+    (drag.Params(BOX[:1], scale_height=5e6, rotation=30.0), 0.1),
 ]
+"""In air that gets thinner so slowly, the orbit's highest place counts; attacks seldom try it."""
 
 
-@pytest.mark.parametrize(("part", "params", "reached"), BOUNDED)
-def test_no_torque_of_an_environment_exceeds_its_bound_and_some_come_near(part, params, reached):
-    found = list(shares(part, params, 1))
+@pytest.mark.parametrize(("params", "reached"), DRAG)
+def test_no_torque_of_the_air_exceeds_its_bound_and_some_come_near(params, reached):
+    found = list(shares(params, 1))
     assert reached < max(found) <= 1.0 + 1e-12
 
 
@@ -114,15 +108,6 @@ def test_no_side_is_pushed_more_than_the_largest_torque(kind, count, light):
     largest = np.linalg.norm(torque, axis=1).max()
     assert largest <= found * (1.0 + 1e-12)
     assert found < (5.0 if light else 2.0) * largest
-
-
-def test_a_table_is_bounded_by_its_rows():
-    params = torque_table.examples()[1]
-    numbers = torque_table.prepare(params, 0.01)
-    state = State(NO_TURN, ZERO, ZERO, ZERO, ZERO)
-    sizes = [np.linalg.norm(torque_table.update(ZERO, state, numbers, None, step)) for step in range(400)]
-    bound = torque_table.bound(params, Envelope(1e7, 1e4, 0.0, 0.0)).torque
-    assert 0.99 * bound < max(sizes) <= bound * (1.0 + 1e-12)
 
 
 def unloaded(params, random, field_error, momentum, count):
