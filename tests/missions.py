@@ -22,14 +22,10 @@ name = "mission"
 [simulation] duration = 60.0; control_period = 0.1
 [[law]] name = "mission"; type = "modes"; quaternion_sign = "shortest"
 """)
-DETUMBLE = """
-[[law.mode]]
-name = "detumble"
-type = "pd"
-k_rate = 0.02
-k_attitude = 1e-6
+DETUMBLE = toml("""
+[[law.mode]] name = "detumble"; type = "pd"; k_rate = 0.02; k_attitude = 1e-6
 until = { rate_below = "0.5 deg/s", dwell = "2 s" }
-"""
+""")
 POINT = toml("""
 [[law.mode]] name = "point"; type = "pid"; k_rate = 0.006; k_attitude = 0.0008; k_integral = 1e-5; integral_limit = 1e-4
 """)
@@ -42,13 +38,9 @@ outage = [100, 160]
 boresight = [0, -1, 0]
 """)
 """A gyro and a star tracker, which is lost for a minute, with their filter."""
-GUARDED = """
-[[law]]
-name = "mission"
-type = "modes"
-quaternion_sign = "shortest"
-on_loss = "safe"
-"""
+GUARDED = toml("""
+[[law]] name = "mission"; type = "modes"; quaternion_sign = "shortest"; on_loss = "safe"
+""")
 MONITORS = toml("""
 [[law.monitor]] name = "tracker"; kind = "stuck"; reading = "attitude"; limit = "5 s"; modes = ["wait", "point", "sun"]
 [[law.monitor]] name = "jump"; kind = "rate"; reading = "rate"; limit = "1 deg/s^2"; times = 2

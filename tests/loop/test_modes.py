@@ -122,13 +122,9 @@ def torque(measurement, gains, craft, memory):
 def examples():
     return [Gains(0.01)]
 """
-HOLD = """
-[[law.mode]]
-name = "hold"
-file = "delayed.py"
-k = 0.001
-until = { after = "2 s", to = "turn" }
-"""
+HOLD = toml("""
+[[law.mode]] name = "hold"; file = "delayed.py"; k = 0.001; until = { after = "2 s", to = "turn" }
+""")
 TURN = toml("""
 [[law.mode]] name = "turn"; type = "pd"; k_rate = 0.006; k_attitude = 0.0008; until = { after = "1 s", to = "hold" }
 """)
