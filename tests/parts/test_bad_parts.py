@@ -11,7 +11,7 @@ from starhold.parts.catalogue import find, read_module
 from starhold.parts.contract import Parameter
 from starhold.scenario.writing import law_table
 from tests.parts.files import BODY, EFFECTOR, PARTS, PD, POINT, TARGET, part
-from tests.refusals import complains
+from tests.refusals import complains, replaced
 from tests.running import starhold
 from tests.texts import toml
 
@@ -225,8 +225,7 @@ BROKEN = {
 def test_a_file_that_is_no_part_or_fails(kind, tmp_path):
     role, old, new, said = BROKEN[kind]
     text, keys = PARTS[role]
-    assert old in text
-    (tmp_path / "mine.py").write_text(text.replace(old, new))
+    (tmp_path / "mine.py").write_text(replaced(text, old, new))
     before = GYRO if role == "estimator" else ""
     assert said in told(tmp_path, BODY + before + part(MINE + keys) + PD)
 
