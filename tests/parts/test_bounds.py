@@ -1,6 +1,7 @@
 """What parts say of the largest torques and errors that they make: never exceeded, and not far above the largest."""
 
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,6 @@ from starhold.parts.effectors.layouts import pyramid, three_orthogonal
 from starhold.parts.environments import drag
 from starhold.parts.orbit import BODIES, Elements, from_elements, highest_speed, lowest
 from starhold.parts.plates import BOX, largest_torque
-from starhold.parts.sensors import magnetometer
 from tests.tiers import leading
 
 GRAVITY, CRAFT = BODIES["Earth"].gravity, make_craft([0.05, 0.065, 0.025])
@@ -60,7 +60,6 @@ def shares(params, seed):
             yield float(np.linalg.norm(torque)) / bound.torque
 
 
-EPOCHS = [(2025.0, 1.0, 3.0, 18.0, 0.0, 0.0), (2029.0, 9.0, 21.0, 12.0, 30.0, 15.0)]
 WING = (*BOX, (0.2, 0.6, 0.0, 0.8, 0.0, 0.4, 0.0), (0.2, 1.0, 1.0, 1.0, 0.0, -0.4, 0.1))
 DRAG = [
     (drag.Params(BOX, density=1.5e-12), 0.5),
@@ -122,19 +121,10 @@ def unloaded(params, random, field_error, momentum, count):
         measured = np.array(to_body(state.attitude, field)) + field_error * directions(random, 1)[0]
         rate = 10.0 ** random.uniform(-4, 0) * directions(random, 1)[0]
         stored = momentum * directions(random, 1)[0] - inertia @ rate
-        shown = shown_of(tuple(stored.tolist()), tuple(measured.tolist()))
+        shown = SimpleNamespace(wheel_momentum=tuple(stored.tolist()), magnetic_field=tuple(measured.tolist()))
         switched = magnetic_unloading.switch(magnetic_unloading.remember(numbers), None, shown, state, numbers, step)
         torque, bound = magnetic_unloading.reaction(switched, None, state, numbers), magnetic_unloading.bound(params, around)
         yield float(np.linalg.norm(torque)), bound.torque + bound.per_rate * float(np.linalg.norm(rate))
-
-
-def shown_of(stored, field):
-    """What the unloading reads of a measurement."""
-
-    class Shown:
-        wheel_momentum, magnetic_field = stored, field
-
-    return Shown
 
 
 @pytest.mark.parametrize("limited", leading([1, 0]))
@@ -149,7 +139,9 @@ def shown_of(stored, field):
     ],
 )
 def test_unloading_keeps_what_it_says(gain, field_error, momentum, reached, limited):
-    params = magnetic_unloading.Params(gain, (0.2, 0.1, 0.2), limited, (1e-3, 0.0, -5e-4), EPOCHS[1])
+    params = magnetic_unloading.Params(
+        gain, (0.2, 0.1, 0.2), limited, (1e-3, 0.0, -5e-4), (2029.0, 9.0, 21.0, 12.0, 30.0, 15.0)
+    )
     pairs = list(unloaded(params, np.random.default_rng(limited), field_error, momentum, COUNT // 2))
     found = [size / bound for size, bound in pairs]
     assert reached < max(found) <= 1.0 + 1e-12
@@ -179,26 +171,6 @@ def test_friction_that_grows_without_end_has_no_bound():
     assert wheels.error(params, Envelope(7e6, 7.6e3, 0.1, 0.065)).torque == float("inf")
     smooth = wheels.make_wheels(three_orthogonal(), 2.2e-5, 2e-3, float("inf"), coulomb=1e-5)
     assert wheels.error(smooth, Envelope(7e6, 7.6e3, 0.1, 0.065)) == (pytest.approx(3**0.5 * 1e-5), 0.0)
-
-
-def test_a_magnetometer_without_noise_errs_by_no_more_than_it_says():
-    params = magnetometer.Params(bias=(2e-8, -1e-8, 3e-8), scale_error=-0.01, epoch=EPOCHS[0])
-    numbers, random, errors = magnetometer.prepare(params, 1.0), np.random.default_rng(5), []
-
-    class Still:
-        vector = staticmethod(lambda place, deviation: ZERO)
-
-    for _ in range(5 * COUNT):
-        place = tuple((magnetic_field.GROUND * directions(random, 1)[0]).tolist())
-        state, step = state_at(random, (place, ZERO)), int(random.integers(10**6))
-        reading, _ = magnetometer.measure(state, ZERO, numbers, Still, step)
-        true = to_body(state.attitude, magnetic_field.field_at(state.position, step, numbers.field))
-        errors.append(float(np.linalg.norm(np.subtract(reading.magnetic_field, true))))
-    bound = magnetometer.error(params)
-    assert 0.55 * bound.field < max(errors) <= bound.field
-    assert (bound.attitude, bound.rate) == (0.0, 0.0)
-    assert magnetometer.noise(params._replace(noise=1e-9), 1.0).field == 1e-9
-    assert magnetometer.error(params._replace(outage=(1.0, 2.0))).field == float("inf")
 
 
 @pytest.mark.parametrize("eccentricity", [0.0, 0.3, 0.9, 1.5])
