@@ -18,6 +18,7 @@ from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.studies.budget import COMBINED, LOOP, TOGETHER, sources
 from tests.refusals import complains, refused
 from tests.running import starhold
+from tests.texts import toml
 
 PERIOD, INERTIA, K_RATE, K_ATTITUDE = 0.5, (2.0, 3.0, 4.0), 0.4, 0.2
 NOISE = {"torque noise": 2e-5, "attitude noise": 2e-4, "rate noise": 1e-4}
@@ -268,16 +269,10 @@ def test_command_writes_what_its_page_quotes(folder):
     complains(starhold("budget", "imager.toml", "-o", "out", cwd=folder), "results already there")
 
 
-STRICT = """
-[[requirement]]
-method = "budget"
-metric = "ape"
-at_most = "1 mas"
-[[requirement]]
-method = "budget"
-metric = "rpe"
-at_most = "1 deg"
-"""
+STRICT = toml("""
+[[requirement]] method = "budget"; metric = "ape"; at_most = "1 mas"
+[[requirement]] method = "budget"; metric = "rpe"; at_most = "1 deg"
+""")
 
 
 def test_options_take_the_place_of_the_files_keys_and_a_missed_requirement_is_told(folder):

@@ -16,9 +16,7 @@ COARSE = BASE.replace('step = "5 deg"', 'step = "85 deg"').replace("step = 0.001
 
 
 def parsed(*pairs, text=COARSE):
-    for old, new in pairs:
-        text = replaced(text, old, new)
-    return parse(text, "my.toml")
+    return parse(replaced(text, *pairs) if pairs else text, "my.toml")
 
 
 def test_lists_and_spreads_give_the_decimals_that_are_meant():

@@ -17,19 +17,15 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from tests.making import ORBITAL, aimed, built, noise, on_wheels, point_loop
 from tests.missions import WATCHED, WATCHFUL
+from tests.texts import toml
 
 FUNCTIONS, CAUTIOUS = (str(Path(__file__).parent / f"{name}.toml") for name in ("every_function", "cautious"))
 """Scenarios of a law that uses every elementary function and the time, and whose inertia changes; of one that reads whether
 its estimate is valid, and whose tracker is lost for a while."""
 NOISE = noise(1e-4, 1e-3, 1e-4)
-FAULT = """
-[[fault]]
-time = 30
-wheel = 2
-lost = true
-inertia = [[7.0, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]
-delay = 10
-"""
+FAULT = toml("""
+[[fault]] time = 30; wheel = 2; lost = true; inertia = [[7.0, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]; delay = 10
+""")
 """A lost wheel, and an inertia that the law knows of ten seconds later."""
 
 
