@@ -20,7 +20,7 @@ from common import header, interleaved, show
 from starhold.loop.kernels import Kernel, numbers_of
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
-from starhold.simulation.lane import simulate
+from starhold.simulation.lane import fly, label
 from starhold.studies.fitting import START, Free, Predictor
 from starhold.studies.identify import Fit
 from starhold.studies.telemetry import read
@@ -62,7 +62,7 @@ def main() -> None:
     """Print the times of slopes and of fits, and how far the two estimates are apart."""
     scenario = parse(SCENARIO, "tumble.toml")
     loop = build(scenario, scenario.laws[0])
-    telemetry = read(scenario, loop, simulate(loop, 600))
+    telemetry = read(scenario, loop, label(loop, *fly(loop, 600), 1).dataset())
     predictor = Predictor(scenario, scenario.laws[0], Free.of(scenario, KEYS), True)
     fit = Fit(scenario, predictor, telemetry)
     begun = predictor.begun(loop.start.attitude, loop.start.rate)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from starhold.analysis.ranking import MetricSet
 from starhold.errors import InputError, expect, optional, shortly
+from starhold.export.aem import export_aem as export_aem
+from starhold.export.aem import read_aem as read_aem
 from starhold.export.oem import export_oem as export_oem
 from starhold.export.oem import read_oem as read_oem
 from starhold.files import passing_folder
@@ -16,6 +18,7 @@ from starhold.scenario.reading import make_scenario as make_scenario
 from starhold.simulation.lane import Recording
 from starhold.studies import compare as studies
 from starhold.studies.serving import serve as serve
+from starhold.studies.sweep import sweep as sweep
 from starhold.synthesis.pole_placement import place as place
 
 if TYPE_CHECKING:
@@ -28,7 +31,6 @@ if TYPE_CHECKING:
     from starhold.campaign.verify import Review
     from starhold.certification.certificate import Certificate
     from starhold.certification.invariant import InvariantProblem
-    from starhold.export.aem import Aem
     from starhold.export.folder import Exported
     from starhold.publications.reproduction import Reproduction
     from starhold.scenario.designing import Design
@@ -110,26 +112,6 @@ def metrics(run: xr.Dataset | Flight) -> Metrics:
         return flight.metric_set.measured(flight.metrics)
     recording = Recording.of(cast("xr.Dataset", run))
     return studies.metric_set_of(recording).measured(studies.metrics_of(recording))
-
-
-@shortly
-def sweep(
-    scenario: reading.Scenario | str | Path,
-    changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
-    law: str | None = None,
-    threads: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> DataFrame:
-    """Fly a scenario with other values and measure each run: a row each, with the changed keys, `law` and the `metrics`.
-
-    changes: for some keys their values, {"law.pd.k_rate": [0.1, 0.2], "spacecraft.inertia": [...]}, of which every
-    combination is flown; or a list of changes as a scenario's `with_` takes them. law: the one that flies; if None those
-    that the keys name, else all. Each row is what `compare` measures of the changed scenario, but for the cost of calls;
-    nothing is certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the
-    first flight where one of the scenarios cannot be."""
-    from starhold.studies.sweep import sweep as fly_sweep
-
-    return fly_sweep(reading.open_scenario(scenario), changes, law, threads, progress)
 
 
 @shortly
@@ -256,30 +238,6 @@ def export_c(
 
 
 @shortly
-def export_aem(
-    run: xr.Dataset | str | Path,
-    file: str | Path,
-    *,
-    epoch: str | None = None,
-    object_name: str = "SPACECRAFT",
-    object_id: str = "0000-000A",
-    frame: str = "EME2000",
-    version: Literal["1.0", "2.0"] = "2.0",
-) -> Path:
-    """Write the attitudes of a run as a CCSDS attitude ephemeris message, and return its path.
-
-    run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run, by default that of the
-    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", into which the attitudes of a run whose inertial axes are
-    those of date (MOD_EARTH) are turned; any other name is what the inertial axes are called. The quaternions turn the frame
-    to the body's axes, scalar last. InputError for a run without attitudes, a word that does not fit, and a file that cannot
-    be written."""
-    from starhold.export.aem import write_run
-
-    about = {"object_name": object_name, "object_id": object_id, "frame": frame, "version": version}
-    return write_run(run, Path(file), epoch, about)
-
-
-@shortly
 def export_requirements(
     scenario: reading.Scenario | str | Path, file: str | Path, original: str | Path | None = None
 ) -> Path:
@@ -295,15 +253,6 @@ def export_requirements(
     except OSError as error:
         raise InputError(str(error.filename or into), "", f"{error.strerror}", "files that can be used") from None
     return into
-
-
-@shortly
-def read_aem(file: str | Path) -> Aem:
-    """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
-    the reference frame to the body's axes), and what it is about. InputError where it is none."""
-    from starhold.export import aem
-
-    return aem.read_message(file, aem.read_aem, "a CCSDS attitude ephemeris message")
 
 
 @shortly

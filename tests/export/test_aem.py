@@ -8,7 +8,7 @@ from ccsds_ndm.ndm_io import NdmIo
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
-from starhold.export.aem import read_aem, write_aem
+from starhold.export.aem import parse_aem, write_aem
 from starhold.parts.epoch import days_of, precession
 from tests.running import starhold
 
@@ -47,7 +47,7 @@ def written(tmp_path, version):
 
 @pytest.mark.parametrize("version", ["1.0", "2.0"])
 def test_what_is_written_is_read_again(version, tmp_path):
-    told = read_aem(written(tmp_path, version))
+    told = parse_aem(written(tmp_path, version))
     np.testing.assert_array_equal(told.attitudes, ATTITUDES)
     np.testing.assert_array_equal(told.times, TIMES)
     assert told[2:] == ("2026-12-31T23:59:59.5", "CUBE SAT", "EME2000", "UTC")
@@ -78,7 +78,7 @@ def test_axes_of_date_are_turned_into_those_that_are_named(tmp_path):
     own = Rotation.from_quat(run["attitude"].to_numpy()[0], scalar_first=True).inv().apply(to_date @ toward)
     for frame, seen in (("EME2000", toward), ("MOD_EARTH", to_date @ toward)):
         sh.export_aem(run, tmp_path / "run.aem", frame=frame)
-        told = read_aem(tmp_path / "run.aem")
+        told = parse_aem(tmp_path / "run.aem")
         assert told.frame == frame
         found = Rotation.from_quat(told.attitudes[0], scalar_first=True).inv().apply(seen)
         np.testing.assert_allclose(found, own, rtol=0, atol=1e-11)
@@ -96,14 +96,14 @@ def test_axes_that_nothing_ties_to_a_date_are_left_alone(tmp_path):
     for about in ({}, nowhere, mars):
         run = sh.simulate(sh.load("three-laws").with_({"simulation.duration": 2.0} | about), "lyapunov")
         sh.export_aem(run, tmp_path / "run.aem")
-        np.testing.assert_array_equal(read_aem(tmp_path / "run.aem").attitudes, run["attitude"].to_numpy())
+        np.testing.assert_array_equal(parse_aem(tmp_path / "run.aem").attitudes, run["attitude"].to_numpy())
 
 
 def test_what_a_library_of_others_writes_is_read(tmp_path):
     message = NdmIo().from_path(written(tmp_path, "1.0"))
     path = tmp_path / "other.aem"
     path.write_text(NdmIo().to_string(message, NDMFileFormats.KVN))
-    told = read_aem(path)
+    told = parse_aem(path)
     np.testing.assert_allclose(told.attitudes, ATTITUDES, rtol=0, atol=1e-15)
     np.testing.assert_array_equal(told.times, TIMES)
 
@@ -111,7 +111,7 @@ def test_what_a_library_of_others_writes_is_read(tmp_path):
 def quarter(text, tmp_path):
     path = tmp_path / "turn.aem"
     path.write_text(text)
-    return read_aem(path)
+    return parse_aem(path)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import starhold as sh
 from starhold.algebra.structure import flatten
 from starhold.loop.kernels import make_step
 from starhold.scenario.building import build
-from starhold.simulation.lane import simulate
+from starhold.simulation.lane import fly, label
 from starhold.simulation.stepper import Stepper
 from tests.refusals import refused
 
@@ -56,7 +56,7 @@ def made(folder, law=CLOCK, reads='READS = ("time",)', use="measurement.time", *
 def test_the_time_counts_from_the_start_of_the_flight(more, tmp_path):
     scenario = made(tmp_path, **more)
     loop = build(scenario, scenario.laws[0])
-    run = simulate(loop, 64)
+    run = label(loop, *fly(loop, 64), 1).dataset()
     # Powers of two, of which products are exact.
     assert run["command"][:, 0].to_numpy()[:64].tolist() == (np.arange(64) * 2.0**-23).tolist()
     flight = Stepper(loop)

@@ -8,7 +8,7 @@ import piqp
 import scipy.sparse as sp
 
 from starhold.laws.predictive.problem import Problem
-from starhold.laws.predictive.single import Solution, pose, solve
+from tests.mpc.single import Solution, pose, solve
 from tests.tiers import fewer
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from starhold.laws.predictive.problem import Problem
-from starhold.laws.predictive.single import record_solver, work_out
 from starhold.laws.predictive.solver import PATIENCE
 from tests.mpc.programs import Program
+from tests.mpc.single import record_solver, work_out
 from tests.tiers import leading
 from tests.trace.machines import Job, column, on_lanes, same
 

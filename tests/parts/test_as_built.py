@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
+from starhold.algebra.quaternion import multiply
 from starhold.algebra.vector import ZERO
 from starhold.parts.effectors import magnetorquers, thrusters
 from starhold.parts.random import Dice, Silent
@@ -63,8 +64,9 @@ def test_jitter_turns_what_is_shown_by_the_rate(sensor):
     state = namedtuple("State", of_state)(**of_state)
     exact, off = np.array(reading(sensor, sensor.Params(**given), state)[0]), []
     numbers = sensor.prepare(sensor.Params(**given, jitter=0.01), 0.5)
+    before = multiply(state.attitude, (math.cos(0.125), 0.0, 0.0, -math.sin(0.125)))
+    memory = sensor.remember(numbers, state._replace(attitude=before))
     for step in range(400):
-        memory = sensor.remember(numbers, state) if hasattr(sensor, "remember") else ()
         shown = np.array(sensor.measure(state, memory, numbers, Dice((1, 2), step, 0), 0)[0][0])
         if sensor is star_tracker:
             ends = [Rotation.from_quat(q, scalar_first=True) for q in (exact, shown)]

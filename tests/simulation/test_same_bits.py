@@ -11,7 +11,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.loop import kernels
 from starhold.parts.catalogue import fit
 from starhold.parts.craft import make_craft
-from starhold.simulation.lane import fly, simulate
+from starhold.simulation.lane import fly, label
 from starhold.simulation.lanes import carry_columns, simulate_many, stacked
 from tests.making import ORBITAL, aimed, noise
 
@@ -108,13 +108,13 @@ def test_seed_changes_noise_and_nothing_else():
 
 def test_progress_is_reported_to_the_end():
     calls = []
-    simulate(flown(), 500, progress=lambda done, total: calls.append((done, total)))
+    fly(flown(), 500, progress=lambda done, total: calls.append((done, total)))
     assert calls[-1] == (500, 500)
     assert calls == sorted(set(calls))
 
 
 def test_dataset_is_labelled():
-    run = simulate(flown(), 50, record_every=5)
+    run = label(flown(), *fly(flown(), 50, 5), 5).dataset()
     assert run.sizes == {"time": 11, "quaternion": 4, "axis": 3}
     assert run["time"].values[-1] == pytest.approx(5.0)
     units = {"attitude": "1", "rate": "rad/s", "torque": "N m", "position": "m", "velocity": "m/s"}

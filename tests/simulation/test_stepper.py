@@ -7,7 +7,7 @@ import starhold as sh
 from starhold.algebra.structure import flatten
 from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
-from starhold.simulation.lane import simulate
+from starhold.simulation.lane import fly, label
 from starhold.simulation.stepper import Stepper
 from tests.simulation.loops import FAULT
 
@@ -31,7 +31,7 @@ def assert_same(run, other, count):
 
 
 def check_bits(loop, steps=STEPS):
-    whole, flight = simulate(loop, steps), Stepper(loop)
+    whole, flight = label(loop, *fly(loop, steps), 1).dataset(), Stepper(loop)
     for _ in range(steps):
         flight.step()
     assert_same(whole, flight.dataset(), steps + 1)
@@ -75,7 +75,7 @@ def test_lanes_are_runs():
     for _ in range(STEPS):
         readings = many.step()
     for lane in (0, 10):
-        assert_same(simulate(loop, STEPS, run=loop.run + lane), many.dataset(lane), STEPS + 1)
+        assert_same(label(loop, *fly(loop, STEPS, run=loop.run + lane), 1).dataset(), many.dataset(lane), STEPS + 1)
     assert readings.measurement.rate[0].shape == (11,)
     assert len(set(readings.measurement.rate[0])) == 11
     assert many.diverged.tolist() == [False] * 11

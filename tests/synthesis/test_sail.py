@@ -21,7 +21,6 @@ from starhold.synthesis.sail import (
     lit_discs,
     make_sail,
     max_lean,
-    mirror,
     normal_of,
     outline,
     push,
@@ -41,6 +40,12 @@ parts = st.floats(0.0, 1.0)
 optics = st.tuples(parts, parts).map(lambda p: (p[0], p[1] * (1.0 - p[0]))).filter(lambda p: sum(p) > 0.02)
 sails = optics.map(lambda p: make_sail(PRESSURE, 150.0, 300.0, *p))
 clocks = st.floats(-math.pi, math.pi)
+
+
+def mirror(wanted, pressure):
+    """The area (m2) and unit normal of a perfect mirror that give this force (N) at this pressure (N/m2)."""
+    size = norm(wanted)
+    return size**3 / (2.0 * pressure * wanted[0] ** 2), tuple(x / size for x in wanted)
 
 
 @given(optics, st.floats(0.0, 1.5), clocks)

@@ -4,21 +4,26 @@ Versions 1.0 (CCSDS 504.0-B-1) and 2.0 (504.0-B-2). The quaternion Q1 Q2 Q3 QC o
 REF_FRAME_A into REF_FRAME_B with the convention of `starhold.algebra.quaternion`: a vector's components in A become those in
 B."""
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from datetime import UTC, date, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import conjugate, multiply
-from starhold.errors import InputError, expect
+from starhold.errors import InputError, expect, shortly
 from starhold.files import read_text, write_text
 from starhold.parts.epoch import OF_DATE, OF_J2000, Date, date_of, days_of, precession
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Version = Literal["1.0", "2.0"]
 BODY = "SC_BODY"
@@ -56,22 +61,36 @@ class Aem(NamedTuple):
     time_system: str
 
 
-def write_run(run: Any, path: Path, epoch: str | None, about: dict[str, Any]) -> Path:
-    """Write the attitudes of a run, a Dataset, a run.nc or its folder, as a message, and return its path. epoch: UTC at its
-    start, None for its own; about: further arguments of `write_aem`. InputError for a run without attitudes, a word that
-    does not fit, and a file that cannot be written."""
-    run = open_run(run)
-    if "attitude" not in run:
+@shortly
+def export_aem(
+    run: xr.Dataset | str | Path,
+    file: str | Path,
+    *,
+    epoch: str | None = None,
+    object_name: str = "SPACECRAFT",
+    object_id: str = "0000-000A",
+    frame: str = OF_J2000,
+    version: Version = "2.0",
+) -> Path:
+    """Write the attitudes of a run as a CCSDS attitude ephemeris message, and return its path.
+
+    run: what `simulate` returns, a run.nc or the folder of one. epoch: UTC at the start of the run, by default that of the
+    scenario's [orbit], else 2000-01-01T12:00:00. frame: "EME2000", into which the attitudes of a run whose inertial axes are
+    those of date (MOD_EARTH) are turned; any other name is what the inertial axes are called. The quaternions turn the frame
+    to the body's axes, scalar last. InputError for a run without attitudes, a word that does not fit, and a file that cannot
+    be written."""
+    flown: Any = open_run(run)
+    if "attitude" not in flown:
         raise InputError("export aem", "", "a run without attitudes", "one of a rigid body")
-    times, attitudes = run["time"].to_numpy(), run["attitude"].to_numpy()
-    if run.attrs.get("frame") == OF_DATE and about["frame"] == OF_J2000:
-        attitudes = from_date(attitudes, date_of(run.attrs["epoch"]))
-    begun = run.attrs.get("epoch", UNDATED) if epoch is None else epoch
+    times, attitudes = flown["time"].to_numpy(), flown["attitude"].to_numpy()
+    if flown.attrs.get("frame") == OF_DATE and frame == OF_J2000:
+        attitudes = from_date(attitudes, date_of(flown.attrs["epoch"]))
+    about: Any = {"object_name": object_name, "object_id": object_id, "frame": frame, "version": version}
     try:
-        write_aem(path, times, attitudes, epoch=begun, **about)
+        write_aem(Path(file), times, attitudes, epoch=flown.attrs.get("epoch", UNDATED) if epoch is None else epoch, **about)
     except ValueError as error:
         raise InputError("export aem", "", str(error), "a word that a CCSDS message may hold") from None
-    return path
+    return Path(file)
 
 
 def open_run(place: Any) -> Any:
@@ -154,7 +173,14 @@ def read_message(file: str | Path, parse: Callable[[Path], _Message], kind: str)
         raise InputError(str(file), "", str(error), kind) from None
 
 
-def read_aem(path: Path) -> Aem:
+@shortly
+def read_aem(file: str | Path) -> Aem:
+    """Read a CCSDS attitude ephemeris message of one segment: `times` (s, since the first), `attitudes` (scalar first, from
+    the reference frame to the body's axes), and what it is about. InputError where it is none."""
+    return read_message(file, parse_aem, "a CCSDS attitude ephemeris message")
+
+
+def parse_aem(path: Path) -> Aem:
     """Read the attitudes of a message of one segment. OSError, or ValueError that names the line and its error."""
     lines = Lines(read_text(path))
     version = lines.value("CCSDS_AEM_VERS")

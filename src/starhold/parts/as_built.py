@@ -14,7 +14,6 @@ import numpy as np
 from starhold.algebra.circular import nearest
 from starhold.algebra.cosines import from_quaternion
 from starhold.algebra.quaternion import Quaternion, normalise, to_reference
-from starhold.algebra.quaternion import multiply as turned
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.several import each
 from starhold.algebra.structure import leaves
@@ -111,14 +110,6 @@ def _in_steps(step: Scalar, x: Scalar) -> Scalar:
     return step * nearest(x / step)
 
 
-def when_read(state: Any, jitter: Step, dice: Dice, place: int) -> Any:
-    """The state with the attitude of the instant at which a sensor is read, to which the body turns at a constant rate."""
-    if not jitter:
-        return state
-    half = scale(0.5 * jitter[0] * dice.normals(place, 1)[0], state.rate)
-    return state._replace(attitude=normalise(turned(state.attitude, (1.0, *half))))
-
-
 class Timing(NamedTuple):
     """How late a sensor shows a state: whole control periods, a constant of a kernel, and the share of one more; and the
     jitter of its instants in control periods; () for none."""
@@ -141,8 +132,7 @@ class Waiting(NamedTuple):
 
 
 def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
-    """The dead time, and the jitter of what a sensor sees change from step to step, () for neither. ValueError for one
-    that is too long."""
+    """The dead time and the jitter of a sensor, () for neither. ValueError for a dead time that is too long."""
     if delay > LONGEST * period:
         raise ValueError(f"the delay must be at most {LONGEST} control periods, {LONGEST * period:g} s")
     steps = delay / period

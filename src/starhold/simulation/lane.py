@@ -99,19 +99,6 @@ class Recording:
         return data, coords
 
 
-def simulate(
-    loop: ClosedLoop, steps: int, record_every: int = 1, run: int | None = None, progress: Progress | None = None
-) -> xr.Dataset:
-    """Fly a closed loop for `steps` control periods.
-
-    Returns an xarray Dataset over `time` (s), a sample every `record_every` control steps, the state before and the torque
-    after each. `run` numbers the random numbers, in place of the loop's. A motion that diverged (not finite, or faster than
-    the integration can follow) ends the samples, and its time stands in `attrs["diverged_at"]` (s); else that attribute is
-    absent."""
-    samples, carry = fly(loop, steps, record_every, run, progress)
-    return label(loop, samples, carry, record_every).dataset()
-
-
 def fly(
     loop: ClosedLoop, steps: int, record_every: int = 1, run: int | None = None, progress: Progress | None = None
 ) -> tuple[NDArray[np.float64], Carry]:

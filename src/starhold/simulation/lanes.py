@@ -84,7 +84,7 @@ def simulate_many(
     an array (lanes,) in place of every number that differs between lanes, whole numbers excepted, see `stacked`; width:
     lanes in flight at once on a core.
 
-    The result is the same, bit for bit, for any number of threads and any width, and equals that of `simulate` lane by lane
+    The result is the same, bit for bit, for any number of threads and any width, and equals that of `fly` lane by lane
     until the motion diverges."""
     start = np.asarray(starts if isinstance(starts, np.ndarray) else [flatten(s) for s in starts], dtype=float)
     start = start if isinstance(starts, np.ndarray) else start.T

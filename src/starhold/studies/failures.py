@@ -17,7 +17,6 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.envelope import authority
 from starhold.parts.effectors.wheels import Wheels, lose
-from starhold.parts.orbit import period_of
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.bodies.rigid_body.tables import FaultTable
 from starhold.scenario.building import build
@@ -26,6 +25,7 @@ from starhold.scenario.reading import LawEntry, Scenario
 from starhold.simulation.lane import fly, label
 from starhold.studies.bodies.rigid_body import certify_law
 from starhold.studies.pointing import ProvedPointing, prove_pointing
+from starhold.studies.requirements import orbit_of
 from starhold.synthesis.stability_degree import degree, scale
 
 Array: TypeAlias = NDArray[np.float64]
@@ -195,7 +195,7 @@ def _flown(scenario: Scenario, entry: LawEntry, failure: Failure) -> Failure:
             raise
         return replace(failure, refused=error.allowed)
     gains = loop.events[-1].gains if loop.events else loop.gains
-    period = _orbit_period(scenario)
+    period = orbit_of(scenario)
     every, steps = table.simulation.record_every, _steps(scenario, loop, period)
     samples, carry = fly(loop, steps, every)
     recording = label(loop, samples, carry, every)
@@ -240,16 +240,6 @@ def _certified(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> tuple[f
         return None
     # Wheels without limits are not claimed, so that the set is bounded.
     return claim.numbers["slew_angle"], claim.numbers["rate"]
-
-
-def _orbit_period(scenario: Scenario) -> float | None:
-    """Return the period of the initial orbit (s); None without an orbit, or where it is not closed."""
-    orbit = scenario.table.orbit
-    if orbit is None:
-        return None
-    position, velocity = orbit.start
-    period = period_of(position, velocity, orbit.gravitational_parameter)
-    return period if math.isfinite(period) else None
 
 
 def _steps(scenario: Scenario, loop: ClosedLoop, period: float | None) -> int:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import relative
 from starhold.algebra.structure import flatten, unflatten
+from starhold.certification.wording import listed
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.scenario.building import build
@@ -92,17 +93,13 @@ class Replay:
             return "Nothing that the scenario computes was recorded: there is nothing to compare with."
         if first is None:
             bits = ", bit for bit" if all(one.same_bits for one in self.comparisons) else ""
-            return f"Computed and recorded values agree{bits}: {_listed([c.name for c in self.comparisons])}."
+            return f"Computed and recorded values agree{bits}: {listed([c.name for c in self.comparisons])}."
         place = first.beyond.argmax()
         also = [c.name for c in self.comparisons if c.parted_at == first.parted_at and c is not first]
         return (
             f"They first deviate at {first.parted_at:g} s: {first.name} differs by {first.difference[place]:.3g} "
-            f"{first.unit}, {first.rule} {first.allowed[place]:.3g}{f'; so do {_listed(also)}' if also else ''}."
+            f"{first.unit}, {first.rule} {first.allowed[place]:.3g}{f'; so do {listed(also)}' if also else ''}."
         )
-
-
-def _listed(words: list[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def tolerance_of(text: str | float) -> float:
@@ -149,7 +146,7 @@ def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, fir
     fields = [name for name in like.state._fields if name != loop.body.module.COMMAND]
     needed = [name for name in (fields[:2] if not readings else []) if name not in values]
     if needed:
-        raise InputError(telemetry.name, "", f"no {_listed(needed)}", "what the law knows: this scenario has no sensors")
+        raise InputError(telemetry.name, "", f"no {listed(needed)}", "what the law knows: this scenario has no sensors")
     known = {name: part(getattr(like.state, name), name if name in fields else "") for name in like.state._fields}
     state = like.state._replace(**known)
     if first and "position" in fields and "position" not in values:
@@ -168,9 +165,9 @@ def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, fir
     lacking = [name for name in taken if name in values and np.isnan(values[name]).any()]
     absent = [name for name in taken if name not in values]
     every = f"{count} control steps, every {loop.period:g} s"
-    notes = [f"{_listed(gaps)} of {every}; between them none is new, and rates go along straight lines." if gaps else ""]
-    notes += [f"Not recorded, and taken from the estimate or the model: {_listed(absent)}." if absent else ""]
-    notes += [f"Recorded at some control steps alone, and so at the others: {_listed(lacking)}." if lacking else ""]
+    notes = [f"{listed(gaps)} of {every}; between them none is new, and rates go along straight lines." if gaps else ""]
+    notes += [f"Not recorded, and taken from the estimate or the model: {listed(absent)}." if absent else ""]
+    notes += [f"Recorded at some control steps alone, and so at the others: {listed(lacking)}." if lacking else ""]
     return rows, [note for note in notes if note]
 
 
@@ -187,7 +184,7 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], telemetry: 
     flags = {name for name, field in wanted.items() if "_is_" in field}
     if missing := [name for name in wanted if name not in values and name not in flags]:
         allowed = "every reading of the scenario's sensors: leave out the parts that the satellite lacks"
-        raise InputError(telemetry.name, "", f"no {_listed(missing)}", allowed)
+        raise InputError(telemetry.name, "", f"no {listed(missing)}", allowed)
     filled: dict[str, Array] = {}
     gaps: list[str] = []
     for name in wanted:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from itertools import product
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from starhold.errors import InputError
+from starhold.errors import InputError, shortly
 from starhold.scenario.checking import show
 from starhold.scenario.making import variants
-from starhold.scenario.reading import Scenario
+from starhold.scenario.reading import Scenario, open_scenario
 from starhold.simulation.batched import Flying, fly_batched
 from starhold.simulation.lane import Progress
 from starhold.studies.compare import build, metrics_of, name_samples
@@ -21,21 +22,29 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 
+@shortly
 def sweep(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     changes: Mapping[str, Iterable[Any]] | Iterable[Mapping[str, Any]],
     law: str | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> DataFrame:
-    """Return a row for each law and each of the changes, see `starhold.sweep`."""
-    points = _points(scenario, changes)
-    names = [law] if law is not None else _named(scenario, points)
+    """Fly a scenario with other values and measure each run: a row each, with the changed keys, `law` and the `metrics`.
+
+    changes: for some keys their values, {"law.pd.k_rate": [0.1, 0.2], "spacecraft.inertia": [...]}, of which every
+    combination is flown; or a list of changes as a scenario's `with_` takes them. law: the one that flies; if None those
+    that the keys name, else all. Each row is what `compare` measures of the changed scenario, but for the cost of calls;
+    nothing is certified. Runs that differ only in numbers fly side by side on the lanes of a vector. InputError before the
+    first flight where one of the scenarios cannot be."""
+    opened = open_scenario(scenario)
+    points = _points(opened, changes)
+    names = [law] if law is not None else _named(opened, points)
     rows: list[dict[str, Any]] = []
     flown: list[Scenario] = []
     flights: list[Flying] = []
     # All are read before the first flight, so that an error in the last is reported at once.
-    for point, other in zip(points, variants(scenario, points), strict=True):
+    for point, other in zip(points, variants(opened, points), strict=True):
         simulation = other.table.simulation
         for name in names:
             loop = build(other, other.pick(name))

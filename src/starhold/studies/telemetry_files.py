@@ -15,7 +15,7 @@ from starhold.algebra.cosines import to_quaternion
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import conjugate, multiply
 from starhold.errors import InputError, input_at, optional
-from starhold.export.aem import open_run, read_aem
+from starhold.export.aem import open_run, parse_aem
 from starhold.files import read_text
 from starhold.laws.interface import Gain
 from starhold.parts.epoch import OF_J2000
@@ -151,7 +151,7 @@ def _message(path: Path, mapping: MappingTable) -> tuple[Any, MappingTable]:
     """An attitude ephemeris message: its attitude, and times by its own time system."""
     import pandas as pd
 
-    message = read_aem(path)
+    message = parse_aem(path)
     base = {"UTC": "unix", "GPS": "gps"}.get(message.time_system, "first")
     begun = np.datetime64(message.epoch, "ns").astype(float) * 1e-9 - (GPS_EPOCH if base == "gps" else 0.0)
     frame = pd.DataFrame({"time": begun + message.times} | dict(zip(LABELS["quaternion"], message.attitudes.T, strict=True)))

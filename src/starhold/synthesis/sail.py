@@ -85,13 +85,6 @@ def force(normal: Vector, area: Scalar, sail: Sail) -> Vector:
     return add(along, (strength * (1.0 - sail.specular), 0.0, 0.0))
 
 
-def mirror(wanted: Vector, pressure: Scalar) -> tuple[Scalar, Vector]:
-    """Return the area (m2) and unit normal of a perfect mirror that give this force (N) at this pressure (N/m2); the force
-    must have a part away from the Sun."""
-    size = norm(wanted)
-    return size * size * size / (2.0 * pressure * (wanted[0] * wanted[0])), scale(1.0 / size, wanted)
-
-
 def normal_of(setting: Setting) -> Vector:
     """Return the unit normal of a panel."""
     across = math.sin(setting.cone)

@@ -84,8 +84,7 @@ class Params(NamedTuple):
 
 class Numbers(NamedTuple):
     """Unit normals, as flight software has them; the deviation, the albedo and the threshold; the Sun, the control period
-    (s), outage and interval (control steps); () or the axes of the mounting, the jitter of its instants (s), and how late
-    it is."""
+    (s), outage and interval (control steps); () or the axes of the mounting, and how late it is."""
 
     normals: tuple[Vector, ...]
     noise: Scalar
@@ -95,7 +94,6 @@ class Numbers(NamedTuple):
     period: Scalar
     outage: Silence
     axes: as_built.Axes
-    jitter: as_built.Step = ()
     late: as_built.Late = ()
 
 
@@ -116,8 +114,8 @@ def prepare(params: Params, period: float) -> Numbers:
     normals = tuple(scale(1.0 / math.hypot(*face), face) for face in params.faces)
     outage, axes = in_steps(params.outage, period, params.interval), as_built.axes_of(params.mounting_error, ZERO)
     shares = params.noise, params.albedo, params.threshold
-    read = as_built.step_of(params.jitter), as_built.late_by(params.delay, period)
-    return Numbers(normals, *shares, sun.prepared(params.epoch, params.ephemeris), period, outage, axes, *read)
+    late = as_built.late_by(params.delay, period, params.jitter)
+    return Numbers(normals, *shares, sun.prepared(params.epoch, params.ephemeris), period, outage, axes, late)
 
 
 def remember(params: Numbers, state: Any) -> Any:
@@ -128,7 +126,6 @@ def remember(params: Numbers, state: Any) -> Any:
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The direction by the currents of this control step."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, MOST)
-    state = as_built.when_read(state, params.jitter, dice, MOST)
     seen = sun.sun(number_of(step) * params.period, params.sun)
     up = unit(state.position)
     light = sun.in_view(state.position, seen)

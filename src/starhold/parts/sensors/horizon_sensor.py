@@ -56,8 +56,7 @@ class Params(NamedTuple):
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the limb's height
-    (m), outage and interval (control steps); () or the axes of the mounting, the jitter of its instants (s), and how late
-    it is."""
+    (m), outage and interval (control steps); () or the axes of the mounting, and how late it is."""
 
     noise: Scalar
     boresight: Vector
@@ -65,7 +64,6 @@ class Numbers(NamedTuple):
     height: Scalar
     outage: Silence
     axes: as_built.Axes
-    jitter: as_built.Step = ()
     late: as_built.Late = ()
 
 
@@ -85,8 +83,7 @@ def prepare(params: Params, period: float) -> Numbers:
         params.limb_height,
         in_steps(params.outage, period, params.interval),
         as_built.axes_of(params.mounting_error, ZERO),
-        as_built.step_of(params.jitter),
-        as_built.late_by(params.delay, period),
+        as_built.late_by(params.delay, period, params.jitter),
     )
 
 
@@ -97,8 +94,7 @@ def remember(params: Numbers, state: Any) -> Any:
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The direction of the Earth's centre at this control step."""
-    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 4)
-    state = as_built.when_read(state, params.jitter, dice, 3)
+    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 3)
     distance = norm(state.position)
     down = as_built.along(params.axes, to_body(state.attitude, scale(-1.0 / distance, state.position)))
     toward = dot(down, params.boresight)

@@ -57,7 +57,7 @@ class Params(NamedTuple):
 
 class Numbers(NamedTuple):
     """Deviation and bias (T), the scale factor, the field, and outage and interval (control steps); () or its axes, its step
-    (T), its limit (T), the jitter of its instants (s), and how late it is."""
+    (T), its limit (T), and how late it is."""
 
     noise: Scalar
     bias: Vector
@@ -67,7 +67,6 @@ class Numbers(NamedTuple):
     axes: as_built.Axes = ()
     step: as_built.Step = ()
     limit: tuple[Scalar, ...] = ()
-    jitter: as_built.Step = ()
     late: as_built.Late = ()
 
 
@@ -91,8 +90,7 @@ def prepare(params: Params, period: float) -> Numbers:
         as_built.axes_of(params.mounting_error, params.axis_errors),
         as_built.step_of(params.resolution),
         (params.limit,) if params.limit < math.inf else (),
-        as_built.step_of(params.jitter),
-        as_built.late_by(params.delay, period),
+        as_built.late_by(params.delay, period, params.jitter),
     )
 
 
@@ -103,8 +101,7 @@ def remember(params: Numbers, state: Any) -> Any:
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The field at this control step, or in an outage the last one before it."""
-    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 4)
-    state = as_built.when_read(state, params.jitter, dice, 3)
+    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 3)
     true = magnetic_field.field_at(state.position, step, params.field)
     seen = as_built.along(params.axes, to_body(state.attitude, true))
     shown = add(add(scale(params.factor, seen), params.bias), dice.vector(0, params.noise))

@@ -72,8 +72,7 @@ class Params(NamedTuple):
 
 class Numbers(NamedTuple):
     """Deviations (rad), the unit vector of the boresight, control steps from update to update, how late it is, and control
-    steps of the outage; the cones that blind, the squared rate limit (rad2/s2), the turn of its mounting, and the jitter of
-    its instants (s), () for none."""
+    steps of the outage; the cones that blind, the squared rate limit (rad2/s2) and the turn of its mounting, () for none."""
 
     cross: Scalar
     roll: Scalar
@@ -84,7 +83,6 @@ class Numbers(NamedTuple):
     cones: blinding.Cones | tuple[()] = ()
     square: tuple[Scalar, ...] = ()
     mounted: as_built.Turn = ()
-    jitter: as_built.Step = ()
 
 
 class Memory(NamedTuple):
@@ -113,14 +111,13 @@ def prepare(params: Params, period: float) -> Numbers:
         params.roll,
         boresight,
         steps_of(params.interval, period),
-        as_built.late_by(params.delay, period),
+        as_built.late_by(params.delay, period, params.jitter),
         in_steps(params.outage, period),
         blinding.prepared(
             looks, params.sun_cone, params.moon_cone, params.limb_cones, params.epoch, params.ephemeris, period
         ),
         (params.rate_limit * params.rate_limit,) if params.rate_limit < math.inf else (),
         mounted,
-        as_built.step_of(params.jitter),
     )
 
 
@@ -136,8 +133,7 @@ def remember(params: Numbers, state: Any) -> Any:
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The last update, a new one where it is due."""
-    state = as_built.when_read(state, params.jitter, dice, 3)
-    then, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 4)
+    then, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 3)
     seen = then.attitude
     due = both(less(memory.left, 0.5), opposite(is_out(step, params.outage)))
     if params.cones:

@@ -59,8 +59,7 @@ class Params(NamedTuple):
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the Sun, the control
-    period (s), and outage and interval (control steps); () or its axes, the jitter of its instants (s), and
-    how late it is."""
+    period (s), and outage and interval (control steps); () or its axes, and how late it is."""
 
     noise: Scalar
     boresight: Vector
@@ -69,7 +68,6 @@ class Numbers(NamedTuple):
     period: Scalar
     outage: Silence
     axes: as_built.Axes = ()
-    jitter: as_built.Step = ()
     late: as_built.Late = ()
 
 
@@ -95,8 +93,7 @@ def prepare(params: Params, period: float) -> Numbers:
         period,
         outage,
         axes,
-        as_built.step_of(params.jitter),
-        as_built.late_by(params.delay, period),
+        as_built.late_by(params.delay, period, params.jitter),
     )
 
 
@@ -107,9 +104,8 @@ def remember(params: Numbers, state: Any) -> Any:
 
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """The Sun at this control step."""
-    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 4)
+    state, memory, waiting = as_built.arrived(state, memory, params.late, as_built.PLACE, dice, 3)
     seen = sun.sun(number_of(step) * params.period, params.sun)
-    state = as_built.when_read(state, params.jitter, dice, 3)
     toward = as_built.along(params.axes, to_body(state.attitude, seen.direction))
     inside = less_equal(params.cosine, dot(toward, params.boresight))
     lit = less(0.5, sun.in_view(state.position, seen))

@@ -15,7 +15,7 @@ from starhold.algebra.quaternion import NO_TURN, Quaternion, multiply, normalise
 from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, most, subtract
 from starhold.errors import InputError, input_at
-from starhold.export.aem import OFF_UNIT, from_date, read_aem
+from starhold.export.aem import OFF_UNIT, from_date, parse_aem
 from starhold.laws.interface import Start
 from starhold.loop.step import total
 from starhold.parts.bodies.rigid_body import State
@@ -173,7 +173,7 @@ def read_history(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64], 
 
     Raises OSError, or ValueError that names the line and its error."""
     if path.suffix.lower() == ".aem":
-        message = read_aem(path)
+        message = parse_aem(path)
         return message.times, message.attitudes, message.frame
     rows: list[list[float]] = []
     order = list(range(len(COLUMNS)))
