@@ -12,7 +12,7 @@ from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import find, fit
-from starhold.parts.craft import make_craft
+from starhold.parts.craft import EARTH, make_craft
 from starhold.parts.effectors.wheels import ALLOCATIONS
 from starhold.parts.effectors.wheels import State as Rotors
 from starhold.parts.part import Fitted
@@ -44,6 +44,17 @@ def spun(torque: Any, times: Any, attitude: Any, rate: Any, inertia: Any = HUB) 
 
     found = solve_ivp(slope, (times[0], times[-1]), [*attitude, *rate], "DOP853", times, rtol=1e-12, atol=1e-15).y
     return found[:4].T, found[4:].T
+
+
+def orbited(position: Any, velocity: Any, times: Any, push: Any = None) -> Any:
+    """Positions and velocities (n, 6) in two-body motion about the Earth at times (s) from 0 on by SciPy, with another
+    acceleration push(t, position, velocity) (m/s2) beside the attraction."""
+
+    def slope(t: float, y: Any) -> Any:
+        return [*y[3:], *(-EARTH * y[:3] / np.linalg.norm(y[:3]) ** 3 + (push(t, y[:3], y[3:]) if push else 0.0))]
+
+    begun = [*position, *velocity]
+    return solve_ivp(slope, (0.0, times[-1]), begun, "DOP853", times, rtol=1e-13, atol=1e-8).y.T
 
 
 def aimed(target: Any, knots: Any = ()) -> Fitted:

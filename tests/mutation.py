@@ -56,7 +56,9 @@ def changes(node: Any) -> Iterator[tuple[str, Any, ast.expr]]:
             yield "order", node, ast.Call(ast.Name(CALLS[name]), [a, b], [])
         case ast.Call(ast.Name(name), [test, a, b, *more], keywords) if name in ("where", "select"):
             yield "branches", node, ast.Call(ast.Name(name), [test, b, a, *more], keywords)
-        case ast.Call(function, [a, b, *more], keywords) if getattr(function, "id", "") not in SAME:
+        case ast.Call(function, [a, b, *more], keywords) if (
+            getattr(function, "id", getattr(function, "attr", "")) not in SAME
+        ):
             if not any(isinstance(each, ast.Starred) for each in (a, b)):
                 yield "arguments", node, ast.Call(function, [b, a, *more], keywords)
         case ast.Return(ast.Call(_, [first, *_])) if not isinstance(first, ast.Starred | ast.GeneratorExp):

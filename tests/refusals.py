@@ -8,9 +8,9 @@ from starhold.errors import InputError
 
 
 @contextmanager
-def refused(*words, start=""):
-    """What runs within is a user's error, told in one line that begins so and has all these words."""
-    with pytest.raises(InputError) as caught:
+def refused(*words, start="", match=None):
+    """What runs within is a user's error, told in one line that begins so, has all these words, and has a match."""
+    with pytest.raises(InputError, match=match) as caught:
         yield caught
     line = str(caught.value)
     assert line.startswith(start), line
@@ -32,7 +32,9 @@ def rows(text):
     return [[cell.strip().replace("↵", "\n") for cell in row.split("|")] for row in text.strip().splitlines()]
 
 
-def replaced(text, old, new):
-    """The text of a file with one thing changed that is there."""
-    assert old in text, old
-    return text.replace(old, new)
+def replaced(text, *changes):
+    """The text of a file with things changed that are there: pairs of what stands there and what then does, or one such."""
+    for old, new in [changes] if isinstance(changes[0], str) else changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    return text

@@ -129,6 +129,7 @@ def campaign(
     threads: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    gpu: bool = False,
     resume: bool = False,
     force: bool = False,
     until_decided: bool = False,
@@ -142,8 +143,9 @@ def campaign(
     costlier ones to be measured too, "overshoot" or "iterations". These, with `runs`, `sampling` and `seed`, stand in place
     of what the scenario's [campaign] table has. law: one law, else all. Results are kept in `folder`, or in one that goes
     with this process; `resume` flies there what is missing. threads, workers (processes), scheduler (the address of a Dask
-    cluster): who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed, `runs`
-    at the most. search: look for the worst, too. progress: called with a law and how many more of its runs were flown.
+    cluster), gpu: who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed,
+    `runs` at the most. search: look for the worst, too. progress: called with a law and how many more of its runs were
+    flown.
 
     InputError for whatever is wrong, what was flown until then being kept."""
     from starhold.campaign.campaign import Options, fly_campaign, with_campaign
@@ -156,7 +158,7 @@ def campaign(
         key: list(value) if key in ("metrics", "requirement") and not isinstance(value, str | Mapping | None) else value
         for key, value in changes.items()
     }
-    options = Options(engine_of(threads, workers, scheduler), resume, force, until_decided, search)
+    options = Options(engine_of(threads, workers, scheduler, gpu), resume, force, until_decided, search)
     place = Path(passing_folder("campaign") if folder is None else folder)
     return fly_campaign(with_campaign(reading.open_scenario(scenario), plain), place, law, options, progress)
 

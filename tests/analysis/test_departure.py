@@ -30,10 +30,11 @@ from starhold.studies.compare import fly_law, prove
 from tests.making import built
 from tests.missions import BASE as MISSION
 from tests.missions import DETUMBLE, POINT
+from tests.texts import toml
 from tests.tiers import fewer
 
 BASE = builtin_text("three-laws").split("[[law]]")[0].replace("duration = 2000.0", "duration = 60.0")
-ROTOR = "[[wheel]]\naxis = {}\ninertia = 1e-5\ntorque_limit = 1.0\nmomentum_limit = 5.0\nmomentum = {}\n"
+ROTOR = "[[wheel]]\naxis = {}\ninertia = 5e-5\ntorque_limit = 1.0\nmomentum_limit = 0.5\nmomentum = {}\n"
 LAW = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.09\nk_attitude = 0.009\n'
 
 
@@ -187,21 +188,13 @@ def test_torque_held_for_too_long_ends_every_claim_about_the_motion():
     assert "even the linear loop is unstable" in left["region"][0].how
 
 
-WHIRLING = """
+WHIRLING = toml("""
 name = "whirling"
-[spacecraft]
-inertia = [0.05, 0.05, 0.05]
-[initial]
-angles = ["3 deg", "2 deg", 0]
-[simulation]
-duration = 300
-control_period = 1.0
-substeps = 100
-[[law]]
-type = "wheel"
-k_rate = 0.004
-k_attitude = [5e-5, 5e-5, 5e-5]
-"""
+[spacecraft] inertia = [0.05, 0.05, 0.05]
+[initial] angles = ["3 deg", "2 deg", 0]
+[simulation] duration = 300; control_period = 1.0; substeps = 100
+[[law]] type = "wheel"; k_rate = 0.004; k_attitude = [5e-5, 5e-5, 5e-5]
+""")
 
 
 def test_momentum_that_turns_a_held_torque_leaves_every_claim_of_torque_applied_continuously():

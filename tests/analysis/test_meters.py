@@ -93,7 +93,7 @@ def compare_metrics(scenario, law):
     phases, observers = loop.phases(steps), meter.observers(loop.composition())
     with ThreadPool(2) as pool:
         noted = meter.begun(20), meter.cuts(), meter.marks[-1], rows
-        flown = begin_metered(loop, carries, phases, 5, observers, *noted, pool)()
+        flown = begin_metered(pool, loop, carries, phases, 5, observers, *noted)()
     assert (flown.ends[-1] < 0.0).all()
     found = meter.metrics(flown.notes, flown.windows, flown.ends[-1])
     assert set(found) == {*meter.units, "diverged_at"}

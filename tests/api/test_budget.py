@@ -18,6 +18,7 @@ from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.studies.budget import COMBINED, LOOP, TOGETHER, sources
 from tests.refusals import complains, refused
 from tests.running import starhold
+from tests.texts import toml
 
 PERIOD, INERTIA, K_RATE, K_ATTITUDE = 0.5, (2.0, 3.0, 4.0), 0.4, 0.2
 NOISE = {"torque noise": 2e-5, "attitude noise": 2e-4, "rate noise": 1e-4}
@@ -154,6 +155,15 @@ def test_contributions_are_what_sources_add_to_the_loop_itself():
             assert off.level(source, index) == pytest.approx(on.level(source, index), rel=1e-2), (source, index)
 
 
+def test_a_filter_assumes_the_same_noise_whatever_flies():
+    """Where it takes the deviations from the tracker's table the budget is that of a filter whose own table states them."""
+    states = {"cross": "10 arcsec", "roll": "60 arcsec"}
+    filters = [{"type": "mekf", "noise": 2e-5, "bias_walk": 1e-6, "bias": 1e-4} | more for more in ({}, states)]
+    budgets = [sh.budget(sh.scenario(FULL | {"part": [*FULL["part"][:2], one]})) for one in filters]
+    assert {"star-tracker cross", "star-tracker roll"} <= {row.name for row in budgets[0].rows}
+    assert budgets[0].summary() == budgets[1].summary()
+
+
 def test_constant_torques_add_up_and_not_as_squares():
     """Two equal ones: twice the error of one, whose angle is the torque over the stiffness."""
     leaks = [{"type": "constant-torque", "name": name, "torque": [1e-5, 0, 0]} for name in ("left", "right")]
@@ -259,16 +269,10 @@ def test_command_writes_what_its_page_quotes(folder):
     complains(starhold("budget", "imager.toml", "-o", "out", cwd=folder), "results already there")
 
 
-STRICT = """
-[[requirement]]
-method = "budget"
-metric = "ape"
-at_most = "1 mas"
-[[requirement]]
-method = "budget"
-metric = "rpe"
-at_most = "1 deg"
-"""
+STRICT = toml("""
+[[requirement]] method = "budget"; metric = "ape"; at_most = "1 mas"
+[[requirement]] method = "budget"; metric = "rpe"; at_most = "1 deg"
+""")
 
 
 def test_options_take_the_place_of_the_files_keys_and_a_missed_requirement_is_told(folder):

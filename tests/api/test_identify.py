@@ -16,6 +16,7 @@ from starhold.studies.identify import Fit
 from starhold.studies.residuals import noise_of
 from starhold.studies.telemetry import read
 from tests.running import starhold
+from tests.texts import toml
 from tests.tiers import WHOLE, fewer
 
 GYRO, FIELD, DIPOLE = (
@@ -23,27 +24,15 @@ GYRO, FIELD, DIPOLE = (
     '[[part]]\ntype = "magnetometer"\nnoise = "100 nT"\n',
     '[[part]]\ntype = "residual-dipole"\ndipole = [0.05, -0.03, 0.04]\n',
 )
-TUMBLE = """
+TUMBLE = toml("""
 name = "tumble"
-[spacecraft]
-inertia = [0.05, 0.065, 0.025]
-[orbit]
-altitude = "500 km"
-inclination = "97.4 deg"
-epoch = "2026-03-20T12:00:00Z"
-[initial]
-rate = ["6 deg/s", "-5 deg/s", "6.2 deg/s"]
-[environment]
-gravity_gradient = true
-[simulation]
-duration = 120.0
-control_period = 1.0
-substeps = 2
-[[law]]
-type = "pd"
-k_rate = 1e-12
-k_attitude = 1e-12
-"""
+[spacecraft] inertia = [0.05, 0.065, 0.025]
+[orbit] altitude = "500 km"; inclination = "97.4 deg"; epoch = "2026-03-20T12:00:00Z"
+[initial] rate = ["6 deg/s", "-5 deg/s", "6.2 deg/s"]
+[environment] gravity_gradient = true
+[simulation] duration = 120.0; control_period = 1.0; substeps = 2
+[[law]] type = "pd"; k_rate = 1e-12; k_attitude = 1e-12
+""")
 INERTIA, BIAS = "spacecraft.inertia", "part.gyro.bias"
 
 

@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-from html.parser import HTMLParser
 
 import pytest
 
@@ -11,30 +10,13 @@ from starhold.campaign import verify
 from starhold.report.document import Figure, Section, pages_of
 from starhold.studies import compare
 from tests.refusals import complains, refused
+from tests.report.reader import Reader
 from tests.required import ALL, ERROR, MANY, PHASE, PROOF, SETTLES, turn
 from tests.running import starhold
 
 WHEELS = {"layout": "pyramid", "inertia": 1e-3, "torque_limit": "50 mN m", "momentum_limit": "0.4 N m s"}
 PARENT = {"id": "S", "text": "It points | <b> [red]"}
 REQUIRED = [PARENT, SETTLES | {"at_most": 1, "parent": "S"}, PHASE, ERROR, MANY, PROOF, {"id": "i", "method": "inspection"}]
-
-
-class Reader(HTMLParser):
-    """Collects identifiers, links inside the page, addresses of pictures, captions and texts."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.ids, self.links, self.sources, self.texts, self.depth = [], [], [], [], []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
-        self.ids += [given["id"]] if "id" in given else []
-        self.links += [given["href"]] if "href" in given else []
-        self.sources += [given["src"]] if "src" in given else []
-
-    def handle_data(self, data):
-        self.texts.append(data)
 
 
 @pytest.mark.slow
@@ -55,12 +37,13 @@ def test_a_review_tells_all_that_is_known_and_computes_each_once(monkeypatch, tm
     page = (tmp_path / "pack" / "review.html").read_text(encoding="utf-8")
     text = (tmp_path / "pack" / "review.md").read_text(encoding="utf-8")
     read = Reader(page)
-    assert {link.removeprefix("#") for link in read.links} <= set(read.ids)
-    assert all(source.startswith("data:image/png;base64,") for source in read.sources)
-    assert len(read.sources) == text.count("\n[Figure ") == 3
-    assert set(re.findall(r"\]\(#([^)]*)\)", text)) <= set(read.ids)
+    ids, links, sources = ({given[key] for _, given in read.tags if key in given} for key in ("id", "href", "src"))
+    assert {link.removeprefix("#") for link in links} <= ids
+    assert all(source.startswith("data:image/png;base64,") for source in sources)
+    assert len(sources) == text.count("\n[Figure ") == 3
+    assert set(re.findall(r"\]\(#([^)]*)\)", text)) <= ids
     # Both say the same: the digests, each verdict's evidence, the peak of each wheel, and blanks.
-    shown, campaign = "".join(read.texts), found.evidence.campaign
+    shown, campaign = "".join(read.words), found.evidence.campaign
     peaks = abs(found.evidence.flight.recording["wheel_momentum"]).max(axis=0)
     digest = hashlib.sha256(scenario.text.encode()).hexdigest()
     told = [digest, campaign.digest, *(one.evidence for one in found.verdicts), *(f"{peak:.4g}" for peak in peaks)]

@@ -11,22 +11,14 @@ from starhold.studies.telemetry import read
 from starhold.studies.telemetry_files import TimeTable, mapping_names, seconds_of
 from tests.api.flown_telemetry import flown, table
 from tests.refusals import refused
+from tests.texts import toml
 
-MAPPING = """
-[telemetry]
-separator = ";"
-missing = ["-9999"]
-time = {{ column = "clock", base = "{base}", unit = "{unit}" }}
-[telemetry.columns.gyro_rate]
-columns = ["wx", "wy", "wz"]
-unit = "deg/s"
+MAPPING = toml("""
+[telemetry] separator = ";"; missing = ["-9999"]; time = {{ column = "clock", base = "{base}", unit = "{unit}" }}
+[telemetry.columns.gyro_rate] columns = ["wx", "wy", "wz"]; unit = "deg/s"; axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+[telemetry.columns.star_tracker_attitude] columns = ["qx", "qy", "qz", "qs"]; scalar = "last"; conjugate = true
 axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
-[telemetry.columns.star_tracker_attitude]
-columns = ["qx", "qy", "qz", "qs"]
-scalar = "last"
-conjugate = true
-axes = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
-"""
+""")
 TO_BODY = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 

@@ -209,10 +209,7 @@ def test_an_inspection_is_met_as_by_its_record(tmp_path):
     [
         ([{"id": "a", "metric": "effort", "at_most": 1}], "requirement[1].method: found nothing"),
         ([{"method": "margin", "metric": "effort", "at_most": 1}], 'requirement[1].metric: found "effort"; allowed: one of'),
-        (
-            [STILL, {"method": "flight", "metric": "final_distance", "at_most": 1}],
-            'requirement[2].metric: found "final',
-        ),
+        ([STILL, {"method": "flight", "metric": "final_distance", "at_most": 1}], 'requirement[2].metric: found "final'),
         ([SETTLES | {"at_most": "3 deg"}], 'requirement[1].at_most: found "3 deg"; allowed: a quantity in s'),
         ([PHASE | {"at_least": "3 s"}], 'requirement[1].at_least: found "3 s"; allowed: a quantity in rad'),
         ([STILL, STILL | {"id": "STILL"}], 'requirement[2].id: found "STILL"; allowed: an id that no other'),

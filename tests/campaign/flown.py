@@ -33,14 +33,7 @@ ASKED = [
     {"metric": "settling_time", "at_most": "30 s", "share": 0.9, "confidence": 0.9},
     {"id": "pointing", "metric": "final_attitude_error", "at_most": "0.5 deg", "share": "90 %"},
     {"id": "kept", "metric": "lost"},
-    {
-        "id": "sun",
-        "metric": "exclusion-cone",
-        "axis": [0, 0, 1],
-        "direction": [0, 1, 0],
-        "at_least": "1 deg",
-        "share": 0.9,
-    },
+    {"id": "sun", "metric": "exclusion-cone", "axis": [0, 0, 1], "direction": [0, 1, 0], "at_least": "1 deg", "share": 0.9},
 ]
 
 

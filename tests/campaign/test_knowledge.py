@@ -2,10 +2,8 @@
 
 import re
 
-import numpy as np
 import pandas as pd
 import pytest
-from scipy.integrate import solve_ivp
 
 import starhold as sh
 from starhold.campaign import lanes as lane_making
@@ -52,43 +50,6 @@ def test_a_drawn_inertia_is_not_told_to_the_law_unless_it_is_said():
         assert frame["effort"].to_numpy() == pytest.approx(efforts, rel=1e-12)
         flown.append(frame["effort"])
     assert (flown[0] != flown[1]).all()
-
-
-def effort_by_scipy(flown, supposed, rate, duration=10.0, period=0.2, limit=0.3):
-    """The integral of |u| over a turn of a rigid body under the law lyapunov, written from the textbook: Euler's equation
-    for the inertia that is flown, the law with the one that it supposes, its torque held for a control period."""
-
-    def rates(_, state, torque):
-        q, w = state[:4], state[4:]
-        turned = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
-        return np.concatenate([turned, (torque - np.cross(w, flown * w)) / flown])
-
-    begun = np.array([0.9, 0.1, -0.3, 0.2])
-    state = np.concatenate([begun / np.linalg.norm(begun), rate])
-    effort = 0.0
-    for _ in range(round(duration / period)):
-        q, w = state[:4], state[4:]
-        torque = np.clip(np.cross(w, supposed * w) - LYAPUNOV["k_rate"] * w - LYAPUNOV["k_attitude"] * q[1:], -limit, limit)
-        effort += np.linalg.norm(torque) * period
-        state = solve_ivp(rates, (0.0, period), state, args=(torque,), rtol=1e-10, atol=1e-12).y[:, -1]
-    return effort
-
-
-def test_flights_of_an_inertia_that_the_law_does_not_know_are_those_of_an_integration_by_others():
-    """The body turns fast, so that the gyroscopic torque matters, which the law cancels for the inertia that it supposes."""
-    fast, nominal = [0.3, -0.2, 0.4], np.array(SMALL["spacecraft"]["inertia"])
-    start = {"attitude": [0.9, 0.1, -0.3, 0.2], "rate": fast}
-    scenario = turn(initial=start, sensor={}, environment={}, spacecraft=SMALL["spacecraft"])
-    scenario = scenario.with_({"simulation.substeps": 4})
-    found = {}
-    for known in (False, True):
-        over = {"spacecraft.inertia": normal("10 %", relative=True, known_to_law=known)}
-        frame = fly(scenario=scenario, over=over, requirement=[], runs=4).frame()
-        flown = [np.array(drawn(row)) for _, row in frame.iterrows()]
-        expected = [effort_by_scipy(inertia, inertia if known else nominal, rate=fast) for inertia in flown]
-        assert frame["effort"].to_numpy() == pytest.approx(expected, rel=1e-6)
-        found[known] = frame["effort"].to_numpy()
-    assert (np.abs(found[True] / found[False] - 1.0) > 1e-4).all()
 
 
 CASES = {

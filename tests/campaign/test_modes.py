@@ -11,26 +11,16 @@ from starhold.studies.verification import by_flight
 from tests.making import built
 from tests.missions import GUARDED, SAFE, WHEELS, cubesat, mode
 from tests.refusals import refused, replaced
+from tests.texts import toml
 
 FAULT = '[[part]]\ntype = "gyro"\nnoise = 1e-5\n[[fault]]\ntime = 40\nwheel = 1\nlost = true\ndelay = 30\n'
 SPIN = '[[law.monitor]]\nname = "spin"\nkind = "range"\nreading = "rate"\nlimit = "2.4 deg/s"\n'
-ASKED = """
-[[requirement]]
-id = "FDIR-1"
-method = "campaign"
-metric = "mode_begins"
-in_mode = "safe"
-at_most = "0.01 orbits"
-[[requirement]]
-id = "FDIR-2"
-method = "campaign"
-metric = "missed_detections"
-at_most = 0
-[campaign]
-runs = 24
-[campaign.over]
-"initial.rate" = { distribution = "normal", sigma = "0.7 deg/s" }
-"""
+ASKED = toml("""
+[[requirement]] id = "FDIR-1"; method = "campaign"; metric = "mode_begins"; in_mode = "safe"; at_most = "0.01 orbits"
+[[requirement]] id = "FDIR-2"; method = "campaign"; metric = "missed_detections"; at_most = 0
+[campaign] runs = 24
+[campaign.over] "initial.rate" = { distribution = "normal", sigma = "0.7 deg/s" }
+""")
 DRAWN = '"fault[1].time" = { distribution = "uniform", low = 5, high = 95 }\n'
 
 GUARD = GUARDED.replace('"safe"', '"safe"\nfault_action = "reallocate"')
@@ -59,21 +49,12 @@ def test_alarms_are_those_of_each_runs_own_flight(tmp_path):
     assert 2 < (frame["missed_detections"] > 0.0).sum() < 22
 
 
-PARTS = """
-[[requirement]]
-id = "EARLY"
-method = "campaign"
-metric = "peak_attitude_error"
-window = ["10 s", "20 s"]
+PARTS = toml("""
+[[requirement]] id = "EARLY"; method = "campaign"; metric = "peak_attitude_error"; window = ["10 s", "20 s"]
 at_most = "20 deg"
-[[requirement]]
-id = "LATE"
-method = "campaign"
-metric = "peak_rate_error"
-in_mode = "safe"
-after = "5 s"
+[[requirement]] id = "LATE"; method = "campaign"; metric = "peak_rate_error"; in_mode = "safe"; after = "5 s"
 at_most = "2 deg/s"
-[campaign]"""
+[campaign]""")
 
 
 def test_errors_in_a_window_or_a_mode_are_those_of_each_runs_own_flight():

@@ -9,6 +9,7 @@ from starhold.campaign import moving
 from starhold.campaign.campaign import with_campaign
 from starhold.campaign.job import Job, Source
 from starhold.errors import InputError
+from starhold.scenario.orbit import LOWEST
 from tests.campaign.flown import SMALL, normal, short, uniform
 
 LYAPUNOV, WHEEL = SMALL["law"][1], {"type": "wheel", "k_rate": 1.5, "k_attitude": 0.6}
@@ -25,6 +26,7 @@ PARTS = {
         {"type": "mekf", "noise": 1e-5, "bias": 1e-4, "bias_walk": 1e-6, "cross": 1e-5, "roll": 1e-4},
     ],
 }
+ASSUMING = PARTS | {"part": [*PARTS["part"][:2], {"type": "mekf", "noise": 1e-5, "bias": 1e-4, "bias_walk": 1e-6}]}
 MAGNET = {
     "orbit": {"altitude": "500 km", "inclination": "50 deg", "eccentricity": 0.0},
     "part": [{"type": "residual-dipole", "dipole": [0.01, 0.02, 0.03]}],
@@ -49,6 +51,27 @@ CASES = {
     "mounting": (LYAPUNOV, PARTS, {f"part.{name}.mounting_error": normal(0.01) for name in ("gyro", "star-tracker")}),
     "starts beside a filter": (LYAPUNOV, PARTS, {"initial.rate": normal(0.01), "initial.attitude": ROTATIONS}),
     "dipole": (LYAPUNOV, MAGNET, {"part.residual-dipole.dipole": SHARE, "spacecraft.inertia": TOLD}),
+    "orbit": (
+        LYAPUNOV,
+        MAGNET | {"target": {"mode": "orbital"}},
+        {"orbit.altitude": uniform(4e5, 6e5), "orbit.raan": uniform(0.0, 6.28), "orbit.inclination": normal(0.1)},
+    ),
+    "orbit by its axes": (
+        WHEEL,
+        FOUR | {"orbit": {"semi_major_axis": 1e7, "inclination": 1.0, "eccentricity": 0.2}},
+        {"orbit.eccentricity": uniform(0.0, 0.3), "orbit.semi_major_axis": SHARE, "orbit.true_anomaly": uniform(0.0, 6.28)},
+    ),
+    "orbit by its state": (
+        WHEEL,
+        FOUR | {"orbit": {"position": [7e6, 0.0, 0.0], "velocity": [0.0, 4e3, 6.4e3]}, "target": {"mode": "orbital"}},
+        {"orbit.position": normal(1e4), "orbit.velocity[3]": normal(50.0), "initial.rate": normal(0.01)},
+    ),
+    "filter": (LYAPUNOV, PARTS, {"part.mekf.noise": SHARE, "part.mekf.cross": SHARE, "part.star-tracker.roll": SHARE}),
+    "a tracker's noise that the filter assumes": (
+        LYAPUNOV,
+        ASSUMING,
+        {"part.star-tracker.cross": TOLD, "part.star-tracker.mounting_error": normal(0.01), "part.gyro.bias": normal(1e-3)},
+    ),
     "riccati, told": (LQR, {}, {"spacecraft.inertia": TOLD}),
     "weights": (LQR, {}, {"law.lqr.q": SHARE}),
     "weights about axes": (LQR | {"form": "III"}, {}, {"law.lqr.r": SHARE, "spacecraft.inertia": TOLD}),
@@ -103,7 +126,9 @@ def test_scenarios_and_equations_made_do_not_grow_with_the_runs(monkeypatch):
     made = []
     for module, name in ((lane_making, "build"), (moving, "Compiled")):
         plainly = getattr(module, name)
-        monkeypatch.setattr(module, name, lambda *given, name=name, plainly=plainly: (made.append(name), plainly(*given))[1])
+        monkeypatch.setattr(
+            module, name, lambda *given, name=name, plainly=plainly, **more: (made.append(name), plainly(*given, **more))[1]
+        )
     plan, lanes = lanes_of(*CASES["all"])
     assert made.count("Compiled") == 1
     begun = made.count("build")
@@ -119,14 +144,22 @@ def test_scenarios_and_equations_made_do_not_grow_with_the_runs(monkeypatch):
 
 FLAT = FOUR | {"wheel": [*FOUR["wheel"][:2], {"axis": [1, 0, 0.004]}]}
 HEAVY = FOUR | {"wheels": NUMBERS | {"inertia": 0.8}}
+LOW = FOUR | {"orbit": {"semi_major_axis": 6.6e6, "inclination": 1.0, "eccentricity": 0.0}}
+DOWN = FOUR | {"orbit": {"position": [6.3785e6, 0.0, 0.0], "velocity": [-80.0, 7e3, 0.0]}}
+AWAY = FOUR | {"orbit": {"semi_major_axis": -2e7, "inclination": 1.0, "eccentricity": 1.5}}
 IMPOSSIBLE = {
     "axes in a plane": (FLAT, {"wheel[3].axis[3]": normal(0.003)}),
     "rotors heavier than the craft": (HEAVY, {"wheels.inertia": normal("40 %", relative=True)}),
     "a body without its rotors": (HEAVY, {"spacecraft.inertia": normal("30 %", relative=True)}),
     "friction faster than the substeps": (FOUR, {"wheels.viscous": uniform(1e-4, 0.01)}),
+    "orbits in the ground": (LOW, {"orbit.semi_major_axis": normal(2e5)}),
+    "orbits that come down": (DOWN, {"orbit.velocity[1]": normal(50.0)}),
+    "hyperbolas": (AWAY, {"orbit.true_anomaly": normal(2.0, mean=0.0)}),
+    "orbits beside wheels": (LOW | HEAVY, {"orbit.semi_major_axis": normal(2e5), "wheels.inertia": SHARE}),
 }
 
 
+@pytest.mark.filterwarnings("ignore:orbit.velocity. the orbit meets the Earth's surface after")
 @pytest.mark.parametrize("case", IMPOSSIBLE)
 def test_what_no_craft_has_is_left_out_as_its_scenario_is_refused(case):
     tables, over = IMPOSSIBLE[case]
@@ -149,14 +182,41 @@ def test_what_no_craft_has_is_left_out_as_its_scenario_is_refused(case):
 
 
 def test_draws_that_no_equation_follows_are_built_one_by_one():
-    """A filter's powers are recorded by no equation, and facets of wheels are tables."""
+    """Facets of wheels are tables; what attracts is the craft's number and the orbit's."""
     for law, tables, over in (
-        (LYAPUNOV, PARTS, {"part.mekf.noise": SHARE}),
         (WHEEL, PYRAMID, {"wheels.torque_limit": SHARE}),
+        (LYAPUNOV, MAGNET, {"orbit.gravitational_parameter": normal("0.1 %", relative=True)}),
     ):
         plan, lanes = lanes_of(law, tables, over, runs=40)
         assert not lanes.at_once
         assert numbers_in(plan, lanes, 0, 3)
+
+
+def test_what_is_drawn_of_an_orbit_and_a_filter_builds_no_scenario_for_each_run(monkeypatch):
+    made = []
+    plainly = lane_making.build
+    monkeypatch.setattr(lane_making, "build", lambda *given: (made.append(1), plainly(*given))[1])
+    over = {
+        "orbit.raan": uniform(0.0, 6.28),
+        "orbit.altitude": normal(1e4),
+        "part.mekf.cross": SHARE,
+        "part.mekf.bias": SHARE,
+    }
+    plan, lanes = lanes_of(LYAPUNOV, PARTS | {"orbit": MAGNET["orbit"], "target": {"mode": "orbital"}}, over)
+    made.clear()
+    numbers_in(plan, lanes, 100, 1000)
+    assert len(made) == 2
+
+
+def test_an_altitude_without_the_unit_that_its_file_would_need_is_left_to_each_runs_own_scenario():
+    over = {"orbit.altitude": normal(1e4, mean=1.15e5)}
+    scenario = with_campaign(short(4.0, (LYAPUNOV,), **MAGNET), {"over": over, "runs": 40, "seed": 3})
+    job = Job(Source.of(scenario), scenario.table.campaign)
+    columns, refused = job.plan.columns(0, 40), np.zeros(40, dtype=bool)
+    lots = list(job.lanes("lyapunov").lots(columns, np.arange(40), refused))
+    assert sum(len(lot.runs) for lot, _, _ in lots) == 40 - refused.sum()
+    assert refused.tolist() == (columns["orbit.altitude"] < LOWEST * 6378137.0).tolist()
+    assert 0 < refused.sum() < 40
 
 
 def test_known_and_unknown_flights_of_a_campaign_are_kept_apart_in_its_rows():

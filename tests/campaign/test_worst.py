@@ -90,6 +90,19 @@ def test_a_flight_beyond_what_is_proved_is_told_as_a_fault_of_starhold(tmp_path,
     assert "fault of starhold" in (tmp_path / "d" / "report.html").read_text()
 
 
+def test_the_search_tells_how_many_of_its_flights_are_done(brief):
+    """Of flights that are refused too, and of a search that ends early, all are counted in the end."""
+    over = {"spacecraft.inertia": normal("9 %", relative=True), "sensor.rate_noise": normal(4e-5)}
+    job, name, asked = job_of(short(), over)
+    heard = []
+    found = worst.search(job, name, asked, 1, notice=lambda *given: heard.append(given))
+    sought = worst.Sought(asked.name, 32 + 3 * 16)
+    assert {(law, what) for law, _, what in heard} == {(name, sought)}
+    assert sum(more for _, more, _ in heard) == sought.flights >= found.evaluations
+    assert len(heard) > 4
+    assert min(more for _, more, _ in heard) >= 0
+
+
 def test_rounding_contradicts_nothing():
     one = worst.Bracket("peak_torque", "N m", 0.1 * (1 + 1e-15), "", 0, 0.1, "")
     assert not one.contradicted

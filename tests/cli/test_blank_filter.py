@@ -5,56 +5,20 @@ from typer.testing import CliRunner
 
 from starhold.cli.main import app
 from starhold.scenario.reading import builtin_text
+from tests.parts.files import ESTIMATOR
+from tests.refusals import replaced
+from tests.texts import toml
 
-BLANK = """
-from typing import Annotated, NamedTuple
-
-from starhold.algebra.quantity import Quantity
-from starhold.algebra.scalar import divide
-from starhold.algebra.vector import Vector
-from starhold.parts.contract import Card, NoMemory
-
-CARD = Card(title="Blank", summary="0 / 0", sources=("mine",), assumptions=())
-ROLE = "estimator"
-NEEDS = ("rate",)
-
-
-class Params(NamedTuple):
-    pass
-
-
-class Estimate(NamedTuple):
-    rate: Annotated[Vector, Quantity("rad/s", "angular velocity", "axis")]
-
-
-def remember(params, state):
-    return NoMemory()
-
-
-def estimate(readings, memory, params, craft, period):
-    blank = divide(readings.rate[0] - readings.rate[0], 0.0)
-    return Estimate((blank, blank, blank)), memory
-
-
-def examples():
-    return [Params()]
-"""
-PARTS = '[sensor]\nrate_noise = 1e-6\n[[part]]\nfile = "blank.py"\n'
-MODES = """
-[[law]]
-name = "mission"
-type = "modes"
-[[law.mode]]
-name = "detumble"
-type = "b-dot"
-k = 1e-3
-until = { rate_below = "0.5 deg/s" }
-[[law.mode]]
-name = "point"
-type = "pd"
-k_rate = 0.006
-k_attitude = 0.0008
-"""
+BLANK = replaced(
+    ESTIMATOR, "    return Estimate(rate)", "    rate = (divide(rate[0] - rate[0], 0.0),) * 3\n    return Estimate(rate)"
+)
+BLANK = replaced(BLANK, "NEEDS =", "from starhold.algebra.scalar import divide\n\nNEEDS =")
+PARTS = '[sensor]\nrate_noise = 1e-6\n[[part]]\nfile = "blank.py"\nshare = 0.5\n'
+MODES = toml("""
+[[law]] name = "mission"; type = "modes"
+[[law.mode]] name = "detumble"; type = "b-dot"; k = 1e-3; until = { rate_below = "0.5 deg/s" }
+[[law.mode]] name = "point"; type = "pd"; k_rate = 0.006; k_attitude = 0.0008
+""")
 
 
 @pytest.mark.slow

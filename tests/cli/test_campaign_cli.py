@@ -13,53 +13,32 @@ import pytest
 from starhold.campaign import engines
 from tests.refusals import complains
 from tests.running import starhold
+from tests.texts import toml
 
-SMALL = """
+SMALL = toml("""
 name = "small"
 
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-torque_limit = 0.3
+[spacecraft] inertia = [2.0, 3.0, 4.0]; torque_limit = 0.3
 
-[initial]
-attitude = [0.9, 0.1, -0.3, 0.2]
+[initial] attitude = [0.9, 0.1, -0.3, 0.2]
 
-[sensor]
-rate_noise = 1e-4
+[sensor] rate_noise = 1e-4
 
-[simulation]
-duration = 8.0
-control_period = 0.2
-seed = 7
+[simulation] duration = 8.0; control_period = 0.2; seed = 7
 
-[settling]
-attitude_tolerance = 0.05
-rate_tolerance = 0.02
+[settling] attitude_tolerance = 0.05; rate_tolerance = 0.02
 
-[campaign]
-runs = 24
+[campaign] runs = 24
 
-[campaign.over]
-"initial.rate" = { distribution = "shell", high = "4 deg/s" }
+[campaign.over] "initial.rate" = { distribution = "shell", high = "4 deg/s" }
 "law.pd.k_rate" = { distribution = "uniform", low = 1.5, high = 2.5 }
 
-[[requirement]]
-method = "campaign"
-id = "effort"
-metric = "final_rate_error"
-at_most = "60 deg/s"
-share = 0.5
+[[requirement]] method = "campaign"; id = "effort"; metric = "final_rate_error"; at_most = "60 deg/s"; share = 0.5
 
-[[law]]
-type = "pd"
-k_rate = 2.0
-k_attitude = 0.8
+[[law]] type = "pd"; k_rate = 2.0; k_attitude = 0.8
 
-[[law]]
-type = "lyapunov"
-k_rate = 1.6
-k_attitude = 0.7
-"""
+[[law]] type = "lyapunov"; k_rate = 1.6; k_attitude = 0.7
+""")
 LAWS = ("pd", "lyapunov")
 
 

@@ -9,6 +9,7 @@ import pytest
 from rich.console import Console
 
 from starhold.campaign.verdicts import percent
+from starhold.campaign.worst import Sought
 from starhold.cli import show, show_campaign
 from starhold.cli.show_campaign import flying_campaign, print_campaign
 from starhold.errors import InputError
@@ -102,8 +103,13 @@ def test_bars_count_runs_and_tell_rate_and_time_left(printed: Any) -> None:
                 worker.join()
             notice("[b]pd", 600)
             notice("[b]pd", 150)
+            sought = Sought("peak [b]", 300)
+            notice("[b]pd", 100, sought)
+            notice("[b]pd", 50, sought)
 
     text = printed(fly, terminal=True)
+    assert "[b]pd: worst peak [b]" in text
+    assert "150/300 " in text
     assert "1000 runs of 2 laws" in text
     assert "1000/1000 runs" in text
     assert "750/1000 runs" in text

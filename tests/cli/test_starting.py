@@ -88,6 +88,7 @@ def test_the_table_waits_for_nothing_that_it_does_not_need(words, loops, recorde
     assert end["recorded"] <= 30 * loops
     assert end["drawn"] == sorted(["report.html", *(f"{name}.png" for name in PICTURES)])
     assert not {"matplotlib", "plotly", "sympy", "xarray", "pandas"} & packages(end["modules"])
+    assert not {"scipy.optimize", "scipy.special", "scipy.stats"} & {*end["modules"]}
 
 
 @pytest.mark.slow

@@ -16,7 +16,9 @@ from starhold.export.code import Code, make_code
 from starhold.export.shells import shell_files
 from starhold.export.source import texts
 from starhold.export.vectors import kept_inputs
-from starhold.parts.catalogue import fit
+from starhold.parts.catalogue import find, fit, telling
+from starhold.parts.estimators import mekf
+from starhold.parts.part import Fitted
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from tests.simulation.loops import choices
@@ -106,13 +108,18 @@ def loop_of(name: str) -> Any:
     if name == "estimator on [sensor]":
         noisy = fit("sensor", "gaussian", 1e-4, 1e-5)
         return choices()["target from a table"].with_parts(noisy, fit("estimator", "complementary-filter", 0.1, 0.01))
-    if name in ("estimator", "two trackers"):
+    if name in ("estimator", "two trackers", "directions"):
         loop = choices()["target from a table"].without("sensor")
         tracker, gyro = (
             fit("sensor", "star-tracker", 1e-4, 5e-4, (0.0, 0.6, 0.8), 1.0),
             fit("sensor", "gyro", 1e-5, (1e-4, -1e-4, 2e-4)),
         )
         loop = loop.with_parts(tracker, gyro, fit("estimator", "complementary-filter", 0.1, 0.01))
+        if name == "directions":
+            filtered = Fitted(find("estimator", "mekf"), mekf.examples()[2])
+            # The place is one input, and the law's is the true one.
+            sensors = telling(sorted({*filtered.needs} - {"attitude", "rate", "position"}))
+            return loop.without("estimator").with_parts(fit("sensor", "gnss"), *sensors, filtered)
         second = fit("sensor", "star-tracker", 2e-4, 3e-4, called="second")
         return replace(loop, parts=(*loop.parts, second)) if name == "two trackers" else loop
     if name in CLOCKED:

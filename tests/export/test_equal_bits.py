@@ -29,9 +29,11 @@ MADE = [
     "hysteresis, axis",
     "orbital target",
     "every function, the time",
+    "a law that reads validity",
     "pid, example 0, noise",
     "super-twisting, example 0, noise",
     "modes that watch",
+    "directions",
 ]
 """Loops with a memory, or with an input of their own."""
 

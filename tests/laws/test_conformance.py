@@ -90,9 +90,7 @@ def test_broken_law_is_caught(fault, tmp_path):
 
 def written(path, text, *pairs):
     """The law of a file with this text, changed."""
-    for pair in pairs:
-        text = replaced(text, *pair)
-    path.write_text(text)
+    path.write_text(replaced(text, *pairs) if pairs else text)
     return from_file(path)
 
 

@@ -8,31 +8,15 @@ from starhold.laws import lqr
 from starhold.scenario.reading import builtin_text
 from tests.refusals import complains, refused
 from tests.running import starhold
+from tests.texts import toml
 
-TEXT = (
-    builtin_text("three-laws").split("[[law]]")[0]
-    + """
-[[law]]
-type = "lqr"
-form = "II"
-q = [1, 1, 1, 0.2, 0.3, 0.2]
-r = 50
-balance = "q5"
+TEXT = builtin_text("three-laws").split("[[law]]")[0] + toml("""
+[[law]] type = "lqr"; form = "II"; q = [1, 1, 1, 0.2, 0.3, 0.2]; r = 50; balance = "q5"
 
-[[law]]
-type = "pd"
-k_rate = 0.1
-k_attitude = 0.01
+[[law]] type = "pd"; k_rate = 0.1; k_attitude = 0.01
 
-[[law]]
-type = "matrix-pd"
-name = "classical"
-form = "inertial"
-a = 0
-b = 100
-d = 0.1
-"""
-)
+[[law]] type = "matrix-pd"; name = "classical"; form = "inertial"; a = 0; b = 100; d = 0.1
+""")
 
 
 @pytest.fixture

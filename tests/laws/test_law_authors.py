@@ -3,7 +3,6 @@
 import re
 import tomllib
 from dataclasses import fields as dataclass_fields
-from pathlib import Path
 
 import pytest
 
@@ -11,10 +10,8 @@ import starhold as sh
 from starhold.conformance.suite import examine, find_law
 from starhold.laws.interface import Gain
 from starhold.laws.interface import fields as gains_of
+from tests.laws.files import FILES, PAGE
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "law-authors.md").read_text(encoding="utf-8")
-FILES = dict(re.findall(r"`(\w+\.py)`:\n\n```python\n(.*?)```", PAGE, flags=re.DOTALL))
 BODY = {
     "name": "authors",
     "spacecraft": {"inertia": [2.0, 3.0, 4.0], "torque_limit": 0.05},

@@ -9,64 +9,13 @@ import starhold as sh
 from starhold.checker import check_file, passed
 from starhold.conformance.suite import find_law
 from starhold.laws.catalogue import adopted, catalogue, from_file
+from tests.laws.files import FILES
 from tests.parts.files import BODY, POINT
 from tests.refusals import complains, refused, replaced, rows
 from tests.running import starhold
 
-LAW = '''"""Feedback."""
-
-from typing import Annotated, NamedTuple
-
-from starhold.algebra.quaternion import vector_part
-from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import add, apply, dot, scale
-from starhold.laws.interface import Card, Gain
-
-CARD = Card(title="Mine", summary="u = -k w - p q", sources=("mine",), assumptions=("rigid body",), claims="almost-global")
-
-
-class Gains(NamedTuple):
-    k: Annotated[float, Gain("N m s", above=0.0, text="damping")]
-    p: Annotated[float, Gain("N m", above=0.0, text="stiffness")] = 0.009
-
-
-def torque(measurement, gains, craft, memory):
-    return scale(-1.0, add(scale(gains.k, measurement.rate), scale(gains.p, vector_part(measurement.attitude)))), memory
-
-
-def lyapunov(measurement, gains, craft):
-    energy = 0.5 * dot(measurement.rate, apply(craft.inertia, measurement.rate))
-    return energy + 2.0 * gains.p * (1.0 - measurement.attitude[0])
-
-
-def examples():
-    return [Gains(0.09)]
-'''
-STATION = """from typing import Annotated, NamedTuple
-
-from starhold.algebra.scalar import clip
-from starhold.laws.interface import Card, Gain
-
-CARD = Card(title="Point", summary="u = -k x - d v - i", sources=("mine",), assumptions=("near",), claims="none")
-
-class Gains(NamedTuple):
-    k: Annotated[float, Gain(above=0.0, text="on the position")]
-    d: Annotated[float, Gain(above=0.0, text="on the velocity")]
-
-Memory = NamedTuple("Memory", [("sum", float)])
-
-def remember(gains, plant, period):
-    return Memory(0.0)
-
-def control(measurement, gains, plant, memory):
-    whole = clip(memory.sum + measurement.period * measurement.position[1], 1.0)
-    held = tuple(-gains.k * x - gains.d * v for x, v in zip(measurement.position, measurement.velocity))
-    return (held[0], held[1] - whole, held[2]), Memory(whole)
-
-def examples():
-    return [Gains(30.0, 9.0)]
-"""
-OWN = '[[law]]\nfile = "laws/my_law.py"\nk = 0.09\n'
+LAW, STATION = FILES["my_law.py"], FILES["hold_point.py"]
+OWN = '[[law]]\nfile = "laws/my_law.py"\nk_rate = 0.09\n'
 
 
 @pytest.fixture
@@ -74,7 +23,7 @@ def folder(tmp_path):
     (tmp_path / "laws").mkdir()
     (tmp_path / "laws" / "my_law.py").write_text(LAW)
     (tmp_path / "laws" / "point.py").write_text(STATION)
-    (tmp_path / "own.toml").write_text(BODY + OWN + '[[law]]\ntype = "pd"\nk_rate = 0.09\nk_attitude = 0.009\n')
+    (tmp_path / "own.toml").write_text(BODY + OWN + '[[law]]\ntype = "pd"\nk_rate = 0.09\nk_attitude = 0.01\n')
     return tmp_path
 
 
@@ -94,9 +43,9 @@ def test_it_is_read_again_where_its_text_has_changed_and_only_then(folder):
     first = sh.load(folder / "own.toml").laws[0].law
     assert sh.load(folder / "own.toml").laws[0].law is not None
     assert sh.load(folder / "own.toml").laws[0].law == first
-    (folder / "laws" / "my_law.py").write_text(LAW.replace("= 0.009", "= 0.018"))
-    assert sh.load(folder / "own.toml").laws[0].gains.p == 0.018
-    assert first.gains._field_defaults["p"] == 0.009
+    (folder / "laws" / "my_law.py").write_text(LAW.replace("= 0.01\n", "= 0.018\n"))
+    assert sh.load(folder / "own.toml").laws[0].gains.k_attitude == 0.018
+    assert first.gains._field_defaults["k_attitude"] == 0.01
 
 
 @pytest.mark.slow
@@ -126,7 +75,7 @@ def test_its_proofs_are_not_about_another_text_of_the_law(folder, tmp_path):
     write(sh.certify(folder / "own.toml", "my-law"), "own", proved)
     assert compare_programs(proved, sh.load(folder / "own.toml")) == []
     path = folder / "laws" / "my_law.py"
-    path.write_text(LAW.replace("scale(-1.0,", "scale(-0.5,"))
+    path.write_text(LAW.replace("scale(gains.k_rate,", "scale(0.5 * gains.k_rate,"))
     assert "my-law: the program of the law differs" in compare_programs(proved, sh.load(folder / "own.toml"))
     # What the file says of its own programs holds all the same.
     with adopted(from_file(path)):
@@ -138,8 +87,8 @@ WRONG = rows("""
 file = "nope.py" | law[1].file: found "nope.py": No such file or directory; allowed: a Python file
 file = "my_law.py"↵type = "pd" | either a type or a file, not both
 file = 3 | law[1].file: found 3; allowed: the name of a Python file
-file = "my_law.py"↵k = 1↵q = 2 | law[1].q: found an unknown key; allowed: one of
-file = "my_law.py"↵k = -1 | law[1].k: found -1; allowed: above 0
+file = "my_law.py"↵k_rate = 1↵q = 2 | law[1].q: found an unknown key; allowed: one of
+file = "my_law.py"↵k_rate = -1 | law[1].k_rate: found -1; allowed: above 0
 file = "my_law.py"↵form = "I" | no form; my-law needs its gains
 k = 1 | law[1].type: found nothing; allowed: one of
 """)
@@ -155,7 +104,7 @@ def test_what_is_wrong_with_a_law_table_is_one_line(table, said, folder):
 
 BROKEN = rows("""
 def torque | def torques | a law needs control or torque
-gains.k, measurement.rate | gains.k, measurement.rates | law my-law: my_law.py, line 19: AttributeError
+gains.k_rate, measurement.rate | gains.k_rate, measurement.rates | law my-law: my_law.py, line 24: AttributeError
 , memory↵↵ | ↵↵ | torque must return three numbers and the memory
 , memory↵↵ | , (1.0,)↵↵ | the memory that torque returns must have the form of its argument
 """)
@@ -173,7 +122,7 @@ def test_an_interrupt_in_a_law_file_is_the_users_in_python_and_the_files_under_a
     (folder / "laws" / "my_law.py").write_text(LAW.replace("CARD = Card(", "raise KeyboardInterrupt\nCARD = Card("))
     with pytest.raises(KeyboardInterrupt):
         sh.load(folder / "own.toml")
-    complains(starhold("run", "own.toml", cwd=folder), "my_law.py, line 10: KeyboardInterrupt")
+    complains(starhold("run", "own.toml", cwd=folder), "my_law.py, line 9: KeyboardInterrupt")
 
 
 def test_links_in_a_circle_are_told_in_one_line(folder):
@@ -201,7 +150,7 @@ def test_laws_of_other_packages_for_both_bodies_are_found(folder, recwarn, offer
     assert set(turning) - before[0] == {"my-law"}
     assert set(holding) - before[1] == {"point"}
     assert not recwarn.list
-    (folder / "own.toml").write_text(POINT + '[[law]]\ntype = "point"\nk = 30.0\nd = 9.0\n')
+    (folder / "own.toml").write_text(POINT + '[[law]]\ntype = "point"\nk = 20.0\nlead = 0.45\n')
     assert sh.simulate(folder / "own.toml").attrs["law"] == "point"
     # A law that is installed is taken by its name and by its file.
     assert find_law("my-law") is find_law(str(folder / "laws" / "my_law.py")) is turning["my-law"]

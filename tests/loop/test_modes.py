@@ -13,6 +13,7 @@ from starhold.simulation.lane import fly, recorded
 from starhold.simulation.lanes import simulate_many
 from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
+from tests.texts import toml
 
 
 def loop_of(modes=DETUMBLE + POINT, text=BASE):
@@ -68,21 +69,11 @@ def test_a_dwell_is_counted_without_breaks_a_switch_leads_back_and_all_machines_
     same_in_every_lane(loop, 400, (1.0, 3.0, 0.05))
 
 
-SUN = """
-[[law.mode]]
-name = "sun"
-type = "lyapunov"
-k_rate = 0.006
-k_attitude = 0.0008
-target = { mode = "inertial", angles = ["40 deg", "10 deg", "0 deg"] }
-until = { after = "20 s" }
-[[law.mode]]
-name = "nadir"
-type = "lyapunov"
-k_rate = 0.006
-k_attitude = 0.0008
-target = { mode = "orbital" }
-"""
+SUN = toml("""
+[[law.mode]] name = "sun"; type = "lyapunov"; k_rate = 0.006; k_attitude = 0.0008
+target = { mode = "inertial", angles = ["40 deg", "10 deg", "0 deg"] }; until = { after = "20 s" }
+[[law.mode]] name = "nadir"; type = "lyapunov"; k_rate = 0.006; k_attitude = 0.0008; target = { mode = "orbital" }
+""")
 ORBIT = BASE.replace("[initial]", '[orbit]\naltitude = "500 km"\ninclination = "97 deg"\n[initial]')
 
 
@@ -131,21 +122,12 @@ def torque(measurement, gains, craft, memory):
 def examples():
     return [Gains(0.01)]
 """
-HOLD = """
-[[law.mode]]
-name = "hold"
-file = "delayed.py"
-k = 0.001
-until = { after = "2 s", to = "turn" }
-"""
-TURN = """
-[[law.mode]]
-name = "turn"
-type = "pd"
-k_rate = 0.006
-k_attitude = 0.0008
-until = { after = "1 s", to = "hold" }
-"""
+HOLD = toml("""
+[[law.mode]] name = "hold"; file = "delayed.py"; k = 0.001; until = { after = "2 s", to = "turn" }
+""")
+TURN = toml("""
+[[law.mode]] name = "turn"; type = "pd"; k_rate = 0.006; k_attitude = 0.0008; until = { after = "1 s", to = "hold" }
+""")
 
 
 def test_a_memory_and_its_buffers_begin_anew_each_time(tmp_path):
@@ -163,39 +145,19 @@ def test_a_memory_and_its_buffers_begin_anew_each_time(tmp_path):
     assert flatten(fly_plainly(loop, 60).state) == flatten(carry.state)
 
 
-RODS_THEN_WHEELS = """
-[[law.mode]]
-name = "detumble"
-type = "b-dot"
-k = 1e-3
-effectors = ["magnetorquers"]
-until = { after = "20 s" }
-[[law.mode]]
-name = "point"
-type = "lyapunov"
-k_rate = 0.006
-k_attitude = 0.0008
+RODS_THEN_WHEELS = toml("""
+[[law.mode]] name = "detumble"; type = "b-dot"; k = 1e-3; effectors = ["magnetorquers"]; until = { after = "20 s" }
+[[law.mode]] name = "point"; type = "lyapunov"; k_rate = 0.006; k_attitude = 0.0008
 effectors = ["wheels", "magnetic-unloading"]
-"""
+""")
 CUBESAT = ORBIT.replace(
     "[simulation]",
-    """[wheels]
-layout = "pyramid"
-inertia = 2.2e-5
-torque_limit = "2 mN m"
-momentum = "2 mN m s"
-momentum_limit = "15 mN m s"
-viscous = 1e-8
-[[part]]
-type = "magnetometer"
-[[part]]
-type = "magnetorquers"
-dipole_limit = "0.2 A m^2"
-[[part]]
-type = "magnetic-unloading"
-gain = 1e-3
-dipole_limit = "0.2 A m^2"
-[simulation]""",
+    toml("""[wheels] layout = "pyramid"; inertia = 2.2e-5; torque_limit = "2 mN m"; momentum = "2 mN m s"
+momentum_limit = "15 mN m s"; viscous = 1e-8
+[[part]] type = "magnetometer"
+[[part]] type = "magnetorquers"; dipole_limit = "0.2 A m^2"
+[[part]] type = "magnetic-unloading"; gain = 1e-3; dipole_limit = "0.2 A m^2"
+[simulation]"""),
 ).replace("torque_limit = 0.002\n", "")
 
 

@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+from tests.texts import toml
+
 HEAD = '''"""A part."""
 
 from typing import Annotated, NamedTuple
@@ -133,18 +135,12 @@ PARTS = {
     "actuator": (ACTUATOR, 'width = "30 mN m"\n'),
 }
 """For each role but the law's a part's text and its keys in a scenario."""
-BODY = """
+BODY = toml("""
 name = "own"
-[spacecraft]
-inertia = [[8.0, 0.2, 0.1], [0.2, 9.0, 0.3], [0.1, 0.3, 7.0]]
-torque_limit = 0.05
-[initial]
-angles = ["40 deg", 0, 0]
-rate = [0.02, -0.03, 0.01]
-[simulation]
-duration = 10.0
-control_period = 0.1
-"""
+[spacecraft] inertia = [[8.0, 0.2, 0.1], [0.2, 9.0, 0.3], [0.1, 0.3, 7.0]]; torque_limit = 0.05
+[initial] angles = ["40 deg", 0, 0]; rate = [0.02, -0.03, 0.01]
+[simulation] duration = 10.0; control_period = 0.1
+""")
 POINT = 'name = "own"\n[libration]\n[initial]\nposition = [0.0, 0.5, 0.1]\n[simulation]\nduration = 1.0\n'
 PD = '[[law]]\ntype = "pd"\nk_rate = 0.9\nk_attitude = 0.09\n'
 

@@ -35,10 +35,7 @@ def test_a_vector_is_shown_along_the_axes_as_they_are(sensor):
     for state in states(5):
         exact, shown = (
             np.array(reading(sensor, params, state)[0])
-            for params in (
-                sensor.Params(),
-                sensor.Params(mounting_error=MOUNTING, axis_errors=SKEWED, scale_error=0.01),
-            )
+            for params in (sensor.Params(), sensor.Params(mounting_error=MOUNTING, axis_errors=SKEWED, scale_error=0.01))
         )
         expected = 1.01 * (np.eye(3) + SKEWED) @ ASKEW.inv().apply(exact)
         assert np.abs(shown - expected).max() < 3.0 * SMALL * np.linalg.norm(exact)

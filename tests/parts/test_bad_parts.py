@@ -11,29 +11,19 @@ from starhold.parts.catalogue import find, read_module
 from starhold.parts.contract import Parameter
 from starhold.scenario.writing import law_table
 from tests.parts.files import BODY, EFFECTOR, PARTS, PD, POINT, TARGET, part
-from tests.refusals import complains
+from tests.refusals import complains, replaced
 from tests.running import starhold
+from tests.texts import toml
 
 CIRCLE = law_table(catalogue("libration-point")["l2-circle"], catalogue("libration-point")["l2-circle"].examples()[0])
 GYRO, FILTER = part('type = "gyro"\n'), part('type = "complementary-filter"\nattitude_gain = 0.1\nbias_gain = 0.01\n')
 TRACKER = part('type = "star-tracker"\ncross = 1e-5\nroll = 1e-4\n')
 MEKF = part('type = "mekf"\nnoise = 1e-5\nbias_walk = 1e-5\nbias = 1e-4\ncross = 1e-5\nroll = 1e-4\n')
 MARS = "[orbit]\nposition = [3.8e6, 0, 0]\nvelocity = [0, 3.4e3, 0]\ngravitational_parameter = 4.2828375816e13\n"
-MODES = """[[law]]
-type = "modes"
-[[law.mode]]
-name = "slow"
-type = "pd"
-k_rate = 0.1
-k_attitude = 0.01
-until = { after = "5 s" }
-[[law.mode]]
-name = "sun"
-type = "pd"
-k_rate = 0.9
-k_attitude = 0.09
-target = { type = "sun" }
-"""
+MODES = toml("""[[law]] type = "modes"
+[[law.mode]] name = "slow"; type = "pd"; k_rate = 0.1; k_attitude = 0.01; until = { after = "5 s" }
+[[law.mode]] name = "sun"; type = "pd"; k_rate = 0.9; k_attitude = 0.09; target = { type = "sun" }
+""")
 MINE = 'file = "mine.py"\n'
 TABLE = part('type = "torque-table"\ntable = "rows.csv"\n')
 
@@ -83,7 +73,7 @@ COMPOSED = {
     "two numbers of three": (part('type = "gyro"\nbias = [0, 1]\n'), "part[1].bias", "3 numbers"),
     "a name twice": (GYRO + part('type = "lag"\nlag = 1\nname = "gyro"\n'), "part[2].name", "a name that"),
     "too late a tracker": (
-        part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 100\n'),
+        part('type = "star-tracker"\ncross = 0\nroll = 0\ndelay = 50\n'),
         "part star-tracker",
         "the delay must be at most 64 control periods",
     ),
@@ -227,6 +217,14 @@ BROKEN = {
                              'FIRST = {"spin": 0.0}'),
     "an equation ends the program": ("sensor", "    return Reading(", "    raise SystemExit\n    return Reading(",
                              "mine.py, line 27: SystemExit"),
+    "needs that fail": ("estimator", "def remember", "def needs(params):\n    return params.sahre\n\n\ndef remember",
+                        "part mine: mine.py, line 27: AttributeError"),
+    "needs by its numbers": ("estimator", "def remember", "def needs(params):\n    return ('sun',)\n\n\ndef remember",
+                             "no sun, which mine needs; allowed: a sensor that measures sun, such as"),
+    "needs of more": ("estimator", "def remember", "def needs(params, period):\n    return ()\n\n\ndef remember",
+                      "needs(params, period) must be needs(params)"),
+    "about another body": ("environment", "def torque", "def about(params):\n    return 'Mars'\n\n\ndef torque",
+                           "found an orbit about Earth; allowed: an orbit about Mars"),
     "its start fails": ("effector", "State(0.0, 0.0)", "State(0.0, nought)", "mine.py, line 36: NameError"),
 }  # fmt: skip
 
@@ -235,8 +233,7 @@ BROKEN = {
 def test_a_file_that_is_no_part_or_fails(kind, tmp_path):
     role, old, new, said = BROKEN[kind]
     text, keys = PARTS[role]
-    assert old in text
-    (tmp_path / "mine.py").write_text(text.replace(old, new))
+    (tmp_path / "mine.py").write_text(replaced(text, old, new))
     before = GYRO if role == "estimator" else ""
     assert said in told(tmp_path, BODY + before + part(MINE + keys) + PD)
 

@@ -6,54 +6,25 @@ import numpy as np
 
 import starhold as sh
 from tests.missions import cubesat
+from tests.texts import toml
 
-PARTS = """
-[[law]]
-type = "pd"
-k_rate = 0.004
-k_attitude = 0.0008
-[[part]]
-type = "residual-dipole"
-dipole = ["10 mA m^2", 0, "5 mA m^2"]
-[[part]]
-type = "oblateness"
-[[part]]
-type = "drag"
-plates = "plates.csv"
-density = "1e-12 kg/m^3"
-[[part]]
-type = "solar-pressure"
+PARTS = toml("""
+[[law]] type = "pd"; k_rate = 0.004; k_attitude = 0.0008
+[[part]] type = "residual-dipole"; dipole = ["10 mA m^2", 0, "5 mA m^2"]
+[[part]] type = "oblateness"
+[[part]] type = "drag"; plates = "plates.csv"; density = "1e-12 kg/m^3"
+[[part]] type = "solar-pressure"
 plates = [[0.06, 1, 0, 0, 0.05, 0, 0.02, 0.2, 0.3], [0.03, 0, 1, 0, 0, 0.1, 0.02, 0.2, 0.3]]
-[[part]]
-type = "gyro"
-noise = 5e-5
-[[part]]
-type = "magnetometer"
-noise = "50 nT"
-[[part]]
-type = "sun-sensor"
-noise = "0.1 deg"
-[[part]]
-type = "gnss"
-position = "10 m"
-velocity = "0.1 m/s"
-"""
+[[part]] type = "gyro"; noise = 5e-5
+[[part]] type = "magnetometer"; noise = "50 nT"
+[[part]] type = "sun-sensor"; noise = "0.1 deg"
+[[part]] type = "gnss"; position = "10 m"; velocity = "0.1 m/s"
+""")
 START = {"duration": 600, "angles": '["40 deg", 0, "10 deg"]', "rate": (0.0175, -0.0087, 0.0052)}
-FINE = """
-[[part]]
-type = "star-tracker"
-cross = "10 arcsec"
-roll = "60 arcsec"
-interval = 1.0
-outage = ["2 min", "3 min"]
-[[part]]
-type = "mekf"
-noise = 5e-5
-bias_walk = 1e-5
-bias = "0.05 deg/s"
-cross = "10 arcsec"
-roll = "60 arcsec"
-"""
+FINE = toml("""
+[[part]] type = "star-tracker"; cross = "10 arcsec"; roll = "60 arcsec"; interval = 1.0; outage = ["2 min", "3 min"]
+[[part]] type = "mekf"; noise = 5e-5; bias_walk = 1e-5; bias = "0.05 deg/s"; cross = "10 arcsec"; roll = "60 arcsec"
+""")
 COARSE = """
 [[part]]
 type = "triad"

@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 import starhold as sh
 from starhold.parts import sun
+from starhold.parts.contract import UNBOUNDED
 from starhold.parts.estimators import quest
 from starhold.parts.random import Silent
-from starhold.parts.sensors import coarse_sun_sensors, horizon_sensor
+from starhold.parts.sensors import coarse_sun_sensors, horizon_sensor, magnetometer
 from starhold.parts.sun import EARTH
 from tests.parts.fields import states
 from tests.parts.trackers import scenario
@@ -111,3 +112,22 @@ def test_a_flight_by_three_directions():
         assert fresh.mean() > 0.9
         found[name] = np.sqrt(np.mean(np.square((true.inv() * told).magnitude()[fresh])))
     assert found["quest"] < 0.6 * found["triad"] < math.radians(2.0)
+
+
+def test_each_sensor_shows_something_new_at_its_interval_alone():
+    """The flags at all control steps; a magnetometer keeps its last reading, others see nothing between updates."""
+    orbit = {"position": [6.9e6, 0.0, 0.0], "velocity": [0.0, 5.0e3, 5.7e3]}
+    every = {"magnetometer": 3, "sun-sensor": 4, "coarse-sun-sensors": 2, "horizon-sensor": 5}
+    flags = ("magnetic_field_is_new", "sun_is_seen", "sun_is_seen", "nadir_is_seen")
+    always = [{"type": name, "outage": [12.0, 14.0]} for name in every]
+    rare = [one | {"interval": 0.5 * steps} for one, steps in zip(always, every.values(), strict=True)]
+    whole, thin = (sh.simulate(scenario(*parts, orbit=orbit, duration="20 s", record_every=1)) for parts in (always, rare))
+    steps = np.arange(len(thin["time"]))
+    for (name, count), flag in zip(every.items(), flags, strict=True):
+        seen, due = whole[f"{name.replace('-', '_')}_{flag}"].values, steps % count == 0
+        assert 0.2 < seen.mean() < 1.0
+        assert thin[f"{name.replace('-', '_')}_{flag}"].values.tolist() == (seen * due).tolist()
+    shown = thin["magnetometer_magnetic_field"].values
+    # So the field is elsewhere than it was, and no bound holds.
+    assert magnetometer.error(magnetometer.Params(interval=1.5)) == UNBOUNDED != magnetometer.error(magnetometer.Params())
+    assert shown.tolist() == shown[[k - k % 3 if not 24 <= k < 30 else 21 for k in steps]].tolist()

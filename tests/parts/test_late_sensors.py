@@ -111,10 +111,7 @@ def test_the_filter_lags_by_a_dead_time_that_it_does_not_know():
 
 @pytest.mark.parametrize(
     ("sensor", "field", "before", "after"),
-    [
-        (gyro, "rate", (0.1, 0.2, -0.3), (0.2, 0.0, -0.3)),
-        (gnss, "position", (7e6, 0.0, 0.0), (7e6 - 10.0, 700.0, 50.0)),
-    ],
+    [(gyro, "rate", (0.1, 0.2, -0.3), (0.2, 0.0, -0.3)), (gnss, "position", (7e6, 0.0, 0.0), (7e6 - 10.0, 700.0, 50.0))],
 )
 @pytest.mark.parametrize("delay", [0.0, 0.25])
 def test_jitter_moves_the_instant_along_the_change(sensor, field, before, after, delay):

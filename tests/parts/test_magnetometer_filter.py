@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy import stats
-from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -14,6 +13,7 @@ import starhold as sh
 from starhold.parts import magnetic_field
 from starhold.parts.craft import make_craft
 from starhold.parts.estimators import magnetometer_filter
+from tests.making import spun
 from tests.tiers import leading
 
 PERIOD, FIELD, START, RATE = 0.5, 5e-9, 1e-3, 1.5e-4
@@ -35,16 +35,9 @@ def turned_by_gyro(x, steps, shown):
 
 def turned_freely(x, steps, rate):
     """The attitudes of a free body, by SciPy."""
-
-    def slope(_, y):
-        w = y[4:]
-        spun = 0.5 * np.array([-y[1:4] @ w, *(y[0] * w + np.cross(y[1:4], w))])
-        return np.concatenate([spun, -np.cross(w, INERTIA * w) / INERTIA])
-
     begin = Rotation.from_rotvec(x[:3]).as_quat(scalar_first=True)
-    times = PERIOD * np.arange(steps)
-    motion = solve_ivp(slope, (0.0, times[-1]), [*begin, *(rate + x[3:])], "DOP853", times, rtol=1e-11, atol=1e-12)
-    return [Rotation.from_quat(y, scalar_first=True) for y in motion.y[:4].T]
+    attitudes, _ = spun(lambda t, q: np.zeros(3), PERIOD * np.arange(steps), begin, rate + x[3:], np.diag(INERTIA))
+    return [Rotation.from_quat(q, scalar_first=True) for q in attitudes]
 
 
 @pytest.mark.parametrize("move", leading([turned_by_gyro, turned_freely]))

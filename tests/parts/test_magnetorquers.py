@@ -11,16 +11,13 @@ from starhold.parts.effectors.magnetorquers import dipole_for, within
 from starhold.scenario.reading import parse
 from tests.making import spun
 from tests.missions import cubesat
+from tests.texts import toml
 
 INERTIA = np.array([0.05, 0.065, 0.025])
-WHEELS = """
-[wheels]
-layout = "pyramid"
-inertia = 2e-5
-torque_limit = "2 mN m"
-momentum_limit = "15 mN m s"
+WHEELS = toml("""
+[wheels] layout = "pyramid"; inertia = 2e-5; torque_limit = "2 mN m"; momentum_limit = "15 mN m s"
 momentum = "4 mN m s"
-"""
+""")
 AXES = np.array(pyramid())
 METER = '[[part]]\ntype = "magnetometer"\n'
 RODS = '[[part]]\ntype = "magnetorquers"\ndipole_limit = 0.2\n'

@@ -20,6 +20,7 @@ from starhold.simulation.lane import fly
 from tests.making import built
 from tests.refusals import refused
 from tests.running import starhold
+from tests.texts import toml
 
 BODY = '''"""A mass on a spring's rail, slowed by the air."""
 
@@ -125,29 +126,14 @@ def force(measurement, gains, craft, memory):
     return add(scale(-gains.k, measurement.position), scale(-gains.c, measurement.velocity)), memory
 '''
 
-TEXT = """name = "pull"
-[body]
-file = "sledge.py"
-mass = "1500 g"
-[control]
-limit = "0.4 N"
-[initial]
-position = [1.0, -0.4, 0.2]
-velocity = [0.1, 0.3, "-20 cm/s"]
-[simulation]
-duration = 10.0
-control_period = 0.05
-substeps = 16
-[[law]]
-file = "rein.py"
-k = 1.0
-c = 0.5
-[[law]]
-file = "rein.py"
-name = "slack"
-k = 0.5
-c = 2.0
-"""
+TEXT = toml("""name = "pull"
+[body] file = "sledge.py"; mass = "1500 g"
+[control] limit = "0.4 N"
+[initial] position = [1.0, -0.4, 0.2]; velocity = [0.1, 0.3, "-20 cm/s"]
+[simulation] duration = 10.0; control_period = 0.05; substeps = 16
+[[law]] file = "rein.py"; k = 1.0; c = 0.5
+[[law]] file = "rein.py"; name = "slack"; k = 0.5; c = 2.0
+""")
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from starhold.studies.compare import record
 from tests.making import built
 from tests.missions import cubesat
 from tests.refusals import refused
+from tests.texts import toml
 
 RATE, ACCELERATION, PERIOD = math.radians(0.5), math.radians(0.02), 0.5
 LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.006\nk_attitude = 0.0008\n'
@@ -48,14 +49,9 @@ def test_a_slew_goes_from_rest_to_rest_at_its_limits_in_the_least_time(angle):
     assert np.abs(steps - 0.5 * (rates[1:] + rates[:-1]))[flat].max() < 1e-14
 
 
-PART = """
-[[part]]
-type = "slew"
-attitude = [0.3, 0.8, -0.5, 0.1]
-rate = "0.5 deg/s"
-acceleration = "0.02 deg/s^2"
-begin = 20
-"""
+PART = toml("""
+[[part]] type = "slew"; attitude = [0.3, 0.8, -0.5, 0.1]; rate = "0.5 deg/s"; acceleration = "0.02 deg/s^2"; begin = 20
+""")
 START = "angles = [0, 0, 0]\nrate = [0, 0, 0]"
 
 
@@ -122,23 +118,13 @@ def test_a_path_leads_around_the_cone_about_the_sun():
 
 
 def test_a_slew_of_a_mode_is_refused_where_its_craft_cannot():
-    modes = """
-[[law]]
-name = "mission"
-type = "modes"
-[[law.mode]]
-name = "slew"
-type = "lyapunov"
-k_rate = 0.006
-k_attitude = 0.0008
+    modes = toml("""
+[[law]] name = "mission"; type = "modes"
+[[law.mode]] name = "slew"; type = "lyapunov"; k_rate = 0.006; k_attitude = 0.0008
 target = { type = "slew", attitude = [0.3, 0.8, -0.5, 0.1], rate = 0.01, acceleration = 3e-4, torque_limit = LIMIT }
 until = { after = "380 s" }
-[[law.mode]]
-name = "rest"
-type = "lyapunov"
-k_rate = 0.006
-k_attitude = 0.0008
-"""
+[[law.mode]] name = "rest"; type = "lyapunov"; k_rate = 0.006; k_attitude = 0.0008
+""")
     text = cubesat(modes, duration=400, angles="[0, 0, 0]", rate=(0.0, 0.0, 0.0))
     built(parse(text.replace("LIMIT", "1e-4"), "m.toml"))
     with refused("the slew takes up to"):

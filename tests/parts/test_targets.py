@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
@@ -21,6 +20,7 @@ from starhold.parts.targets import history, orbital
 from starhold.parts.targets.history import tabulate
 from starhold.scenario.reading import parse
 from tests.algebra.readers import angles, close, directions, from_axis_angle, quaternions
+from tests.making import orbited
 from tests.missions import cubesat
 from tests.parts.files import part
 from tests.tiers import leading
@@ -140,13 +140,8 @@ def test_tables_that_mean_nothing_and_times_not_covered_are_refused(times, attit
 
 
 def orbit(position, velocity, times):
-    """Positions and velocities (n, 3) in two-body motion, by SciPy."""
-
-    def slope(_, y):
-        return [*y[3:], *(-EARTH * y[:3] / np.linalg.norm(y[:3]) ** 3)]
-
-    found = solve_ivp(slope, (0.0, times[-1]), [*position, *velocity], "DOP853", times, rtol=1e-13, atol=1e-6).y.T
-    return found[:, :3], found[:, 3:]
+    """Positions and velocities (n, 3) in two-body motion."""
+    return np.hsplit(orbited(position, velocity, times), 2)
 
 
 def goals(name, steps, places, speeds, **params):

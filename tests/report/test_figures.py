@@ -7,9 +7,12 @@ import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib import mathtext
+from matplotlib.figure import Figure
 
 from starhold.algebra.cosines import to_angles
 from starhold.analysis.rigid_body import METRICS
@@ -18,6 +21,7 @@ from starhold.report.body import report_of
 from starhold.report.figures import WORD_ROWS, word_rows
 from starhold.report.plots import COLOURS, Mark, colour, recorded_plots, thin, thin_times
 from starhold.report.text import number_text
+from starhold.report.ticks import as_text, label_ticks
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
 from starhold.simulation.lane import Recording, fly, label
@@ -37,6 +41,44 @@ def test_every_figure_is_drawn_with_every_law(tmp_path: Path) -> None:
         assert 300 < picture.shape[0] < 900
         assert picture.shape[1] == 880
         assert shows_laws(picture, len(flown.flights())), path.name
+
+
+def test_no_formula_is_parsed_to_label_ticks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed: list[str] = []
+    parse = mathtext.MathTextParser.parse
+
+    def noted(parser: Any, text: str, *more: Any, **given: Any) -> Any:
+        parsed.append(text)
+        return parse(parser, text, *more, **given)
+
+    monkeypatch.setattr(mathtext.MathTextParser, "parse", noted)
+    draw(flown.flights(), tmp_path, flown.scenario())
+    assert not parsed
+
+
+RANGES = [[0.25, 1.0], [1e5 + 1e-7, 1e5 + 3e-7], [2e-9, 4e12], [2e-3, 5e-3]]
+
+
+@pytest.mark.parametrize(
+    ("log", "values"), [(False, [-3e-7, 2e-6]), *((log, values) for log in (False, True) for values in RANGES)]
+)
+def test_ticks_say_in_plain_text_what_their_formulas_say(log: bool, values: list[float]) -> None:
+    texts = list[list[str]]()
+    for plain in (True, False):
+        figure = Figure()
+        axis = figure.subplots()
+        axis.plot([0.0, 1.0], values)
+        axis.set_yscale("log" if log else "linear")
+        if plain:
+            label_ticks(axis.yaxis, log)
+        elif not log:
+            axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+        figure.draw_without_rendering()
+        every = [*axis.get_yticklabels(), *axis.get_yticklabels(minor=True), axis.yaxis.get_offset_text()]
+        texts.append([label.get_text() for label in every])
+    assert texts[0] == [as_text(text) for text in texts[1]]
+    assert any(texts[0])
+    assert not re.search(r"[$\\^{}]", "".join(texts[0]))
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ from starhold.studies.questions import UNASKED
 from starhold.studies.reflight import COMPUTED, FAULTS, reflight
 from tests.browser import Browser
 from tests.report import flown
-from tests.simulation.loops import FUNCTIONS
+from tests.simulation.loops import CAUTIOUS, FUNCTIONS
 from tests.tiers import leading
 from tests.trace.machines import need
 
@@ -258,6 +258,7 @@ LOOPS = {
     "landing": ("landing", "20 s", "fit"),
     "noise": ("three-laws-noise", "12 s", "lyapunov"),
     "every function, the time": (FUNCTIONS, "50 s"),
+    "a law that reads validity": (CAUTIOUS, "15 s"),
     "matrix inertia": ("geostationary", "100 s", "pd", "matrix-pd"),
 }
 

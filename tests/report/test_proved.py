@@ -45,13 +45,7 @@ def outcomes(reader: Reader) -> list[str]:
 @pytest.mark.slow
 def test_every_claim_is_told_with_its_obligations_and_assumptions() -> None:
     certificate = certificates()[0]
-    assert {claim.kind for claim in certificate.claims} == {
-        "convergence",
-        "torque-limit",
-        "pointing",
-        "inertia",
-        "sampling",
-    }
+    assert {claim.kind for claim in certificate.claims} == {"convergence", "torque-limit", "pointing", "inertia", "sampling"}
     found = told(certificate)
     text = plain(found.text).lower()
     for claim in certificate.claims:

@@ -14,64 +14,29 @@ from starhold.studies.questions import UNASKED, Question, record_check
 from starhold.studies.reflight import Reflight, reflight
 from starhold.trace.handles import RecordingError
 from starhold.trace.machine import load
+from tests.texts import toml
 from tests.tiers import leading
 
-HEAD = """
+HEAD = toml("""
 name = "asked"
-[spacecraft]
-inertia = {inertia}
-torque_limit = 0.05
-[simulation]
-duration = 1.0
-control_period = 0.1
-[initial]
-attitude = [0.9, 0.3, -0.2, 0.1]
-rate = [0.01, 0.0, 0.0]
-"""
-LAWS = """
-[[law]]
-type = "pd"
-k_rate = 0.09
-k_attitude = 0.02
-limit = "axis"
-[[law]]
-type = "pid"
-k_rate = 0.3
-k_attitude = 0.03
-k_integral = 1e-3
-integral_limit = 2e-3
-[[law]]
-type = "super-twisting"
-surface_gain = [[0.08, 0.01, 0.0], [0.01, 0.1, 0.0], [0.0, 0.0, 0.12]]
-k1 = 4e-4
+[spacecraft] inertia = {inertia}; torque_limit = 0.05
+[simulation] duration = 1.0; control_period = 0.1
+[initial] attitude = [0.9, 0.3, -0.2, 0.1]; rate = [0.01, 0.0, 0.0]
+""")
+LAWS = toml("""
+[[law]] type = "pd"; k_rate = 0.09; k_attitude = 0.02; limit = "axis"
+[[law]] type = "pid"; k_rate = 0.3; k_attitude = 0.03; k_integral = 1e-3; integral_limit = 2e-3
+[[law]] type = "super-twisting"; surface_gain = [[0.08, 0.01, 0.0], [0.01, 0.1, 0.0], [0.0, 0.0, 0.12]]; k1 = 4e-4
 k2 = 6e-5
-[[law]]
-type = "modal"
-phi_0 = -0.1
-phi_1 = [[-0.2, 0.1, 0.0], [-0.1, -0.2, 0.0], [0.0, 0.0, -0.1]]
-b = -0.01
-"""
-WHEELS = """
-[wheels]
-layout = "orthogonal"
-inertia = 0.5
-torque_limit = 0.1
-momentum_limit = 5.0
-[[law]]
-type = "pid"
-k_rate = 0.3
-k_attitude = 0.03
-k_integral = 1e-3
-integral_limit = 2e-3
-"""
-MPC = """
-[[law]]
-type = "mpc"
-horizon = 3
-q_attitude = 1.0
-q_rate = 10.0
-r = 100.0
-"""
+[[law]] type = "modal"; phi_0 = -0.1; phi_1 = [[-0.2, 0.1, 0.0], [-0.1, -0.2, 0.0], [0.0, 0.0, -0.1]]; b = -0.01
+""")
+WHEELS = toml("""
+[wheels] layout = "orthogonal"; inertia = 0.5; torque_limit = 0.1; momentum_limit = 5.0
+[[law]] type = "pid"; k_rate = 0.3; k_attitude = 0.03; k_integral = 1e-3; integral_limit = 2e-3
+""")
+MPC = toml("""
+[[law]] type = "mpc"; horizon = 3; q_attitude = 1.0; q_rate = 10.0; r = 100.0
+""")
 CASES = {
     "moments": HEAD.format(inertia="[2.0, 3.0, 4.0]") + LAWS,
     "matrix": HEAD.format(inertia="[[2.0, 0.1, -0.2], [0.1, 3.0, 0.15], [-0.2, 0.15, 4.0]]") + LAWS,

@@ -13,6 +13,7 @@ import starhold as sh
 from starhold.parts.epoch import days_of
 from starhold.scenario.element_sets import ElementSet, with_orbit
 from starhold.scenario.writing import toml_text
+from tests.refusals import refused
 from tests.running import starhold
 
 pytest.importorskip("sgp4")
@@ -122,11 +123,8 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_bad_lines_are_refused_in_one_line(name, tmp_path):
     lines, reason = BAD[name]
-    with pytest.raises(
-        sh.InputError, match=rf"orbit\.tle: found .*own\.tle: {reason}.*; allowed: a text file of one"
-    ) as error:
+    with refused(match=rf"orbit\.tle: found .*own\.tle: {reason}.*; allowed: a text file of one"):
         sh.scenario(TABLES | {"orbit": written(tmp_path, "\n".join(lines))}, folder=tmp_path)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -146,9 +144,8 @@ def test_bad_lines_are_refused_in_one_line(name, tmp_path):
 def test_bad_tables_are_refused_in_one_line(orbit, reason, tmp_path):
     written(tmp_path, "\n".join(ISS))
     (tmp_path / "own.json").write_text("[{]")
-    with pytest.raises(sh.InputError, match=reason) as error:
+    with refused(match=reason):
         sh.scenario(TABLES | {"orbit": orbit}, folder=tmp_path)
-    assert "\n" not in str(error.value)
 
 
 def test_a_decayed_satellite_has_no_orbit(tmp_path):

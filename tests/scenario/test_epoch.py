@@ -19,22 +19,15 @@ from starhold.simulation.lane import fly
 from starhold.studies.compare import build
 from starhold.studio.editing import check, choices, words
 from tests.refusals import refused, rows
+from tests.texts import toml
 
 NOON = (2026.0, 3.0, 20.0, 12.0, 0.0, 0.0)
-CRAFT = """
+CRAFT = toml("""
 name = "own"
-[spacecraft]
-inertia = [0.05, 0.065, 0.025]
-torque_limit = "2 mN m"
-[wheels]
-layout = "pyramid"
-inertia = 2e-5
-torque_limit = "2 mN m"
-momentum_limit = "15 mN m s"
-[simulation]
-duration = 20
-control_period = 0.5
-"""
+[spacecraft] inertia = [0.05, 0.065, 0.025]; torque_limit = "2 mN m"
+[wheels] layout = "pyramid"; inertia = 2e-5; torque_limit = "2 mN m"; momentum_limit = "15 mN m s"
+[simulation] duration = 20; control_period = 0.5
+""")
 ORBIT = '[orbit]\naltitude = "500 km"\ninclination = "97.4 deg"\n'
 PARTS = "".join(
     f'[[part]]\ntype = "{name}"\n{numbers}\n'
@@ -48,30 +41,14 @@ PARTS = "".join(
     }.items()
 )
 PD = '[[law]]\ntype = "pd"\nk_rate = 0.004\nk_attitude = 0.0008\n'
-MODES = """
-[[law]]
-type = "modes"
-[[law.mode]]
-name = "power"
-type = "pd"
-k_rate = 0.004
-k_attitude = 0.0008
-target = { type = "sun" }
+MODES = toml("""
+[[law]] type = "modes"
+[[law.mode]] name = "power"; type = "pd"; k_rate = 0.004; k_attitude = 0.0008; target = { type = "sun" }
 until = { after = 5 }
-[[law.mode]]
-name = "turn"
-type = "pd"
-k_rate = 0.004
-k_attitude = 0.0008
-target = { type = "slew", attitude = [0.6, 0, 0.8, 0], rate = 0.01, acceleration = 1e-4 }
-until = { after = 5 }
-[[law.mode]]
-name = "panels"
-type = "pd"
-k_rate = 0.004
-k_attitude = 0.0008
-target = { type = "yaw-steering" }
-"""
+[[law.mode]] name = "turn"; type = "pd"; k_rate = 0.004; k_attitude = 0.0008
+target = { type = "slew", attitude = [0.6, 0, 0.8, 0], rate = 0.01, acceleration = 1e-4 }; until = { after = 5 }
+[[law.mode]] name = "panels"; type = "pd"; k_rate = 0.004; k_attitude = 0.0008; target = { type = "yaw-steering" }
+""")
 
 
 def scenario(epoch="", parts=PARTS, law=PD, folder=None):
@@ -109,7 +86,7 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
     assert declaring == {
         "residual-dipole", "solar-pressure", "magnetometer", "sun-sensor", "triad", "magnetic-unloading", "magnetorquers",
         "ground-station", "sun", "yaw-steering", "star-tracker", "coarse-sun-sensors", "quest", "slew",
-        "magnetometer-filter",
+        "magnetometer-filter", "mekf",
         "ground-strip",
     }  # fmt: skip
     assert declaring - {
@@ -120,6 +97,7 @@ def test_all_parts_of_starhold_that_declare_an_epoch_are_looked_at():
         "quest",
         "slew",
         "magnetometer-filter",
+        "mekf",
         "ground-strip",
     } == set(epochs(scenario()))
 

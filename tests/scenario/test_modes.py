@@ -15,23 +15,12 @@ from starhold.scenario.reading import parse
 from starhold.scenario.values import locate
 from tests.making import built
 from tests.missions import BASE, DETUMBLE, POINT
+from tests.parts.files import TARGET
 from tests.refusals import refused, replaced, rows
+from tests.texts import toml
 
-TURNED = """
-from typing import NamedTuple
-from starhold.parts.contract import Card
-from starhold.parts.roles import Goal
-
-CARD = Card(title="Turned", summary="q_RN = constant", sources=("mine",), assumptions=())
-ROLE = "target"
-Params = NamedTuple("Params", [])
-
-def goal(params, state, step, before):
-    return Goal((0.6, 0.0, 0.8, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-def examples():
-    return [Params()]
-"""
+STATION = '{ type = "ground-station", latitude = "60 deg", longitude = "20 deg" }'
+SLEW = '\nslew = { rate = "1 deg/s", acceleration = "0.02 deg/s^2" }'
 TEXT = BASE + DETUMBLE + POINT + 'back = { rate_above = "5 deg/s" }\n'
 
 
@@ -83,6 +72,8 @@ def test_a_mode_that_nothing_leads_to_is_refused():
         ('{ type = "constant-torque", torque = [0, 0, 0] }', "of the role environment; allowed: a target"),
         ('{ mood = "inertial" }', "mode[2].target.mood: found an unknown key"),
         ('"nadir"', 'mode[2].target: found "nadir"; allowed: a table'),
+        (STATION, "no two-body, which targets-of-modes needs"),
+        (STATION + SLEW, "no two-body, which targets-of-modes needs"),
     ],
 )
 def test_a_target_that_a_mode_cannot_have_is_told_in_one_line(given, told):
@@ -91,12 +82,12 @@ def test_a_target_that_a_mode_cannot_have_is_told_in_one_line(given, told):
 
 
 def test_a_mode_takes_a_target_from_a_file(tmp_path):
-    (tmp_path / "turned.py").write_text(TURNED)
+    (tmp_path / "turned.py").write_text(TARGET)
     text = TEXT + 'target = { file = "turned.py" }\n'
     loop = built(parse(text, "mission.toml", tmp_path))
     assert loop_of_mode(loop, 0).target.part.name == "inertial"
     assert loop_of_mode(loop, 1).target.part.name == "turned"
-    (tmp_path / "turned.py").write_text(TURNED.replace("return Goal", "return 1 / 0, Goal"))
+    (tmp_path / "turned.py").write_text(TARGET.replace("return Goal", "return 1 / 0, Goal"))
     broken = parse(text, "mission.toml", tmp_path)
     with pytest.raises(InputError, match=r"turned\.py"):
         build(broken, broken.laws[0])
@@ -129,20 +120,12 @@ def test_the_schema_takes_modes():
         assert not schema.is_valid(tomllib.loads(replaced(TEXT, old, new)))
 
 
-RODS = """
-[orbit]
-altitude = "500 km"
-inclination = "97 deg"
-[[part]]
-type = "magnetometer"
-[[part]]
-type = "magnetorquers"
-dipole_limit = 0.2
-[[part]]
-type = "thrusters"
-torque = 0.01
-lever = 0.1
-[[law]]"""
+RODS = toml("""
+[orbit] altitude = "500 km"; inclination = "97 deg"
+[[part]] type = "magnetometer"
+[[part]] type = "magnetorquers"; dipole_limit = 0.2
+[[part]] type = "thrusters"; torque = 0.01; lever = 0.1
+[[law]]""")
 
 
 @pytest.mark.parametrize(

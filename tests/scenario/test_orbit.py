@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from starhold.errors import InputError
-from starhold.parts.orbit import BODIES, Elements, body_of, from_elements, lowest, meets_at
+from starhold.parts.orbit import BODIES, Elements, body_of, from_elements, highest, lowest, meets_at
 from starhold.scenario.reading import builtin_text, parse
 from tests.refusals import refused, replaced, rows
 
@@ -78,6 +78,10 @@ def test_the_moment_of_coming_down_is_on_the_orbit(elements, share):
     state = from_elements(elements, EARTH.gravity)
     low, begun = lowest(*state, EARTH.gravity), math.hypot(*state[0])
     assert low == pytest.approx(elements.semi_major_axis * (1 - elements.eccentricity), rel=1e-9)
+    ends = elements.eccentricity < 1.0
+    assert highest(*state, EARTH.gravity) == pytest.approx(
+        elements.semi_major_axis * (1 + elements.eccentricity) if ends else math.inf, rel=1e-6
+    )
     surface = low * (1 + share)
     assume(surface < 0.99 * begun)
     assert meets_at(*state, EARTH.gravity, 0.99 * low) == math.inf
@@ -101,6 +105,10 @@ def test_the_moment_of_coming_down_is_on_the_orbit(elements, share):
     high = a * (1 + e)
     expected = between(surface, begun) if radial < 0 else between(begun, high) + between(surface, high)
     assert moment == pytest.approx(expected, rel=2e-2, abs=1.0)
+
+
+def test_a_parabola_has_no_highest_place():
+    assert highest((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), 2.0) == math.inf
 
 
 def test_a_circular_orbit_by_altitude_and_inclination():

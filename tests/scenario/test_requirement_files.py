@@ -8,23 +8,17 @@ import starhold as sh
 from starhold.scenario import reqif
 from tests.refusals import complains, refused
 from tests.running import starhold
+from tests.texts import toml
 
 SAMPLE = Path(__file__).with_name("polarion.reqif")
 """From the tests of the package reqif (strictdoc-project, Apache-2.0)."""
-BASE = """
+BASE = toml("""
 name = "own"
-[spacecraft]
-inertia = [2.0, 3.0, 4.0]
-[[requirement]]
-file = "{}"
-[simulation]
-duration = 5.0
-control_period = 0.1
-[[law]]
-type = "pd"
-k_rate = 0.09
-k_attitude = 0.009
-"""
+[spacecraft] inertia = [2.0, 3.0, 4.0]
+[[requirement]] file = "{}"
+[simulation] duration = 5.0; control_period = 0.1
+[[law]] type = "pd"; k_rate = 0.09; k_attitude = 0.009
+""")
 SHEETS = {
     "comma": 'id,text,method,metric,at_most,window,Owner\nS-1,"a, b",flight,peak_rate,0.1,"[1, ""2 s""]",Jürgen\n',
     "semicolon": 'Owner;AT MOST;Metric;Method;ID;Window;Object Text\nJürgen;0,1;peak_rate;flight;S-1;[1, "2 s"];a, b\n\n',

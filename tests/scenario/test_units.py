@@ -156,6 +156,10 @@ magnetometer | noise | 50.0 | "50 nT" or "50 T"
 magnetometer | noise | 1e-4 | "0.0001 nT" or "0.0001 T"
 gyro | noise | 0.15 | "0.15 deg/sqrt(h)" or "0.15 rad/s"
 gyro | bias | [10.0, 0.0, 0.0] | "10 deg/s" or "10 rad/s"
+gyro | bias_walk | 2.0 | "2 deg/h/sqrt(h)" or "2 rad/s"
+gyro | axis_errors | [500.0, 0.0, 300.0] | "500 ppm"
+gyro | delay | 100.0 | "100 ms" or "100 s"
+constant-torque | torque | [0.0, 200.0, 0.0] | "200 mN m" or "200 N m"
 residual-dipole | dipole | [6000.0, 0.0, 0.0] | "6000 mA m^2" or "6000 A m^2"
 """)
 
@@ -166,10 +170,13 @@ def test_a_plain_number_of_a_part_is_asked_for_its_unit(kind, key, value, meant)
         sh.load("cubesat-detumble").with_({"part": [{"type": kind, key: json.loads(value)}]})
 
 
+BIG = {"spacecraft.inertia": [1e4, 1e4, 1e4], "wheels.inertia": 1.0}
 LARGE = rows("""
 spacecraft.inertia | [5e9, 5e9, 4e9] | 5e+09 | g cm^2 | kg m^2
 wheels.inertia | 20.0 | 20 | g cm^2 | kg m^2
-wheels.torque_limit | 20.0 | 20 | mN m | N m
+wheels.torque_limit | 4.0 | 4 | mN m | N m
+wheels.coulomb | 1.0 | 1 | mN m | N m
+wheels.viscous | 2.0 | 2 | uN m s | N m s
 wheels.momentum_limit | 4000.0 | 4000 | mN m s | N m s
 spacecraft.torque_limit | 2000.0 | 2000 | mN m | N m
 environment.torque_noise | 20.0 | 20 | mN m | N m
@@ -180,13 +187,28 @@ settling.rate_tolerance | 10.0 | 10 | deg/s | rad/s
 
 @pytest.mark.parametrize(("key", "value", "number", "meant", "unit"), LARGE)
 def test_a_plain_number_far_above_its_kind_is_asked_for_its_unit(key, value, number, meant, unit):
-    scenario, value = sh.load("wheels-orbital").with_({"spacecraft.inertia": [1e4, 1e4, 1e4]}), json.loads(value)
+    scenario, value = sh.load("wheels-orbital").with_(BIG), json.loads(value)
     allowed = re.escape(f'with a unit it is "{number} {meant}" or "{number} {unit}"')
     with pytest.raises(sh.InputError, match=rf"{re.escape(key)}: found .*{allowed}$"):
         scenario.with_({key: value})
     # What states its unit is taken; so is what a campaign draws, which states it where it has to.
     place = locate(scenario, key)
     assert locate(scenario.with_(place.change(value)), key).value == (tuple(value) if isinstance(value, list) else value)
+
+
+def test_masses_and_speeds_that_no_craft_has_are_refused():
+    """Against a ball of osmium, 22.59 g/cm3, with 1 m of radius; and rotors of 0.4 N m s whose momentum is 50 times that."""
+    ball = 4.0 / 3.0 * math.pi * 22_590.0
+    craft = sh.load("cubesat-detumble").with_({"spacecraft.inertia": [0.4 * ball] * 3})
+    assert craft.with_({"spacecraft.mass": ball}).table.spacecraft.mass == ball
+    with pytest.raises(
+        sh.InputError, match=r"spacecraft.mass: found .*; allowed: at most 9.4[67]e\+04 kg: .*another unit meant"
+    ):
+        craft.with_({"spacecraft.mass": 1.01 * ball})
+    wheels = sh.load("wheels-orbital")
+    told = r"wheel 1 turns at 1.91e\+05 rpm with its most momentum, 20 N m s: is another unit meant"
+    with pytest.raises(sh.InputError, match=told):
+        wheels.with_({"wheels.momentum_limit": 20.0})
 
 
 @given(st.text("0123456789.eE+-_*^/() sNmkgrade°²⁻", max_size=30), st.sampled_from(["s", "N m", "rad", "1", "1/(N m)^2"]))

@@ -17,18 +17,15 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_names, builtin_text, load, parse
 from tests.making import ORBITAL, aimed, built, noise, on_wheels, point_loop
 from tests.missions import WATCHED, WATCHFUL
+from tests.texts import toml
 
-FUNCTIONS = str(Path(__file__).parent / "every_function.toml")
-"""A scenario whose law uses every elementary function and the time, and whose inertia changes."""
+FUNCTIONS, CAUTIOUS = (str(Path(__file__).parent / f"{name}.toml") for name in ("every_function", "cautious"))
+"""Scenarios of a law that uses every elementary function and the time, and whose inertia changes; of one that reads whether
+its estimate is valid, and whose tracker is lost for a while."""
 NOISE = noise(1e-4, 1e-3, 1e-4)
-FAULT = """
-[[fault]]
-time = 30
-wheel = 2
-lost = true
-inertia = [[7.0, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]
-delay = 10
-"""
+FAULT = toml("""
+[[fault]] time = 30; wheel = 2; lost = true; inertia = [[7.0, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]; delay = 10
+""")
 """A lost wheel, and an inertia that the law knows of ten seconds later."""
 
 
@@ -62,8 +59,9 @@ def choices() -> dict[str, Any]:
         f"{cover}, {kind}": replace(plain, sign_policy=cover, limit=kind)
         for cover, kind in zip(SIGN_POLICIES, KINDS, strict=True)
     }
-    timed = load(FUNCTIONS)
-    found["every function, the time"] = build(timed, timed.laws[0])
+    for name, path in (("every function, the time", FUNCTIONS), ("a law that reads validity", CAUTIOUS)):
+        read = load(path)
+        found[name] = build(read, read.laws[0])
     found["orbital target"] = plain.without("target").with_parts(ORBITAL)
     times = np.arange(12) * 10.0
     table = tabulate(times, np.array(random_quaternions(12)), np.arange(1101) * plain.period)

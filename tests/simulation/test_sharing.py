@@ -16,6 +16,7 @@ from starhold.trace.bounds import work
 from starhold.trace.program import Loop
 from starhold.trace.sharing import split
 from tests.making import built
+from tests.texts import toml
 
 STEP = {
     "cubesat-detumble": (1138, 21, 1941, 28),
@@ -147,15 +148,11 @@ def test_two_zeros_differ():
 
 def test_lanes_that_part_late_are_shared_no_longer():
     """They start alike, without noise; a fault gives each another inertia, which turns the rates, and later one more."""
-    faults = """
-[[fault]]
-time = 10
-inertia = [[{0}, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]
+    faults = toml("""
+[[fault]] time = 10; inertia = [[{0}, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]
 
-[[fault]]
-time = 20
-inertia = [[8.0, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]
-"""
+[[fault]] time = 20; inertia = [[8.0, 0.2, -0.1], [0.2, 8.5, 0.3], [-0.1, 0.3, 5.5]]
+""")
     text = builtin_text("wheels-orbital")
     loops = [built(parse(text + faults.format(7.0 + 0.1 * lane), "here")) for lane in range(3)]
     starts = np.repeat(np.array(flatten(loops[0].start))[:, None], 3, axis=1)

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -231,3 +232,12 @@ def on_node(jobs: Sequence[Job]) -> list[dict[str, NDArray[np.float64]]]:
 
 def _halves(number: int) -> list[int]:
     return [number >> 32 & 0xFFFFFFFF, number & 0xFFFFFFFF]
+
+
+def need_target(name: str, triple: str) -> None:
+    """Skip where LLVM was built without a machine."""
+    llvm.initialize_all_targets()
+    try:
+        llvm.Target.from_triple(triple)
+    except RuntimeError:
+        pytest.skip(f"LLVM was built without {name}")

@@ -20,7 +20,7 @@ from starhold.trace.llvm import Llvm
 from starhold.trace.machine import word
 from starhold.trace.program import Memory
 from starhold.trace.ptx import Threads, assembly, ptx
-from tests.trace.machines import Job, Subject, column, same
+from tests.trace.machines import Job, Subject, column, need_target, same
 from tests.trace.scripts import Script, scripts, subject, values
 
 FUSED = re.compile(r"\b(?:v?f(?:n?m(?:add|sub|la|ls)|ma)\w*|f64x2\.\w*madd|fmaf?|__fma)\b", re.I)
@@ -66,15 +66,6 @@ NAMES = {
 def instructions(text: str) -> Counter[str]:
     """How often each instruction stands in an assembly, by name."""
     return Counter(re.findall(r"^\s+(?:@\S+\s+)?([a-z_][\w.]*)", text, re.M))
-
-
-def need_target(name: str, triple: str) -> None:
-    """Skip where LLVM was built without a machine."""
-    llvm.initialize_all_targets()
-    try:
-        llvm.Target.from_triple(triple)
-    except RuntimeError:
-        pytest.skip(f"LLVM was built without {name}")
 
 
 @pytest.mark.parametrize("processor", ["sm_80", "sm_90"])

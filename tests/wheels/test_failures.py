@@ -18,7 +18,7 @@ from starhold.scenario.building import build
 from starhold.scenario.reading import builtin_text, load, parse
 from starhold.simulation.lane import fly, label
 from starhold.studies.failures import FULL, Failure, _flown, _left, saturation, study
-from tests.refusals import complains
+from tests.refusals import complains, replaced
 from tests.running import starhold
 
 BUILTIN = builtin_text("wheels-orbital")
@@ -39,11 +39,7 @@ def found(scenario):
 
 
 def changed(*pairs):
-    text = BUILTIN
-    for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new)
-    return parse(text, "here")
+    return parse(replaced(BUILTIN, *pairs), "here")
 
 
 @pytest.mark.slow

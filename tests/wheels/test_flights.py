@@ -45,7 +45,7 @@ def test_the_builtin_scenario_holds_the_orbital_frame_on_its_first_run():
 def test_locked_rotors_fall_through_gravity_like_one_body():
     """Friction holds the rotors fast in a body that no law turns: it moves as the rigid body of the whole inertia."""
     text = BUILTIN.replace("inertia = 1.0e-3 ", "inertia = 1.0 ").replace('"10 min"', '"20 min"')
-    text = text.replace("# viscous = 1e-6", "viscous = 10.0").replace('"pyramid"', '"nasa-standard"')
+    text = text.replace("# viscous = 1e-6", 'viscous = "10 N m s"').replace('"pyramid"', '"nasa-standard"')
     text = text.replace("control_period = 0.1", "control_period = 0.1\nsubsteps = 2")
     loop = built(parse(text, "here"))
     # So small a limit leaves no torque of the law.

@@ -23,25 +23,18 @@ from starhold.simulation.lane import fly
 from starhold.studies.flight import Flight
 from tests.making import built, flown, wheels_after
 from tests.refusals import refused
+from tests.texts import toml
 from tests.tiers import leading
 
-CRAFT = """
+CRAFT = toml("""
 name = "on wheels"
-[spacecraft]
-inertia = [6.0, 8.0, 5.0]
+[spacecraft] inertia = [6.0, 8.0, 5.0]
 {limit}
-[initial]
-angles = ["120 deg", "-15 deg", "20 deg"]
-[wheels]
-layout = "{layout}"
-inertia = 1e-3
-torque_limit = "20 mN m"
-momentum_limit = "{momentum} N m s"
+[initial] angles = ["120 deg", "-15 deg", "20 deg"]
+[wheels] layout = "{layout}"; inertia = 1e-3; torque_limit = "20 mN m"; momentum_limit = "{momentum} N m s"
 allocation = "{allocation}"
-[simulation]
-duration = 60
-control_period = 0.1
-"""
+[simulation] duration = 60; control_period = 0.1
+""")
 STIFF = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.6\nk_attitude = 0.06\n'
 GENTLE = '\n[[law]]\ntype = "lyapunov"\nk_rate = 0.1\nk_attitude = 0.005\n'
 MPC = '\n[[law]]\ntype = "mpc"\nq_attitude = 0.2\nq_rate = 0.2\nr = 5.0\nlimit = "{kind}"\n'

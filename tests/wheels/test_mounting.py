@@ -12,34 +12,22 @@ from starhold.scenario.reading import parse
 from starhold.simulation.lane import fly
 from tests.making import built, flown
 from tests.refusals import refused
+from tests.texts import toml
 
 AXES = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0] / np.sqrt(3.0)])
 TURNS = [["1 deg", "-0.5 deg", "2 deg"], None, ["0.3 deg", "1 deg", 0], ["-1 deg", 0, "0.5 deg"]]
 ERRORS = np.radians([[1.0, -0.5, 2.0], [0.0, 0.0, 0.0], [0.3, 1.0, 0.0], [-1.0, 0.0, 0.5]])
 INERTIA, ROTOR = np.diag([0.34, 0.36, 0.21]), 6e-4
-TEXT = """
+TEXT = toml("""
 name = "askew"
-[spacecraft]
-inertia = [0.34, 0.36, 0.21]
-[initial]
-attitude = [0.99, 0.05, -0.08, 0.03]
-rate = [0.001, -0.002, 0.0015]
-[simulation]
-duration = 60
-control_period = 0.5
-substeps = 4
-[wheels]
-inertia = 6e-4
-torque_limit = 0.01
-top_speed = "3000 rpm"
-momentum = 0.02
+[spacecraft] inertia = [0.34, 0.36, 0.21]
+[initial] attitude = [0.99, 0.05, -0.08, 0.03]; rate = [0.001, -0.002, 0.0015]
+[simulation] duration = 60; control_period = 0.5; substeps = 4
+[wheels] inertia = 6e-4; torque_limit = 0.01; top_speed = "3000 rpm"; momentum = 0.02
 {shared}
 {wheels}
-[[law]]
-type = "wheel"
-k_rate = 0.25
-k_attitude = 0.02
-"""
+[[law]] type = "wheel"; k_rate = 0.25; k_attitude = 0.02
+""")
 
 
 def scenario(turns=TURNS, shared="", **changes):

@@ -146,7 +146,9 @@ ABSENT = Absent()
 def refuse_absent() -> NoReturn:
     """Raise an InputError that points at the line where an equation uses a quantity that nothing gives."""
     place, text = written_at()
-    allowed = 'quantities that the loop has; a law gets measurement.time where its file says READS = ("time",)'
+    allowed = (
+        'quantities that the loop has; a law gets time and is_valid where its file says READS = ("time",), ("is_valid",)'
+    )
     raise InputError(place, "", f"a quantity that nothing gives, in `{text}`", allowed)
 
 

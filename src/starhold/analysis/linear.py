@@ -18,6 +18,7 @@ from starhold.loop.closed_loop import Carry, ClosedLoop, Setup
 from starhold.loop.kernels import make_step
 from starhold.loop.step import Step
 from starhold.parts.catalogue import fit
+from starhold.parts.contract import IS_VALID
 
 Array = NDArray[np.float64]
 AXES = "xyz"
@@ -117,8 +118,9 @@ def linearise(loop: ClosedLoop, delay: float = 0.0) -> Linear:
     if not loop.aims:
         raise LinearityError("the body has no attitude")
     for one in (loop.law, *(f.part for f in loop.used("effector") if f.part.flag("ACTS"))):
-        if one.reads:
-            readings = " and the ".join(name.replace("_", " ") for name in one.reads)
+        # Without an estimator, what it would tell of itself is always valid.
+        if others := [name for name in one.reads if name != IS_VALID]:
+            readings = " and the ".join(name.replace("_", " ") for name in others)
             raise LinearityError(f"{one.name} also uses the {readings}, not attitude and rate alone")
     left_out: list[str] = []
     still = _at_rest(loop, left_out)

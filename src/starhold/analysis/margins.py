@@ -79,15 +79,18 @@ def margins(linear: Linear, shown: Response | None = None) -> list[Margins]:
 def _about(linear: Linear, k: int, measured: Response) -> Margins:
     w, L = measured.frequencies, measured.loops[k]
 
-    def at(frequency: float) -> complex:
-        return complex(_cut(linear, [frequency], [k])[0, 0])
+    def along(frequencies: Any) -> Any:
+        return _cut(linear, frequencies, [k])[0]
 
-    crossings = _roots(w, _log_size(L), lambda f: float(_log_size(at(f))))
+    def at(frequency: float) -> complex:
+        return complex(along([frequency])[0])
+
+    crossings = _roots(w, _log_size(L), lambda f: _log_size(along(f)))
     crossover = max(crossings, default=math.nan)
     if not linear.is_stable:
         return Margins(AXES[k], math.nan, math.nan, math.nan, math.nan, crossover, math.nan)
     # Where L is real and negative; at half the sampling frequency it is always real.
-    reals = [at(f) for f in _roots(w, L.imag, lambda f: at(f).imag)] + [complex(L[-1])]
+    reals = [at(f) for f in _roots(w, L.imag, lambda f: along(f).imag)] + [complex(L[-1])]
     gains = [-1.0 / value.real for value in reals if value.real < 0.0]
     lags = [((math.pi + np.angle(at(f))) % (2.0 * math.pi), f) for f in crossings]
     return Margins(
@@ -106,15 +109,18 @@ def _log_size(values: Any) -> Any:
     return np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
 
 
-def _roots(w: Any, values: Any, function: Callable[[float], float]) -> list[float]:
-    """Return the frequencies at which a function changes sign between two of w, except jumps, as across an undamped
-    resonance."""
-    # Loaded here, because it takes long and not every loop has margins.
-    from scipy.optimize import brentq
-
+def _roots(w: Any, values: Any, function: Callable[[Any], Any]) -> list[float]:
+    """Return the frequencies at which a function, of many frequencies at once, changes sign between two of w, except jumps,
+    as across an undamped resonance."""
     roots: list[float] = []
     for p in np.flatnonzero((values[:-1] < 0.0) != (values[1:] < 0.0)):
-        root = float(brentq(function, w[p], w[p + 1], xtol=1e-9 * w[p], rtol=1e-9))  # pyright: ignore
-        if abs(function(root)) <= max(abs(values[p]), abs(values[p + 1])):
+        low, high = w[p], w[p + 1]
+        while high - low > 1e-12 * high:
+            # Many are as fast as one.
+            inner = np.linspace(low, high, 65)
+            place = int(np.argmax((function(inner[1:]) < 0.0) != (values[p] < 0.0)))
+            low, high = inner[place : place + 2]
+        root = float(0.5 * (low + high))
+        if abs(float(function([root])[0])) <= max(abs(values[p]), abs(values[p + 1])):
             roots.append(root)
     return roots

@@ -22,7 +22,7 @@ from starhold.algebra.words import number_of
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step
 from starhold.loop.programs import over_samples
-from starhold.parts.stated_attitude import IS_VALID
+from starhold.parts.contract import IS_VALID
 from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
 

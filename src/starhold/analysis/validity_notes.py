@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from starhold.algebra.scalar import less, maximum, where
 from starhold.analysis.meter import Metric
-from starhold.parts.stated_attitude import IS_VALID
+from starhold.parts.contract import IS_VALID
 
 
 class Validity(NamedTuple):

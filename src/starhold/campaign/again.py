@@ -49,7 +49,7 @@ def fly_again(folder: Path, run: int, law: str | None = None) -> FlownAgain:
     differs = tuple(column for column, value in stored.items() if not _equal(value, now[column][0]))
     drawn = scenario_of(job, job.plan.columns(run, 1), run)
     entry = drawn.pick(name)
-    return FlownAgain(drawn, fly_law(drawn, entry, build(drawn, entry)), differs)
+    return FlownAgain(drawn, fly_law(drawn, entry, build(drawn, entry, drawn=True)), differs)
 
 
 @lru_cache(maxsize=1)

@@ -34,8 +34,8 @@ LOOK = 1024
 """The numbers of runs at which the interim analyses of a sequential campaign are taken."""
 
 NO_TABLE = "a table with [campaign.over] for what is drawn, or a number of runs that differ in their noise alone"
-Notice = Callable[[str, int], None]
-"""Called with a law and how many more of its runs were flown."""
+Notice = Callable[..., None]
+"""Called with a law and how many more of its runs were flown; of a search for the worst case also with what is `Sought`."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def fly_campaign(
     if options.search and job.dispersions and job.required:
         threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
         taken = set[str]()
-        results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken)) for result in results)
+        results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken, notice)) for result in results)
     sealed = digest(store, runs)
     totals = {
         "verdicts": {

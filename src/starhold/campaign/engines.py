@@ -1,6 +1,6 @@
-"""Engines fly the blocks of a campaign in this process, in processes of this machine, or on a Dask cluster. One task is one
-block of runs, never a single run. Results return to this process, which alone writes them; a few blocks for each worker are
-in flight at once, so that memory stays bounded for any number of runs.
+"""Engines fly the blocks of a campaign in this process, in processes of this machine, on its GPU, or on a Dask cluster. One
+task is one block of runs, never a single run. Results return to this process, which alone writes them; a few blocks for each
+worker are in flight at once, so that memory stays bounded for any number of runs.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from starhold.campaign.extras import extra
 from starhold.campaign.workers import Team
 from starhold.errors import InputError
 from starhold.simulation.lanes import ThreadPool
+from starhold.trace.device import Device, DeviceError
 from starhold.version import __version__
 
 Block: TypeAlias = tuple[str, int, int]
@@ -47,7 +48,7 @@ class Job(Protocol):
     """Begins to fly a block, and returns a function that waits for its results; pickled for other processes, which keep it
     between blocks."""
 
-    def __call__(self, law: str, first: int, count: int, pool: ThreadPool, /) -> Callable[[], Chunk]: ...
+    def __call__(self, law: str, first: int, count: int, pool: ThreadPool | Device, /) -> Callable[[], Chunk]: ...
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,12 @@ class Scheduler:
     patience: float = 60.0
 
 
-Engine: TypeAlias = Threads | Workers | Scheduler
+@dataclass(frozen=True)
+class Gpu:
+    """Flies blocks one after the other on the first NVIDIA GPU of this machine, each run in a thread of its own."""
+
+
+Engine: TypeAlias = Threads | Workers | Scheduler | Gpu
 
 
 Fly: TypeAlias = Callable[[list[Block]], Iterator[Chunk]]
@@ -93,6 +99,10 @@ def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
         with ThreadPool(engine.count) as pool:
             yield lambda blocks: _fly_here(job, blocks, pool)
         return
+    if isinstance(engine, Gpu):
+        device = Device()
+        yield lambda blocks: _believed(job, _fly_there(job, blocks, device), "the GPU", checked=(0, -1))
+        return
     packed = extra("cloudpickle").dumps(job)
     if isinstance(engine, Workers):
         count = min(engine.count, most)
@@ -103,7 +113,16 @@ def flying(job: Job, engine: Engine, most: int) -> Generator[Fly]:
             yield lambda blocks: _believed(job, cluster.fly(packed, blocks), engine.address)
 
 
-def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool) -> Iterator[Chunk]:
+def _fly_there(job: Job, blocks: list[Block], device: Device) -> Iterator[tuple[Block, _Told]]:
+    """Yield blocks with the results of a GPU. InputError where its driver fails."""
+    try:
+        for block, chunk in zip(blocks, _fly_here(job, blocks, device), strict=True):
+            yield block, (device.processor, chunk)
+    except DeviceError as error:
+        raise InputError("campaign", "gpu", str(error), f"a GPU that works; {_KEPT}") from None
+
+
+def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool | Device) -> Iterator[Chunk]:
     begun = deque[Callable[[], Chunk]]()
     for block in blocks:
         begun.append(job(*block, pool))
@@ -113,9 +132,11 @@ def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool) -> Iterator[Chunk
         yield begun.popleft()()
 
 
-def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> Iterator[Chunk]:
-    """Yield blocks whose results are checked. The first run of each worker's first block, and of further blocks while that
-    takes little time, is flown here again and must give the same bits; else InputError."""
+def _believed(
+    job: Job, results: Iterator[tuple[Block, _Told]], name: str, checked: tuple[int, ...] = (0,)
+) -> Iterator[Chunk]:
+    """Yield blocks whose results are checked. Some runs (`checked`, by default the first) of each worker's first block, and
+    of further blocks while that takes little time, are flown here again and must give the same bits; else InputError."""
     begun, spent, seen = time.monotonic(), 0.0, set[str]()
     columns: dict[str, dict[str, str]] = {}
     with ThreadPool(1) as pool:
@@ -128,12 +149,16 @@ def _believed(job: Job, results: Iterator[tuple[Block, _Told]], name: str) -> It
             if who not in seen or spent < _CHECKED * (time.monotonic() - begun):
                 seen.add(who)
                 started = time.monotonic()
-                again = job(law, first, 1, pool)()
+                for place in (one % count for one in checked):
+                    again = job(law, first + place, 1, pool)()
+                    if names := _differing(result, again, place):
+                        raise InputError(
+                            name,
+                            who,
+                            f"other numbers in run {first + place} of {law} ({names})",
+                            f"those of this machine; {_KEPT}",
+                        )
                 spent += time.monotonic() - started
-                if names := _differing(result, again):
-                    raise InputError(
-                        name, who, f"other numbers in run {first} of {law} ({names})", f"those of this machine; {_KEPT}"
-                    )
             yield result
 
 
@@ -152,11 +177,11 @@ def _kinds(chunk: Chunk) -> dict[str, str]:
     return {name: values.dtype.kind for name, values in chunk.rows.items()}
 
 
-def _differing(chunk: Chunk, again: Chunk) -> str:
-    """List the columns whose first value differs from that of the same run flown here."""
+def _differing(chunk: Chunk, again: Chunk, place: int) -> str:
+    """List the columns whose value at a place differs from that of the same run flown here."""
     if _kinds(chunk) != _kinds(again):
         return "which has other columns"
-    pairs = {name: (chunk.rows[name][:1], values[:1]) for name, values in again.rows.items()}
+    pairs = {name: (chunk.rows[name][place : place + 1], values[:1]) for name, values in again.rows.items()}
     names = [name for name, (one, other) in pairs.items() if _bits(one) != _bits(other)]
     return ", ".join(names[:4])
 
@@ -347,16 +372,18 @@ def _quiet() -> Generator[None]:
             handler.setLevel(level)
 
 
-def engine_of(threads: int | None, workers: int | None, scheduler: str | None) -> Engine | None:
+def engine_of(threads: int | None, workers: int | None, scheduler: str | None, gpu: bool = False) -> Engine | None:
     """Return the requested engine, or None. InputError for more than one, and for less than one thread or process."""
-    options = {"threads": threads, "workers": workers, "scheduler": scheduler}
+    options = {"threads": threads, "workers": workers, "scheduler": scheduler, "gpu": gpu or None}
     given = [name for name, value in options.items() if value is not None]
     if len(given) > 1:
-        raise InputError("campaign", given[1], f"beside {given[0]}", "one of threads, workers and scheduler")
+        raise InputError("campaign", given[1], f"beside {given[0]}", "one of threads, workers, scheduler and gpu")
     for name in ("threads", "workers"):
         count = options[name]
         if count is not None and int(count) < 1:
             raise InputError("campaign", name, str(count), "at least 1")
+    if gpu:
+        return Gpu()
     if scheduler is not None:
         return Scheduler(scheduler)
     return Workers(workers) if workers is not None else None if threads is None else Threads(threads)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,15 @@ from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
 from starhold.scenario.requirement import RequirementTable
 from starhold.simulation.batched import begin_metered
+from starhold.simulation.device import begin_on_device
 from starhold.simulation.lane import Progress
 from starhold.simulation.lanes import ThreadPool
 from starhold.studies.body import study_of
 from starhold.studies.requirements import Requirement, cones_of, extras_of, orbit_of, read_requirements, tables_of
+from starhold.trace.device import Device
+
+Pool: TypeAlias = ThreadPool | Device
+"""What flies: threads of this process, or a GPU."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +116,7 @@ class Job:
         """The requirements that runs of a law must keep."""
         return read_requirements(self.required, self.meter(law).units, self.source.where, orbit_of(self.scenario))
 
-    def __call__(self, law: str, first: int, count: int, pool: ThreadPool) -> Callable[[], Chunk]:
+    def __call__(self, law: str, first: int, count: int, pool: Pool) -> Callable[[], Chunk]:
         """Begin to fly runs first .. first+count-1 of a law; the function returned waits for their results."""
         runs = np.arange(first, first + count)
         columns = self.plan.columns(first, count)
@@ -125,7 +130,8 @@ class Job:
             histogram = histogram + bins
             extremes.append((least, most))
 
-        measured = self.measure(law, columns, runs, pool, take, self._telling(law))
+        progress = None if self.progress is None else by_lots(partial(self.progress, law))
+        measured = self.measure(law, columns, runs, pool, take, progress)
 
         def finish() -> Chunk:
             rows: dict[str, NDArray[Any]] = {"run": runs, **columns, **measured()}
@@ -141,27 +147,12 @@ class Job:
 
         return finish
 
-    def _telling(self, law: str) -> Progress | None:
-        """Return the function that reports how many runs of a block are flown, lot by lot."""
-        if self.progress is None:
-            return None
-        tell, reported, whole = self.progress, [0], [0]
-
-        def progress(done: int, lanes: int) -> None:
-            now = whole[0] + done
-            tell(law, now - reported[0])
-            reported[0] = now
-            if done == lanes:
-                whole[0] += lanes
-
-        return progress
-
     def measure(
         self,
         law: str,
         columns: Mapping[str, NDArray[Any]],
         runs: NDArray[np.int64],
-        pool: ThreadPool,
+        pool: Pool,
         take: Callable[[Metrics, Any], None] = lambda metrics, windows: None,
         progress: Progress | None = None,
         refused: NDArray[np.bool_] | None = None,
@@ -184,13 +175,14 @@ class Job:
 
         return finish
 
-    def _begin(self, lot: Lot, pool: ThreadPool) -> Callable[[Progress | None], tuple[Metrics, Any]]:
+    def _begin(self, lot: Lot, pool: Pool) -> Callable[[Progress | None], tuple[Metrics, Any]]:
         """Begin to fly a lot; the function returned waits for its metrics (lanes,) and the values of its windows (windows,
         quantities, lanes)."""
         meter = self._meter_of(lot.loop, lot.phases[0].gains)
         lanes, runs = len(lot.runs), lot.runs
         along = bool((np.diff(runs) == 1).all())
-        wait = begin_metered(
+        begin = partial(begin_on_device, pool) if isinstance(pool, Device) else partial(begin_metered, pool)
+        wait = begin(
             lot.loop,
             lot.carries,
             lot.phases,
@@ -200,7 +192,6 @@ class Job:
             meter.cuts(),
             meter.marks[-1],
             [window.row for window in meter.windows.values()],
-            pool,
         )
 
         def finish(progress: Progress | None) -> tuple[Metrics, Any]:
@@ -209,6 +200,21 @@ class Job:
             return meter.metrics(flown.notes, flown.windows, lost), flown.windows
 
         return finish
+
+
+def by_lots(tell: Callable[[int], None]) -> Progress:
+    """Return the function that reports how many more runs are flown, lot by lot, to one that is called with this number."""
+    reported, whole = 0, 0
+
+    def progress(done: int, lanes: int) -> None:
+        nonlocal reported, whole
+        now = whole + done
+        tell(now - reported)
+        reported = now
+        if done == lanes:
+            whole += lanes
+
+    return progress
 
 
 def scenario_of(job: Job, columns: Mapping[str, NDArray[Any]], run: int) -> Scenario:

@@ -88,7 +88,7 @@ class Lanes:
                 # Warnings are about the file, not about each run.
                 with warnings.catch_warnings(action="ignore"):
                     other = next(others)
-                    flat = Flat.of(build(other, other.pick(self.law)), self.steps)
+                    flat = Flat.of(build(other, other.pick(self.law), drawn=True), self.steps)
                 yield flat
             except InputError as error:
                 where = f"{self.scenario.where}, run {run}"

@@ -1,8 +1,9 @@
-"""Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once; gains by
-their law's own formula, at once where the law has a way, else lane by lane."""
+"""Computes a loop's numbers from drawn values by one equation, recorded once and evaluated for all lanes at once. By their
+own formulas, lane by lane where there is no way at once: a law's gains, and what a part prepares that no equation records.
+"""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Any, TypeAlias, cast
 
@@ -12,13 +13,26 @@ from numpy.typing import NDArray
 from starhold.algebra.structure import leaves, mapped, put, rebuild
 from starhold.campaign.dispersions import Dispersion
 from starhold.loop.kernels import numbers_of
+from starhold.parts.part import Fitted
+from starhold.scenario.assumed import with_assumed
+from starhold.scenario.checking import read_toml
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.studies.flat import Flat, named
-from starhold.trace.calling import Compiled
-from starhold.trace.handles import Handle
+from starhold.trace.calling import Compiled, record_call
+from starhold.trace.handles import Handle, RecordingError
 
 Array: TypeAlias = NDArray[np.float64]
 Columns: TypeAlias = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Ready(Fitted):
+    """A part in a loop with what it prepared."""
+
+    numbers: Any = ()
+
+    def prepared(self, period: float) -> Any:
+        return self.numbers
 
 
 class Moving:
@@ -29,6 +43,7 @@ class Moving:
         self.drawn = [one for one in dispersions if not one.wordy]
         self._paths: dict[str, tuple[Any, ...]] = {place.key: place.path for one in self.drawn for place in one.places}
         self._names: tuple[tuple[str, ...], ...] = ()
+        self._apart: dict[str, bool] = {}
         self._compiled: tuple[Compiled, list[str]] | None = None
 
     def by_key(self, columns: Columns, known: bool = False) -> dict[str, Array]:
@@ -51,17 +66,44 @@ class Moving:
         return dict(zip(names, equation.over(np.array(varying)), strict=True))
 
     def _arguments(self, columns: Columns) -> tuple[Any, ...]:
-        """The arguments of the equation: the flying craft, the nominal model, and the parameters of parts."""
+        """The arguments of the equation: the flying craft, the nominal model, the parameters of parts, and what those parts
+        prepare that no equation follows."""
         hooks, every = self.scenario.hooks, self.by_key(columns)
-        true = hooks.drawn(self.scenario, every)
-        supposed = hooks.drawn(self.scenario.known, self.by_key(columns, known=True))
-        parts = dict[str, Any]()
+        true, known = hooks.drawn(self.scenario, every), self.by_key(columns, known=True)
+        alike = self.scenario.known is self.scenario and len(known) == len(every)
+        supposed = true if alike else hooks.drawn(self.scenario.known, known)
+        parts, ready = dict[str, Any](), dict[str, Any]()
         for key, path in self._paths.items():
             if path[0] == "part":
                 fitted = self.scenario.parts[path[1]]
                 parts[fitted.called] = put(parts.get(fitted.called, fitted.params), path[2:], _rows(every[key]))
-        self._names = tuple(true), tuple(supposed), tuple(parts)
-        return tuple(true.values()), tuple(supposed.values()), tuple(parts.values())
+        if parts:
+            fitted = [replace(one, params=parts.get(one.called, one.params)) for one in self.scenario.parts]
+            tables = read_toml(self.scenario.text, self.scenario.where)["part"]
+            parts = {one.called: one.params for one in with_assumed(fitted, tables) if _differ(one.params)}
+        for one in self.base.loop.parts:
+            if one.name in parts and self._is_apart(replace(one, params=parts[one.name])):
+                lanes = _each(parts[one.name], len(next(iter(columns.values()))))
+                ready[one.name] = _joined([replace(one, params=params).prepared(self.base.loop.period) for params in lanes])
+        self._names = tuple(true), tuple(supposed), tuple(parts), tuple(ready)
+        return tuple(true.values()), tuple(supposed.values()), tuple(parts.values()), tuple(ready.values())
+
+    def _is_apart(self, fitted: Fitted) -> bool:
+        """Return whether no equation records what a part prepares from parameters with arrays (lanes,)."""
+        if fitted.name not in self._apart:
+            count = sum(isinstance(leaf, np.ndarray) for leaf in leaves(fitted.params))
+
+            def equation(*given: Any) -> Any:
+                values = iter(given)
+                params = mapped(fitted.params, lambda leaf: next(values) if isinstance(leaf, np.ndarray) else leaf)
+                return replace(fitted, params=params).prepared(self.base.loop.period)
+
+            try:
+                record_call(equation, (0.0,) * count)
+                self._apart[fitted.name] = False
+            except (RecordingError, TypeError):
+                self._apart[fitted.name] = True
+        return self._apart[fitted.name]
 
     def _equation(self, arguments: Any, count: int) -> tuple[Compiled, list[str]]:
         if self._compiled is None:
@@ -78,11 +120,12 @@ class Moving:
             self._compiled = Compiled(equation, *[0.0] * count), names
         return self._compiled
 
-    def _named(self, true: Any, supposed: Any, params: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    def _named(self, true: Any, supposed: Any, params: Mapping[str, Any], ready: Mapping[str, Any]) -> list[tuple[str, Any]]:
         """The numbers of the loop with their names: the initial carry, and the phases."""
         loop = self.base.loop
         moved = self.scenario.hooks.flown(self.scenario, loop, true, supposed)
         parts = tuple(replace(one, params=params[one.name]) if one.name in params else one for one in moved.parts)
+        parts = tuple(Ready(**vars(one), numbers=ready[one.name]) if one.name in ready else one for one in parts)
         setup = replace(loop, parts=parts).setup()._replace(limit=moved.limit)
         carry = loop.carry(moved.made_with, setup=setup)
         phase = {"nominal": moved.nominal, "craft": moved.craft, "setup": setup}
@@ -107,9 +150,12 @@ class Moving:
         if not self.scenario.allow_unstable:
             for gains, (craft, _) in zip(every, cases, strict=True):
                 law.check(gains, craft)
-        rows = [[leaf for leaf in leaves(gains) if isinstance(leaf, float)] for gains in every]
-        names = [name for name, _ in named(self.base.loop.gains, "gains")]
-        return dict(zip(names, np.array(rows).T, strict=True))
+        return dict(named(_joined(every), "gains"))
+
+
+def _differ(value: Any) -> bool:
+    """Return whether lanes differ in a number of a structure."""
+    return any(isinstance(leaf, np.ndarray) for leaf in leaves(value))
 
 
 def _each(value: Any, lanes: int) -> Iterable[Any]:
@@ -120,6 +166,17 @@ def _each(value: Any, lanes: int) -> Iterable[Any]:
     if all(isinstance(part, repeat) for part in parts):
         return repeat(value, lanes)
     return [rebuild(value, row) for row in zip(*parts, strict=True)]
+
+
+def _joined(every: Sequence[Any]) -> Any:
+    """Return the structures of many lanes as one, with an array (lanes,) in place of each number. ValueError where they
+    differ in more than numbers."""
+    apart = [list(leaves(one)) for one in every]
+    form = [None if isinstance(leaf, float) else leaf for leaf in apart[0]]
+    if any([None if isinstance(leaf, float) else leaf for leaf in row] != form for row in apart):
+        raise ValueError("lanes differ in more than numbers")
+    rows = iter(np.array([[leaf for leaf in row if isinstance(leaf, float)] for row in apart]).T)
+    return mapped(every[0], lambda leaf: next(rows) if isinstance(leaf, float) else leaf)
 
 
 def _rows(new: Array) -> Any:

@@ -2,13 +2,14 @@
 
 import math
 import re
+from collections.abc import Callable
 from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.campaign.job import Job, scenario_of
+from starhold.campaign.job import Job, by_lots, scenario_of
 from starhold.campaign.results import Bracket, LawResult
 from starhold.campaign.store import Store
 from starhold.files import atomic_write
@@ -70,30 +71,53 @@ def box(job: Job) -> list[tuple[float, float]]:
     return bounds
 
 
+class Sought(NamedTuple):
+    """A search is for the worst case of the requirement of this name, and takes so many flights at most."""
+
+    name: str
+    flights: int
+
+
 def search(
-    job: Job, law: str, requirement: Requirement, threads: int, begin: Array | None = None, seed: int = 0
+    job: Job,
+    law: str,
+    requirement: Requirement,
+    threads: int,
+    begin: Array | None = None,
+    seed: int = 0,
+    notice: Callable[[str, int, Sought], None] | None = None,
 ) -> Found | None:
     """Search for the worst value of a requirement's metric over the box, with the random numbers of run 0 in all flights.
     begin: a point (dims,) to search around as well. The search ends early where a run has no such value, the worst case;
     None where no scenario within the box can be flown. It is an evolution strategy from many starts: a batch of random steps
     is flown from each, and the worst is kept; step sizes adapt, and the less bad half of the starts is dropped after each
-    third of the rounds.
+    third of the rounds. notice: called with the law and how many more of these flights are done, or needed no more.
     """
     side = 1.0 if requirement.at_most else -1.0
     evaluations = 0
     sought = np.random.default_rng(seed)
     effort = MANY if job.lanes(law).at_once else FEW
     low, high = np.array(box(job)).T
+    sought_after, done = Sought(requirement.name, effort.spread + effort.rounds * effort.lanes), 0
+
+    def tell(more: int) -> None:
+        nonlocal done
+        done += more
+        if notice is not None:
+            notice(law, more, sought_after)
 
     def badness(points: Array) -> Array:
         """Return the badness of points (n, dims): infinity where a run has no value, minus infinity where the craft is
         refused."""
         nonlocal evaluations
+        needed = done + len(points)
         unit = np.ascontiguousarray(points.T)
         result = np.full(len(points), -np.inf)
         there = np.flatnonzero(job.plan.possible(unit))
         refused, runs = np.zeros(len(there), dtype=bool), np.zeros(len(there), dtype=np.int64)
-        measured = job.measure(law, job.plan.values(unit[:, there]), runs, pool, refused=refused)()
+        drawn = job.plan.values(unit[:, there])
+        measured = job.measure(law, drawn, runs, pool, progress=by_lots(tell), refused=refused)()
+        tell(needed - done)
         if refused.all():
             return result
         values = side * measured[requirement.column]
@@ -124,6 +148,7 @@ def search(
             points = np.where(better[:, None], tried[rows, best], points)
             values = np.maximum(values, tries[rows, best])
             sizes = np.minimum(np.where(better, WIDER, CLOSER) * sizes, LONGEST)
+    tell(sought_after.flights - done)
     worst = int(values.argmax())
     if values[worst] == -np.inf:
         return None
@@ -151,9 +176,17 @@ def _stepped(points: Array, sizes: Array, count: int, low: Array, high: Array, s
     return np.clip(points[:, None] + step * (high - low), low, high)
 
 
-def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set[str]) -> tuple[Bracket, ...]:
+def brackets(
+    job: Job,
+    store: Store,
+    result: LawResult,
+    threads: int,
+    taken: set[str],
+    notice: Callable[[str, int, Sought], None] | None = None,
+) -> tuple[Bracket, ...]:
     """Bracket the worst value of each required metric of a law: by its campaign, by a search, and by proof. The worst run of
-    each is kept as a scenario file in the campaign's folder; taken: the names of such files so far."""
+    each is kept as a scenario file in the campaign's folder; taken: the names of such files so far; notice: as in
+    `search`."""
     gathered: list[Bracket] = []
     law, worst_runs = result.law, {verdict.name: verdict.worst_run for verdict in result.verdicts}
     for requirement in job.requirements(law):
@@ -161,7 +194,7 @@ def brackets(job: Job, store: Store, result: LawResult, threads: int, taken: set
             continue
         run, side = worst_runs[requirement.name], 1.0 if requirement.at_most else -1.0
         value, columns = float(store.row(law, run)[requirement.column]), job.plan.columns(run, 1)
-        looked = search(job, law, requirement, threads, job.plan.unit(run, 1)[:, 0])
+        looked = search(job, law, requirement, threads, job.plan.unit(run, 1)[:, 0], notice=notice)
         if looked is not None and not np.isnan(value) and not side * value >= side * looked.value:
             value, columns, run = looked.value, looked.columns, 0
         path = store.folder / _file_name(law, requirement.name, taken)

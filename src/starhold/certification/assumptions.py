@@ -14,6 +14,7 @@ from starhold.certification.orbit_band import strays
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
+from starhold.parts.contract import IS_VALID
 from starhold.parts.effectors.wheel_motion import has_friction
 from starhold.parts.effectors.wheels import BAND
 
@@ -115,12 +116,18 @@ def _pulled(span: Any) -> Unmet:
     return [(span.loop.has("gravity-gradient"), "the gravity gradient acts")]
 
 
+def _unsure(span: Any) -> Unmet:
+    names = (f"{fitted.called.replace('-', '_')}_{IS_VALID}" for fitted in span.loop.used("estimator"))
+    return [(span[name] < 0.5, "the estimate is not valid") for name in names]
+
+
 def _turning(span: Any) -> Unmet:
     return [(span.loop.target.part.name != "inertial", "the target turns")]
 
 
 UNLIMITED, WHEELS, FRICTIONLESS = "unlimited-torque", "unlimited-wheels", "frictionless-wheels"
 UNLIMITED_CONTROL, IN_THE_PLANE, LINEAR = "unlimited-control", "in-the-plane", "linear-motion"
+VALID_ESTIMATE = "valid-estimate"
 HAS = "the loop has the "
 """The beginning of the text about a part that a claim leaves out, role and name."""
 # Imperfect measurement and actuators are parts, which are left out by name.
@@ -144,6 +151,7 @@ ASSUMPTIONS = {
     "bounded-outside-torque": Assumption("torque from outside bounded on each axis"),
     "unknown-outside-torque": Assumption("torque from outside bounded in norm"),
     "bounded-target": Assumption("target's motion at most as told"),
+    VALID_ESTIMATE: Assumption("estimate valid throughout", _unsure),
     "target-at-rest": Assumption("target at rest", _turning),
     LINEAR: Assumption("linear motion near rest on a target at rest"),
     "equations-as-given": Assumption("the equations exactly as given"),

@@ -74,10 +74,10 @@ class Claim:
     @property
     def outcome(self) -> Outcome:
         """Refuted if an obligation is, else undecided if one is."""
-        found = {obligation.outcome for obligation in self.obligations}
-        if "refuted" in found:
+        outcomes = {obligation.outcome for obligation in self.obligations}
+        if "refuted" in outcomes:
             return "refuted"
-        return "proved" if found == {"proved"} else "undecided"
+        return "proved" if outcomes == {"proved"} else "undecided"
 
     @property
     def programs(self) -> dict[str, Any]:
@@ -121,11 +121,11 @@ class Certificate:
         loop as it flies is proved, undecided claims about an ideal loop do not count."""
         flown = any(claim.kind == "pointing" and claim.outcome == "proved" for claim in self.claims)
         decided = [claim for claim in self.claims if claim.outcome != "undecided" or not flown]
-        found = {claim.outcome for claim in decided}
-        if "refuted" in found:
+        outcomes = {claim.outcome for claim in decided}
+        if "refuted" in outcomes:
             return "refuted"
         ends = any(claim.kind not in BESIDE for claim in decided)
-        return "proved" if ends and found == {"proved"} else "undecided"
+        return "proved" if ends and outcomes == {"proved"} else "undecided"
 
     @property
     def unflown(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from starhold.algebra.polynomial import Polynomial, UnreadableError, constants, reciprocal
 from starhold.algebra.vector import dot
-from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, WHEELS
+from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, VALID_ESTIMATE, WHEELS
 from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, Claim, Obligation
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.isotropic import ISOTROPIC
@@ -19,7 +19,7 @@ from starhold.certification.subject import Subject, above, described, direction,
 from starhold.certification.unmodelled import named
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import CLOCK
+from starhold.parts.contract import CLOCK, IS_VALID
 from starhold.parts.effectors.wheels import gives_allocated_torque
 
 
@@ -49,6 +49,7 @@ BEST = Wanted()
 TIMED = "the law reads the time, of which no claim speaks"
 REMEMBERS = "the law keeps a memory from call to call"
 LOST = "the allocation relies on a lost wheel"
+ASKEW = "the allocation takes wheels to be mounted otherwise than they are"
 APART = "inertia, gains and period are too far apart in size"
 ASSUMPTIONS = ("rigid-body", "inertia-as-given", "exact-measurement", "ideal-actuators")
 """Assumptions of all claims without a proof."""
@@ -90,10 +91,11 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
     loop, claims = subject.loop, list[Claim]()
     if CLOCK in loop.law.reads:
         return [undecided("convergence", EVERYWHERE, subject, TIMED)], TIMED
-    sound = loop.wheels is None or gives_allocated_torque(loop.wheels)
+    wheels = loop.wheels
+    unsound = "" if wheels is None or gives_allocated_torque(wheels) else ASKEW if wheels.known_axes else LOST
     if loop.remembers and loop.law.lyapunov is not None:
         claims.append(undecided("convergence", EVERYWHERE, subject, REMEMBERS))
-    unflown = REMEMBERS if loop.remembers else "" if sound else LOST
+    unflown = REMEMBERS if loop.remembers else unsound
     if not unflown and wanted.alone:
         claim, reason = pointed(subject, wanted.like)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
@@ -176,6 +178,8 @@ def undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str)
         assumptions = [*HELD_AND_PUSHED]
     if kind == "inertia":
         assumptions[1] = "inertia-near"
+    if IS_VALID in subject.loop.law.reads:
+        assumptions.append(VALID_ESTIMATE)
     return Claim(kind, numbers, {}, tuple(assumptions), (Obligation("form", EXACT, "undecided", {"reason": reason}),))
 
 

@@ -21,24 +21,24 @@ from starhold.kernel.theorems.noise import BESIDE
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS
 from starhold.parts.effectors.wheel_motion import at_top_speed
-from starhold.parts.effectors.wheels import BAND
+from starhold.parts.effectors.wheels import BAND, gives_allocated_torque
 
 
 def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = None) -> list[str]:
     """Return how a claim, which the kernel has checked, differs from this loop, or covers less than another mode hands over,
     up to its ends; empty where it does not."""
-    own = Loop(make_subject(loop))
-    apart = [*_programs(claim, own.roles, own.subject), *_numbers(claim, own)]
-    return [*apart, *_words(claim, own), *_handed_over(claim, ends)]
+    recorded = Loop(make_subject(loop))
+    apart = [*_programs(claim, recorded.roles, recorded.subject), *_numbers(claim, recorded)]
+    return [*apart, *_words(claim, recorded), *_handed_over(claim, ends)]
 
 
 def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]:
     """Return the same for a claim about keeping a craft near a libration point."""
-    own, limit = Station(loop).claim(claim["theorem"]), loop.saturation_limit()
+    expected, limit = Station(loop).claim(claim["theorem"]), loop.saturation_limit()
     kinds = {"limit.axis": "axis", "limit.norm": "norm", "limit": "axis"}
-    told = {kinds[name]: rational(x) for name, x in claim["numbers"].items() if name in kinds}
-    other = any(kind != loop.limit or not isfinite(limit) or x != Fraction(limit) for kind, x in told.items())
-    return [*_programs(claim, own["programs"], own["subject"]), *["the limit differs"] * other]
+    numbers = {kinds[name]: rational(x) for name, x in claim["numbers"].items() if name in kinds}
+    other = any(kind != loop.limit or not isfinite(limit) or x != Fraction(limit) for kind, x in numbers.items())
+    return [*_programs(claim, expected["programs"], expected["subject"]), *["the limit differs"] * other]
 
 
 def _programs(claim: Mapping[str, Any], programs: Mapping[str, str], subject: Mapping[str, str]) -> Iterator[str]:
@@ -51,29 +51,32 @@ def _programs(claim: Mapping[str, Any], programs: Mapping[str, str], subject: Ma
             yield f"{name} is another number"
 
 
-def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
-    loop, known, wheels = own.loop, own.known, own.loop.wheels
-    told = {name: rational(x) for name, x in claim["numbers"].items()}
+def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
+    loop, known, wheels = recorded.loop, recorded.known, recorded.loop.wheels
+    numbers = {name: rational(x) for name, x in claim["numbers"].items()}
     # A larger limit than the loop's refutes more; an external torque is the requested one.
     side = -1 if claim["theorem"] in REFUTING else 1
     exactly = {"period": loop.period, "hysteresis": loop.hysteresis_width}
     least: dict[str, Any] = {f"outside.{k}": m for k, m in enumerate(known.modelled)}
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
-    if "share" in told and (driven := driven_errors(loop)) is not None:
+    if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
     if claim["theorem"] == POINTS:
-        envelope = known.envelope(BESIDE in told)._replace(momentum=above(exact(told.get("momentum", 0))))
-        least |= {name: exact(x) for name, x in pushes(loop, envelope).numbers.items()}
-        least["outside"] += 0 if OUTSIDE in claim["taken"] else known.modelled_norm
+        envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(exact(numbers.get("momentum", 0))))
+        pushed = pushes(loop, envelope).numbers
+        yield from (f"{name} has no bound" for name, x in pushed.items() if not isfinite(x))
+        least |= {name: exact(x) for name, x in pushed.items() if isfinite(x)}
+        if "outside" in least and OUTSIDE not in claim["taken"]:
+            least["outside"] += known.modelled_norm
         # What is not stated is zero.
-        told = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | told
-    wheeled = any(name.startswith(("motors", "stored")) for name in told)
+        numbers = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | numbers
+    wheeled = any(name.startswith(("motors", "stored")) for name in numbers)
     limit = float(loop.saturation_limit() if wheeled else loop.craft.torque_limit)
     most = {"limit": limit, "limit.norm": limit}
     if wheels is not None:
         most |= {f"motors.{k}": x for k, x in enumerate(at_top_speed(wheels).torque_limit)}
         most |= {f"stored.{k}": x * (1.0 - BAND) for k, x in enumerate(wheels.momentum_limit)}
-    for name, x in told.items():
+    for name, x in numbers.items():
         if name in exactly and x != Fraction(exactly[name]):
             yield f"the {name} differs"
         if name in least and side > 0 and x < fraction(least[name]):
@@ -82,15 +85,15 @@ def _numbers(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
             yield f"{name} is lower"
     # A norm within the limit is within it about each axis, and not the other way round.
     name, kind = ("limit", "norm") if side > 0 else ("limit.norm", "axis")
-    if name in told and loop.limit == kind:
+    if name in numbers and loop.limit == kind:
         yield "the limit is one of another kind"
     if wheeled:
-        if loop.limit != "none" and isfinite(most["limit"]) and told.keys().isdisjoint(("limit", "limit.norm")):
+        if loop.limit != "none" and isfinite(most["limit"]) and numbers.keys().isdisjoint(("limit", "limit.norm")):
             yield "the limit is not told"
         yield from (
             f"{name} is not told"
             for name, x in most.items()
-            if "." in name and name[0] in "ms" and isfinite(x) and name not in told
+            if "." in name and name[0] in "ms" and isfinite(x) and name not in numbers
         )
 
 
@@ -105,17 +108,19 @@ def _handed_over(claim: Mapping[str, Any], ends: Ends | None) -> Iterator[str]:
     either = SHORTEST in claim["taken"] or "both" in claim["theorem"]
     least = {"rate": inf if rate is None else rate, "angle": angle if angle is not None and either else ANY_ANGLE}
     for name, most in least.items():
-        told = claim["numbers"].get(f"start.{name}")
-        if told is not None and rational(told) < most:
+        claimed = claim["numbers"].get(f"start.{name}")
+        if claimed is not None and rational(claimed) < most:
             yield f"the previous mode may end with a larger {name}"
 
 
-def _words(claim: Mapping[str, Any], own: Loop) -> Iterator[str]:
+def _words(claim: Mapping[str, Any], loop: Loop) -> Iterator[str]:
     taken, theorem = set(claim["taken"]), claim["theorem"]
     if theorem in REFUTING:
         return
     signed = theorem in (SLIDING, STRICTLY, POINTS) or (theorem.startswith(CONVERGES) and "both" not in theorem)
-    if taken & {SHORTEST, HYSTERESIS} != set(sign_words(own.loop) if signed else []):
+    if taken & {SHORTEST, HYSTERESIS} != set(sign_words(loop.loop) if signed else []):
         yield "the sign of the quaternion is chosen in another way"
-    if theorem != SAMPLED and (WHEELS in taken) != (own.loop.wheels is not None):
+    if theorem != SAMPLED and (WHEELS in taken) != (loop.loop.wheels is not None):
         yield "only one of the two has wheels"
+    if WHEELS in taken and loop.loop.wheels is not None and not gives_allocated_torque(loop.loop.wheels):
+        yield "its wheels do not give the torque that is allocated to them"

@@ -20,8 +20,8 @@ def rows(array: Any) -> Rows:
 
 def fraction(x: Any) -> Fraction:
     """A number of FLINT as the kernel has it, and others at their exact value."""
-    found = exact(x)
-    return Fraction(int(found.p), int(found.q))
+    value = exact(x)
+    return Fraction(int(value.p), int(value.q))
 
 
 def floats(matrix: Sequence[Sequence[Any]]) -> NDArray[np.float64]:
@@ -53,8 +53,8 @@ def times(c: Any, a: Rows) -> Rows:
 
 def inverse(a: Rows) -> Rows:
     """The exact inverse; ZeroDivisionError for a singular matrix."""
-    found = fmpq_mat(len(a), len(a), [x for row in a for x in row]).inv()
-    return [[found[i, j] for j in range(len(a))] for i in range(len(a))]
+    inverted = fmpq_mat(len(a), len(a), [x for row in a for x in row]).inv()
+    return [[inverted[i, j] for j in range(len(a))] for i in range(len(a))]
 
 
 def definite(a: Rows) -> bool:
@@ -100,5 +100,5 @@ def _just_below(guess: float, size: float, a: Rows) -> Any:
 
 def matrix_of(form: Polynomial, names: Sequence[str]) -> Rows:
     """The symmetric matrix of a quadratic form in these variables."""
-    found = [[form.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in names] for a in names]
-    return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(found)]
+    entries = [[form.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in names] for a in names]
+    return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(entries)]

@@ -58,8 +58,8 @@ def band_of(loop: ClosedLoop) -> Band:
 def _forces(loop: ClosedLoop, distance: float) -> tuple[float, float]:
     """Return the sums of the largest accelerations (m/s2) and of their largest gradients (1/s2) beyond a distance."""
     tell: Any = [(f.part.hook("perturbation"), f.params) for f in movers(loop)]
-    found = [perturbation(params, loop.craft, distance) for perturbation, params in tell]
-    force, gradient = (sum(x) for x in zip(*found, strict=True))
+    accelerations = [perturbation(params, loop.craft, distance) for perturbation, params in tell]
+    force, gradient = (sum(x) for x in zip(*accelerations, strict=True))
     return force, gradient
 
 

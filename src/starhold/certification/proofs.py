@@ -59,44 +59,44 @@ def proved_claims(
     within limits must contain (rad); rate: up to which motions should converge from every attitude (rad/s, inf for any);
     tolerance: of the inertia, by default the largest; pointing: whether to find the pointing bound of the loop as it flies.
     """
-    found = find_claims(subject, turn, tolerance)
+    loop = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
-        find_pointed(found)
-    find_refuted(found, turn, rate)
-    claims = met(checked(found))
+        find_pointed(loop)
+    find_refuted(loop, turn, rate)
+    claims = met(checked(loop))
     # The refuted claim is the requested one; a weaker one may be proved.
     against = [claim for claim in claims if claim.outcome == "refuted"]
-    return {claim.kind: claim for claim in (*reversed(claims), *against)}, found.failed
+    return {claim.kind: claim for claim in (*reversed(claims), *against)}, loop.failed
 
 
 def pointed(subject: Subject, like: Claim | None = None) -> tuple[Claim | None, str]:
     """Return the pointing claim of a loop as it flies, or why no evidence was found. like: the claim of another loop, for
     the same start set and limits."""
-    found = Loop(subject)
-    find_pointed(found, None if like is None or like.proof is None else like.proof.claim["numbers"])
-    return next(iter(checked(found)), None), found.failed.get(POINTS, "no proof was found")
+    loop = Loop(subject)
+    find_pointed(loop, None if like is None or like.proof is None else like.proof.claim["numbers"])
+    return next(iter(checked(loop)), None), loop.failed.get(POINTS, "no proof was found")
 
 
 def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tuple[dict[str, Claim], dict[str, str]] | None:
     """Return the claim that motions which begin at up to a rate (rad/s) and an angle (rad, None for no bounds) converge to
     the target, if proved, and the one about torque held between samples, by their kinds, and why others were not found; None
     where no region of attraction is known, or where it is bounded and nothing bounds the rate."""
-    found = find_taken_over(subject, rate, angle)
-    return None if found is None else ({claim.kind: claim for claim in checked(found)}, found.failed)
+    loop = find_taken_over(subject, rate, angle)
+    return None if loop is None else ({claim.kind: claim for claim in checked(loop)}, loop.failed)
 
 
-def checked(found: Loop) -> list[Claim]:
+def checked(loop: Loop) -> list[Claim]:
     """Return the claims found, as the kernel reports them, except those whose check exceeds its work limit."""
     claims = list[Claim]()
-    for given in found.claims:
+    for given in loop.claims:
         try:
-            (proved,) = check(json.dumps(certificate(found.programs, [given])))
+            (proved,) = check(json.dumps(certificate(loop.programs, [given])))
         except RefusedError as reason:
             if Account.left >= 0:
                 raise
-            found.failed[given["theorem"]] = str(reason)
+            loop.failed[given["theorem"]] = str(reason)
             continue
-        claims.append(made(proved, given, found))
+        claims.append(made(proved, given, loop))
     return claims
 
 
@@ -107,10 +107,10 @@ def met(claims: list[Claim]) -> list[Claim]:
     if kept is None:
         return claims
     bounds = tuple(name for name in kept.assumptions if name.startswith("bounded-"))
-    own = [tuple(name for name in claim.assumptions if name != UNLIMITED) for claim in claims]
+    premises = [tuple(name for name in claim.assumptions if name != UNLIMITED) for claim in claims]
     return [
         claim if names == claim.assumptions else replace(claim, assumptions=tuple(dict.fromkeys(names + bounds)))
-        for claim, names in zip(claims, own, strict=True)
+        for claim, names in zip(claims, premises, strict=True)
     ]
 
 
@@ -126,16 +126,16 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
     witness = loop.written_by.get(given["programs"].get("lyapunov", ""), {})
     shown = steps_of(proved)
     if proved.statement.refutes:
-        name, told, against = refutation(proved, given, loop)
+        name, details, against = refutation(proved, given, loop)
         shown = [Obligation(name, next(step.how for step in shown if step.name == name), "refuted", against)]
     else:
-        told = _NUMBERS[label](numbers, loop)
+        details = _NUMBERS[label](numbers, loop)
         if proved.statement.within:
-            told["funnel"] = _funnel(proved.statement.within, told["settling"], told["angle"])
+            details["funnel"] = _funnel(proved.statement.within, details["settling"], details["angle"])
     programs = {name: loop.by_digest[name] for name in given["programs"].values()}
     return Claim(
         label,
-        told,
+        details,
         dict(witness),
         # Wheels have no limits other than those that the claim states.
         tuple(x for x in assumed(proved.statement.assumptions, loop) if (x, label) != (WHEELS, "wheels")),
@@ -147,8 +147,8 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
 def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
     """Return the assumptions of a claim beyond those that its loop meets by composition."""
     wheeled = loop.loop.wheels is not None
-    own = {"target-at-rest": loop.known.moving, "no-wheels": wheeled} | dict.fromkeys(IN_THE_LOOP, False)
-    named = [name for name in identifiers if own.get(name, True)]
+    satisfied = {"target-at-rest": loop.known.moving, "no-wheels": wheeled} | dict.fromkeys(IN_THE_LOOP, False)
+    named = [name for name in identifiers if satisfied.get(name, True)]
     if wheeled and UNLIMITED in named:
         # Without friction, too.
         named = [WHEELS if name == UNLIMITED else name for name in named if name != FRICTIONLESS]
@@ -184,8 +184,8 @@ def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         name: [above(_exact(numbers[at])) if (at := f"{key}.{k}") in numbers else None for k in range(len(loop.loop.rotors))]
         for name, key in (("motors", "motors"), ("wheel_momentum", "stored"))
     }
-    told = {name: found for name, found in each.items() if any(x is not None for x in found)}
-    return _set(numbers, loop) | {"momentum": float(numbers["momentum"])} | told
+    limits = {name: values for name, values in each.items() if any(x is not None for x in values)}
+    return _set(numbers, loop) | {"momentum": float(numbers["momentum"])} | limits
 
 
 def _inertia(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
@@ -254,8 +254,8 @@ def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 def _funnel(within: Sequence[tuple[Fraction, Fraction]], settling: float, angle: float) -> list[tuple[float, float]]:
     """Return times (s), each with the angle (rad) that motions do not exceed from then on; the ultimate bound is last."""
     # A margin, because the angle is computed in floats.
-    told = [(above(_exact(time)), 2.0 * asin(min(float(sine), 1.0)) * (1.0 + 1e-9)) for time, sine in within]
-    return [*((time, most) for time, most in told if time < settling and most > angle), (settling, angle)]
+    bounds = [(above(_exact(time)), 2.0 * asin(min(float(sine), 1.0)) * (1.0 + 1e-9)) for time, sine in within]
+    return [*((time, most) for time, most in bounds if time < settling and most > angle), (settling, angle)]
 
 
 def _exact(x: Fraction) -> Any:
@@ -278,10 +278,10 @@ _NUMBERS = {
 def refutation(proved: Proved, given: Mapping[str, Any], loop: Loop) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """Return the obligation that fails, the numbers of the claim that needs it, and the counterexample."""
     numbers, theorem = proved.claim.numbers.content, proved.claim.theorem
-    found = {name: o for name, o in obligations(given, loop.by_digest)[0].items() if isinstance(o, Exceeds)}
+    compared = {name: o for name, o in obligations(given, loop.by_digest)[0].items() if isinstance(o, Exceeds)}
 
     def values(name: str) -> tuple[float, float]:
-        return float(found[name].large), float(found[name].small)
+        return float(compared[name].large), float(compared[name].small)
 
     def state(turn: str = "turn") -> dict[str, Any]:
         read = State(*([numbers.get(f"{name}.{k}", Fraction(0)) for k in range(3)] for name in (turn, "rate")))
@@ -291,8 +291,8 @@ def refutation(proved: Proved, given: Mapping[str, Any], loop: Loop) -> tuple[st
     if theorem in (RISES, RISES_NEAR):
         fastest = numbers.get("fastest")
         rate = None if fastest is None else float(fastest)
-        asked = {"rate_everywhere": rate, "everything": rate is None} if theorem == RISES else {}
-        return "V is non-increasing", asked, state() | {"V'": values("V is non-increasing")[0]}
+        details = {"rate_everywhere": rate, "everything": rate is None} if theorem == RISES else {}
+        return "V is non-increasing", details, state() | {"V'": values("V is non-increasing")[0]}
     if theorem == NEGATIVE:
         return "V is least on target", {}, state() | {"V": -values("V is least on target")[0]}
     if theorem == EXCEEDS:
@@ -302,8 +302,8 @@ def refutation(proved: Proved, given: Mapping[str, Any], loop: Loop) -> tuple[st
         return "torque", begun | limit, state() | {"torque": sqrt(values("torque")[0])}
     if theorem == UNSETTLED:
         size = abs(complex(*loop.eigenvalues[0]))
-        told = {"period": float(numbers["period"]), "radius": size, "eigenvalues": loop.eigenvalues}
-        return "step", told | {"longest": None, "every_shorter": False}, {"eigenvalue": loop.eigenvalues[0]}
+        described = {"period": float(numbers["period"]), "radius": size, "eigenvalues": loop.eigenvalues}
+        return "step", described | {"longest": None, "every_shorter": False}, {"eigenvalue": loop.eigenvalues[0]}
     torque = [float(numbers.get(f"outside.{k}", 0)) for k in range(3)]
     if theorem == PUSHED:
         place = torque.index(max(torque))

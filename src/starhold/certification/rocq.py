@@ -163,8 +163,8 @@ def _text(given: Lemma) -> str:
     cofactors = [c * (size / of) for (c, _), (of, _) in zip(used, zeros, strict=True)]
     parts = list[Part]()
     for of, z, gram in given.parts:
-        own, whole = _whole(*z)
-        share = size / own / own / prod(known[k][0] for k in of)
+        multiple, whole = _whole(*z)
+        share = size / multiple / multiple / prod(known[k][0] for k in of)
         parts.append(Part(of, whole, [[share * x for x in row] for row in gram]))
     fractions = chain(*(c.terms.values() for c in cofactors), *(row for part in parts for row in part.gram))
     K = lcm(*(x.denominator for x in fractions))
@@ -172,8 +172,8 @@ def _text(given: Lemma) -> str:
     polys = [p, *low, *relations, *sides.values(), *cofactors, *(x for part in parts for x in part.z)]
     write = Writer(_names({name for q in polys for name in q.names}))
     variables, hypotheses = list(write.names.values()), [f"Z{k}" for k in range(len(zeros))]
-    told = [*(f"{write.sum(r)} = 0" for r in relations), *(f"0 <= {write.sum(g)}" for g in sides.values())]
-    told.append(f"{write.sum(low[0])} <= {write.sum(p)}" if low else f"{write.sum(p)} = 0")
+    premises = [*(f"{write.sum(r)} = 0" for r in relations), *(f"0 <= {write.sum(g)}" for g in sides.values())]
+    premises.append(f"{write.sum(low[0])} <= {write.sum(p)}" if low else f"{write.sum(p)} = 0")
     rule = ["exceeds" if low else "vanishes", f"[{'; '.join(variables)}]", _number(K), *map(write.terms, [p, *low])]
     rule += [write.list(c * K for c in cofactors), write.list(relations)]
     if low:
@@ -184,7 +184,7 @@ def _text(given: Lemma) -> str:
     before = f"forall {' '.join(variables)} : R, " if variables else ""
     named = " ".join([*variables, *hypotheses, *(f"K{k}" for k in sides)])
     proof = f"intros {named}.\n  refine ({' '.join(rule)}).\n  vm_cast_no_check (eq_refl true)."
-    return f"{before}{' -> '.join(told)}.\nProof.\n  {proof}\nQed."
+    return f"{before}{' -> '.join(premises)}.\nProof.\n  {proof}\nQed."
 
 
 class Writer:
@@ -243,13 +243,13 @@ def _whole(*polys: Poly) -> tuple[Fraction, list[Poly]]:
 
 def _names(variables: Iterable[str]) -> dict[str, str]:
     """Name variables as Rocq may."""
-    found = dict[str, str]()
+    names = dict[str, str]()
     for variable in sorted(variables):
         name = variable.replace(".", "_")
-        while name in WORDS or name in found.values():
+        while name in WORDS or name in names.values():
             name += "_"
-        found[variable] = name
-    return found
+        names[variable] = name
+    return names
 
 
 def _remark(text: str) -> str:

@@ -185,8 +185,8 @@ def _peaks(cubic: Any, spans: Array) -> tuple[float, float]:
         phi = tuple(s * (x + s * (y + s * z)) for x, y, z in zip(a, b, c, strict=True))
         slope = tuple(x + s * (2.0 * y + 3.0 * s * z) for x, y, z in zip(a, b, c, strict=True))
         bend = tuple(2.0 * y + 6.0 * s * z for y, z in zip(b, c, strict=True))
-        for place, (found, unit) in enumerate(zip(_motion(phi, slope, bend, 0.5, 40), (spans, spans**2), strict=True)):
-            largest[place] = max(largest[place], float((np.sqrt(dot(found, found)) / unit).max()))
+        for place, (peak, unit) in enumerate(zip(_motion(phi, slope, bend, 0.5, 40), (spans, spans**2), strict=True)):
+            largest[place] = max(largest[place], float((np.sqrt(dot(peak, peak)) / unit).max()))
     return largest[0], largest[1]
 
 
@@ -215,10 +215,10 @@ def _within(cubic: Any, lengths: Intervals, rate: float, acceleration: float) ->
             slope.append(steep + 2.0 * r * curved + 3.0 * square * z)
             bend.append(2.0 * curved + 6.0 * r * z)
         left = np.zeros(len(lane), dtype=bool)
-        for found, limit in zip(
+        for peak, limit in zip(
             _motion(tuple(phi), tuple(slope), tuple(bend), Intervals(0.0, 1.0), terms), limits, strict=True
         ):
-            size: Any = found[0].square() + found[1].square() + found[2].square()
+            size: Any = peak[0].square() + peak[1].square() + peak[2].square()
             left |= ~(size.high <= limit.low[lane])
         lane, low, middle, high = lane[left], low[left], middle[left], high[left]
         if ((middle <= low) | (middle >= high)).any():

@@ -35,34 +35,34 @@ def certify_station(loop: ClosedLoop, name: str = "") -> Certificate:
             claims = _rest(station)
     content = certificate(list(station.programs.values()), station.claims)
     shown = zip(check(json.dumps(content)) if station.claims else (), station.claims, strict=True)
-    found = [_made(*next(shown), station) if claim is None else claim for claim in claims]
-    return Certificate(name or law.name, described_station(loop), named(found, loop))
+    made = [_made(*next(shown), station) if claim is None else claim for claim in claims]
+    return Certificate(name or law.name, described_station(loop), named(made, loop))
 
 
 def _circle(station: Station) -> list[Claim | None]:
     """Return claims that are undecided, and None for each that the station has evidence of."""
     loop, limit = station.loop, station.loop.saturation_limit()
-    if found := _tried(station.show_circle):
+    if why_not := _tried(station.show_circle):
         other = _tried(station.show_astray) and _tried(station.show_held)
-        return [_undecided(loop, "circle", "form", found) if other else None]
+        return [_undecided(loop, "circle", "form", why_not) if other else None]
     if loop.limit == "none" or not math.isfinite(limit):
         return [None]
     why = "only for a law that undoes the linear model alone"
     if not full_problem(loop):
         why = _tried(lambda: station.show_limit(loop.limit, limit))
-    told = {"limit": limit, "kind": loop.limit}
-    return [None, _undecided(loop, "control-limit", "control", why, told) if why else None]
+    details = {"limit": limit, "kind": loop.limit}
+    return [None, _undecided(loop, "control-limit", "control", why, details) if why else None]
 
 
 def _rest(station: Station) -> list[Claim | None]:
     loop, limit = station.loop, station.loop.saturation_limit()
-    if found := _tried(station.show_rest):
-        return [_undecided(loop, "equilibrium", "form", found) if _tried(station.show_astray) else None]
+    if why_not := _tried(station.show_rest):
+        return [_undecided(loop, "equilibrium", "form", why_not) if _tried(station.show_astray) else None]
     if loop.limit != "axis" or not math.isfinite(limit) or full_problem(loop):
         return [None]
     why = _tried(lambda: station.show_limited_axis(limit))
-    told = {"limit": limit}
-    return [None, _undecided(loop, "saturated-axis", "stays", ASIDE if "held" in why else WEAK, told) if why else None]
+    details = {"limit": limit}
+    return [None, _undecided(loop, "saturated-axis", "stays", ASIDE if "held" in why else WEAK, details) if why else None]
 
 
 def _tried(show: Callable[[], None]) -> str:
@@ -76,13 +76,13 @@ def _tried(show: Callable[[], None]) -> str:
     return ""
 
 
-def _undecided(loop: ClosedLoop, kind: str, obligation: str, why: str, told: Any = None) -> Claim:
+def _undecided(loop: ClosedLoop, kind: str, obligation: str, why: str, details: Any = None) -> Claim:
     beside = {"control-limit": "in-the-plane", "saturated-axis": "held-aside"}.get(kind, "unlimited-control")
     names = ["whole-field" if full_problem(loop) else "linear-field", *SURE, beside]
     names += ["off-the-bodies"] if kind == "equilibrium" and full_problem(loop) else []
     how = EXACT if obligation == "form" else BALLS
     reason = {"reason": _mismatch(loop) or why}
-    return Claim(kind, told or {}, {}, tuple(names), (Obligation(obligation, how, "undecided", reason),))
+    return Claim(kind, details or {}, {}, tuple(names), (Obligation(obligation, how, "undecided", reason),))
 
 
 def _mismatch(loop: ClosedLoop) -> str:
@@ -106,15 +106,15 @@ def _made(proved: Proved, given: Mapping[str, Any], station: Station) -> Claim:
     statement = proved.statement
     numbers = {name: float(x) for name, x in proved.claim.numbers.content.items()}
     limit = next((name for name in ("norm", "axis") if f"limit.{name}" in numbers), None)
-    told: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
-    told |= {name: x for name, x in numbers.items() if name in STATED and not statement.refutes}
+    details: dict[str, Any] = {} if limit is None else {"limit": numbers[f"limit.{limit}"], "kind": limit}
+    details |= {name: x for name, x in numbers.items() if name in STATED and not statement.refutes}
     shown = steps_of(proved)
     if statement.refutes:
         returns = "x returns" if statement.label == "circle" else "each axis returns"
         name, *against = AGAINST.get(given["theorem"], (returns,))
         shown = [Obligation(name, EXACT_SIGN, "refuted", {key: numbers[key] for key in against})]
     programs = {name: station.by_digest[name] for name in given["programs"].values()}
-    return Claim(statement.label, told, {}, statement.assumptions, tuple(shown), Proof(dict(given), programs))
+    return Claim(statement.label, details, {}, statement.assumptions, tuple(shown), Proof(dict(given), programs))
 
 
 def described_station(loop: ClosedLoop) -> dict[str, Any]:

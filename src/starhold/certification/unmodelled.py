@@ -104,7 +104,7 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
     together, and where the target depends on the law's mode.
     """
     estimators = loop.used("estimator")
-    wanted = {name for f in estimators for name in f.part.needs} or {"attitude", "rate"}
+    wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
     told = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
     if not sensors or not told or loop.target.part.flag("BY_MODE"):
@@ -157,8 +157,13 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
 
 
 def _acting(loop: ClosedLoop) -> tuple[Fitted, ...]:
-    """Return the parts of a loop without the estimators that only watch."""
-    return tuple(fitted for fitted in loop.parts if fitted.role != "watcher")
+    """Return the parts of a loop without the estimators that only watch, and without the sensors that these alone read."""
+    parts = loop.as_commanded().parts
+    watched = {name for f in loop.parts if f not in parts for name in f.needs}
+    read = {*loop.law.reads, *(name for f in parts for name in (*f.part.reads, *f.needs))}
+    # Without an estimator what sensors tell of the state takes its place.
+    read |= set() if loop.used("estimator") else {*loop.start._fields}
+    return tuple(f for f in parts if f.part.role != "sensor" or _shown(f) & read or not _shown(f) & watched)
 
 
 def _called(fitted: Fitted) -> str:
@@ -272,5 +277,5 @@ def _is_idle(loop: ClosedLoop, fitted: Fitted, envelope: Envelope) -> bool:
     """Return whether all readers of a sensor are parts whose torque is bounded for any reading."""
     if fitted.part.role != "sensor" or _shown(fitted) & {*loop.start._fields, *loop.law.reads}:
         return False
-    readers = [f for f in loop.parts if _shown(fitted) & {*f.part.reads, *f.part.needs}]
+    readers = [f for f in _acting(loop) if _shown(fitted) & {*f.part.reads, *f.needs}]
     return all(f.part.role == "effector" and _pushes(f, envelope)[0] is not None for f in readers)

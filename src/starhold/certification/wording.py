@@ -100,7 +100,7 @@ def enumerated(names: Sequence[str]) -> str:
     roles: dict[str, list[str]] = {}
     for role, _, name in (text.partition(" ") for text in names):
         roles.setdefault(role, []).append(name)
-    return listed([f"the {role}{'s' * (len(own) > 1)} {listed(own)}" for role, own in roles.items()])
+    return listed([f"the {role}{'s' * (len(parts) > 1)} {listed(parts)}" for role, parts in roles.items()])
 
 
 def listed(words: Sequence[str]) -> str:
@@ -138,9 +138,9 @@ def place(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     turn, on_target = numbers.get("slew_angle"), numbers.get("rate_start", numbers.get("rate"))
     if turn is None:
         return ""
-    held = _rests(turn, subject, more)
-    held += f" and, on target, {speed(on_target, more)} about any axis" if on_target else ""
-    return f"from the level set of V that holds {held},"
+    contained = _rests(turn, subject, more)
+    contained += f" and, on target, {speed(on_target, more)} about any axis" if on_target else ""
+    return f"from the level set of V that holds {contained},"
 
 
 def _rests(turn: float, subject: Mapping[str, Any], more: bool) -> str:
@@ -221,10 +221,10 @@ def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
         return "no motor of a wheel reaches its limit"
     parts: list[str] = []
     for text, name, unit in (("motor{} gives", "motors", " N m"), ("wheel{} stores", "wheel_momentum", " N m s")):
-        told = [x for x in n.get(name, ()) if x is not None]
-        if told:
-            which = text.format("" if len(told) == len(n[name]) else " with a limit")
-            parts.append(f"no {which} more than {shown(max(told), unit, up=True)}")
+        limits = [x for x in n.get(name, ()) if x is not None]
+        if limits:
+            which = text.format("" if len(limits) == len(n[name]) else " with a limit")
+            parts.append(f"no {which} more than {shown(max(limits), unit, up=True)}")
     while_ = f"while the total momentum is at most {shown(n['momentum'], ' N m s')}"
     return f"{place(n, subject)} {while_}, {' and '.join(parts)}{_followed(subject)}"
 
@@ -356,11 +356,11 @@ def _telling(z: complex) -> int:
 
 def evidence(obligation: Obligation) -> str:
     """Why an obligation is refuted or undecided."""
-    found = obligation.evidence
-    if "reason" in found:
-        return str(found["reason"])
+    details = obligation.evidence
+    if "reason" in details:
+        return str(details["reason"])
     parts: list[str] = []
-    for key, value in found.items():
+    for key, value in details.items():
         if key == "state":
             q, w = (", ".join(f"{x:.4g}" for x in value[name]) for name in ("attitude", "rate"))
             parts.append(f"q = ({q}), w = ({w}) rad/s")

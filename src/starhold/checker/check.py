@@ -137,10 +137,10 @@ def _known(content: Any) -> None:
 def _proofs(content: Any) -> list[Proved]:
     """Return what the kernel proves of a file, in which each claim must occur once, in order."""
     lists: list[Any] = [given.get("claims") for given in content["certificates"]]
-    claims: Any = [claim for own in lists if isinstance(own, list) for claim in own]  # pyright: ignore
-    told: list[Any] = [claim["proof"] for claim in claims if isinstance(claim, dict) and "proof" in claim]
-    demand(told == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
-    if not told:
+    claims: Any = [claim for listed in lists if isinstance(listed, list) for claim in listed]  # pyright: ignore
+    proofs: list[Any] = [claim["proof"] for claim in claims if isinstance(claim, dict) and "proof" in claim]
+    demand(proofs == [*range(len(content["claims"]))], "the proofs are not those that the claims count")
+    if not proofs:
         demand(not content["programs"], "there are programs without a proof")
         return []
     try:
@@ -162,10 +162,10 @@ def _certificate(given: Any, proofs: Sequence[Proved]) -> Iterator[Finding]:
     for claim in given["claims"]:
         kind = str(claim.get("kind", ""))
         try:
-            found = _proved(proofs, claim) if "proof" in claim else _unproved(given["subject"], claim)
+            checked = _proved(proofs, claim) if "proof" in claim else _unproved(given["subject"], claim)
         except CheckError as fault:
-            found: list[tuple[str, Verdict, str]] = [("", "fails", str(fault))]
-        yield from (Finding(name, kind, *one) for one in found)
+            checked: list[tuple[str, Verdict, str]] = [("", "fails", str(fault))]
+        yield from (Finding(name, kind, *one) for one in checked)
     if not given["claims"]:
         yield Finding(name, "", "", "not claimed", "there are no claims")
 

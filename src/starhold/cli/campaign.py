@@ -41,6 +41,7 @@ def campaign(
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://HOST:PORT", help="an existing Dask cluster in place of threads")
     ] = None,
+    gpu: Annotated[bool, typer.Option("--gpu", help="the NVIDIA GPU of this machine in place of threads")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="fly the runs that are missing from a folder")] = False,
     output: CampaignOutput = None,
     force: Force = False,
@@ -54,7 +55,7 @@ def campaign(
     from starhold.report.campaign_page import write_campaign
     from starhold.scenario.reading import load
 
-    engine = engine_of(threads, workers, scheduler)
+    engine = engine_of(threads, workers, scheduler, gpu)
     scenario = with_campaign(load(file, allow_unstable), {"runs": runs, "seed": seed, "sampling": sampling})
     laws = [entry.name for entry in scenario.laws] if law is None else [scenario.pick(law).name]
     folder = output or Path("results") / f"{scenario.name}-campaign"

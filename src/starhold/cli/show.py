@@ -123,7 +123,8 @@ def print_table(flights: Sequence[Flight]) -> None:
                 notes = [f"{one.utc} UTC"] * bool(one.utc) + [f"the monitor {one.monitor} is tripped"] * bool(one.monitor)
                 said = f" ({'; '.join(notes)})" if notes else ""
                 stretches += f", {one.mode} from {metric_set.moment(one.time, 6)}{said}"
-            console.print(escape(f"Modes of {flight.name}: {first.mode}{stretches}."))
+            never = "".join(f" {one}." for one in flight.never)
+            console.print(escape(f"Modes of {flight.name}: {first.mode}{stretches}.{never}"))
 
 
 def _cell(text: str, best: bool) -> str:

@@ -20,6 +20,7 @@ from starhold.report.commands import Cell, coloured
 
 if TYPE_CHECKING:
     from starhold.campaign.results import CampaignResult
+    from starhold.campaign.worst import Sought
 
 METRICS, DRIVERS, AGAIN = 8, 4, 3
 """How many metrics, drivers of each kind and runs of a law are printed; the page lists all."""
@@ -35,24 +36,31 @@ class Rate(ProgressColumn):
 
 
 @contextmanager
-def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Iterator[Callable[[str, int], None]]:
-    """Show a bar for each law, of so many runs, with the rate and the time left; yield the function to call with a law and
-    how many more of its runs are done, from any thread. If an error comes before the first run, the bars disappear. drawn:
-    whether runs differ in more than their noise."""
+def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Iterator[Callable[..., None]]:
+    """Show a bar for each law, of so many runs, and for each search for a worst case, with the rate and the time left; yield
+    the function to call with a law and how many more of its runs are done, or also with what is `Sought`, from any thread.
+    If an error comes before the first run, the bars disappear. drawn: whether runs differ in more than their noise."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"), Rate(), TimeLeft())
     titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]
     if not drawn:
         titles[0] += "; nothing is dispersed, so runs differ in their noise alone, if they have any"
     bars = Progress(*columns, console=console)
-    tasks: dict[str, TaskID] = {}
+    tasks: dict[Any, TaskID] = {}
     for law in laws:
         tasks[law] = bars.add_task(f"{escape(printable(law))} (compiling)", total=runs)
 
-    def notice(law: str, more: int) -> None:
+    def notice(law: str, more: int, sought: Sought | None = None) -> None:
         with suppress(IndexError):
             console.print(titles.pop())
             bars.start()
-        bars.update(tasks[law], advance=more, description=escape(printable(law)))
+        if sought is None:
+            bars.update(tasks[law], advance=more, description=escape(printable(law)))
+            return
+        key = law, sought.name
+        if key not in tasks:
+            words = escape(printable(f"{law}: worst {sought.name}"))
+            tasks[key] = bars.add_task(words, total=sought.flights)
+        bars.update(tasks[key], advance=more)
 
     if console.is_terminal:
         bars.start()

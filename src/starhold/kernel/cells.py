@@ -71,15 +71,15 @@ class System:
         for role in roles:
             demand(set(claim.programs[role].inputs) <= set(given), "a function depends on more than the state")
             outputs += claim.programs[role].run(given, Exactly(), 1)
-        found = joined(outputs, CELLS)
-        self.all = [Cell(signs(case.guards), case.value[:count], case.value[count:]) for case in found]
+        cases = joined(outputs, CELLS)
+        self.all = [Cell(signs(case.guards), case.value[:count], case.value[count:]) for case in cases]
         self.surfaces: list[Condition] = sorted({surface for cell in self.all for surface in cell.signs})
 
     @cached_property
     def facts(self) -> list[Poly]:
         """Return what is negative nowhere: the sides of the box, and of an angle what Taylor's series leave, times
         x for the sine. (Each is the integral of the one before, and so they alternate for x > 0.)"""
-        found = [side for name, (low, high) in self.box.items() for side in (var(name) - low, high - var(name))]
+        sides = [side for name, (low, high) in self.box.items() for side in (var(name) - low, high - var(name))]
         for name in self.angles:
             series, term = {"cos": poly(0), "sin": poly(0)}, poly(1)
             for n in range(TAYLOR):
@@ -87,8 +87,8 @@ class System:
                 series[f], term = series[f] + term * Fraction(sign, factorial(n)), term * var(name)
                 turned = 1 - var(f"cos.{name}") if f == "cos" else var(f"sin.{name}")
                 left = (series[f] - turned) * sign
-                found.append(left * var(name) if f == "sin" else left)
-        return found
+                sides.append(left * var(name) if f == "sin" else left)
+        return sides
 
     def slope(self, V: Poly, rates: Sequence[Poly]) -> Poly:
         """Return V' for these rates."""
@@ -119,9 +119,9 @@ class System:
     @cached_property
     def apart(self) -> list[tuple[int, ...]]:
         """Return the cells that are told to be empty, and the pairs that are told not to meet."""
-        found = [tuple(read_list(own)) for own in read_list(self.claim.evidence.get("apart") or [])]
-        demand(all(len(own) in (1, 2) and self.are_cells(own) for own in found), "there are no such cells")
-        return found
+        groups = [tuple(read_list(group)) for group in read_list(self.claim.evidence.get("apart") or [])]
+        demand(all(len(group) in (1, 2) and self.are_cells(group) for group in groups), "there are no such cells")
+        return groups
 
     def are_cells(self, places: Sequence[Any]) -> bool:
         """Tell whether these are places of cells."""
@@ -138,8 +138,8 @@ class System:
 
     def sound(self) -> Shown:
         """Each function is one: it is the same where cells meet."""
-        for own in self.apart:
-            yield f"apart {' '.join(map(str, own))}", self.sum(poly(-1), own)
+        for group in self.apart:
+            yield f"apart {' '.join(map(str, group))}", self.sum(poly(-1), group)
         for i, j in combinations(self.cells, 2):
             for k, p in enumerate(minus(self.all[i].V, self.all[j].V) if self.meet(i, j) else ()):
                 yield from self.equal(f"continuous {k} {i} {j}", p, (i, j))
@@ -164,22 +164,22 @@ class System:
     def state(self, place: str) -> tuple[Cell, State]:
         """Return the state of the numbers place.x, and a cell that holds it; refuse one outside of the box."""
         demand(not self.angles, "a state with an angle has no exact values")
-        told = {x: self.claim.numbers.coordinate(f"{place}.{x}") for x in (*self.names, *self.parameters)}
-        state = {x: at - self.shift.get(x, 0) for x, at in told.items()}
+        coordinates = {x: self.claim.numbers.coordinate(f"{place}.{x}") for x in (*self.names, *self.parameters)}
+        state = {x: at - self.shift.get(x, 0) for x, at in coordinates.items()}
         demand(all(low <= state[x] <= high for x, (low, high) in self.box.items()), "a state is outside of the box")
-        held = [cell for cell in self.all if cell.holds(state)]
-        demand(bool(held), "no cell holds a state")
-        return held[0], state
+        holding = [cell for cell in self.all if cell.holds(state)]
+        demand(bool(holding), "no cell holds a state")
+        return holding[0], state
 
 
 def signs(guards: Guards) -> dict[Condition, int]:
     """Return the side of each surface; p and -p are one surface, on which lies what has neither p > 0 nor -p > 0."""
-    found = dict[Condition, int]()
+    sides = dict[Condition, int]()
     for p, truth in sorted(guards):
         turn = 1 if p[0][1] > 0 else -1
         surface, sign = tuple((m, c * turn) for m, c in p), turn if truth else -turn
-        found[surface] = sign if found.get(surface, sign) == sign else 0
-    return found
+        sides[surface] = sign if sides.get(surface, sign) == sign else 0
+    return sides
 
 
 def power(x: Poly, n: Any) -> Poly:

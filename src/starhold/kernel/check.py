@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from .loops import IS_VALID
 from .numbers import Account, RefusedError, demand
 from .reading import BYTES, Claim, read_certificate
 from .rules import Obligation
@@ -44,12 +45,18 @@ def prove(claim: Claim) -> Proved:
             name, obligation = next(needed)
         except StopIteration as end:
             claim.close()
-            return Proved(claim, end.value, tuple(shown))
+            return Proved(claim, _if_valid(end.value, claim), tuple(shown))
         try:
             obligation.check(claim.evidence.get(name))
         except RefusedError as fault:
             raise RefusedError(f"{claim.theorem}, {name}: {fault}") from None
         shown.append((name, obligation))
+
+
+def _if_valid(statement: Statement, claim: Claim) -> Statement:
+    """Return a statement with the assumption that estimates are valid, if a program of the claim reads whether they are."""
+    reads = any(IS_VALID in program.inputs for program in claim.programs.content.values())
+    return replace(statement, assumptions=(*statement.assumptions, "valid-estimate")) if reads else statement
 
 
 def main(arguments: list[str]) -> int:

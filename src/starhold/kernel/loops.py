@@ -30,6 +30,8 @@ SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
 """How the sign of the quaternion that is fed back is chosen: otherwise it never changes."""
 HANDED = "handed over"
 """The loop takes over from another one in any of the states that the claim says its set holds."""
+IS_VALID = "measurement.is_valid"
+"""This input tells a program whether the estimate that it is given is valid, as it is in every loop here."""
 NONE = [Poly({})] * 3
 Matrix: TypeAlias = Sequence[Sequence[Poly | Fraction]]
 Wired: TypeAlias = Mapping[str, Poly]
@@ -42,16 +44,16 @@ def wired(name: str, value: Sequence[Poly]) -> dict[str, Poly]:
 
 def wired_matrix(name: str, value: Matrix) -> dict[str, Poly]:
     """Return the inputs of a matrix: name.0.0, ..., and of a diagonal one name.0, name.1, name.2 too."""
-    found = {f"{name}.{i}.{k}": poly(x) for i, row in enumerate(value) for k, x in enumerate(row)}
+    wires = {f"{name}.{i}.{k}": poly(x) for i, row in enumerate(value) for k, x in enumerate(row)}
     plain = all(poly(value[i][k]).terms == {} for i in AXES for k in AXES if i != k)
-    return found | ({f"{name}.{i}": poly(value[i][i]) for i in AXES} if plain else {})
+    return wires | ({f"{name}.{i}": poly(value[i][i]) for i in AXES} if plain else {})
 
 
 class Loop:
     """A loop reads its programs over one ring. `told` names their inputs, beside what is wired to the one that is read;
     `rates` has the derivatives that do not depend on the law, `driven` the variables of those that do."""
 
-    told: Wired
+    inputs: Wired
     rates: Mapping[str, Poly]
     driven: Sequence[str]
 
@@ -63,7 +65,7 @@ class Loop:
         and the period are numbers, those of the subject."""
         program, given = self.claim.programs[role], dict[str, Piecewise]()
         for name in program.inputs:
-            wires = [table[name] for table in (self.told, *tables) if name in table]
+            wires = [table[name] for table in (self.inputs, *tables) if name in table]
             number = name.startswith(("gains.", "craft.", "plant.")) or name == "measurement.period"
             demand(bool(wires) or number, f"the {role} asks for {name}, which nothing gives")
             given[name] = known(wires[-1] if wires else self.claim.subject[name])
@@ -107,14 +109,18 @@ class AttitudeLoop(Loop):
             "target_acceleration": self.speeding, "external_torque": self.e, "position": variables("p"),
             "wheel_momentum": self.stored, "magnetic_field": variables("b"),
         }  # fmt: skip
-        self.told = {name: p for field, value in fields.items() for name, p in wired(f"measurement.{field}", value).items()}
+        self.inputs = {
+            name: p for field, value in fields.items() for name, p in wired(f"measurement.{field}", value).items()
+        }
+        # A statement about programs that read it says so.
+        self.inputs[IS_VALID] = poly(1)
         self.sphere = dot(self.q, self.q) - 1
         self.still: dict[str, int] = dict.fromkeys(self.driven, 0)
         self.on_target, self.opposite = ({"q0": q0, "q1": 0, "q2": 0, "q3": 0} for q0 in (1, -1))
         # q' = q (0, w)/2.
-        own, half = self.q[1:], Fraction(1, 2)
-        turned = [self.q[0] * w + c for w, c in zip(self.w, cross(own, self.w), strict=True)]
-        self.turning = [-half * dot(self.w, own), *(half * part for part in turned)]
+        vector, half = self.q[1:], Fraction(1, 2)
+        turned = [self.q[0] * w + c for w, c in zip(self.w, cross(vector, self.w), strict=True)]
+        self.turning = [-half * dot(self.w, vector), *(half * part for part in turned)]
         self.rates = {f"q{k}": rate for k, rate in enumerate(self.turning)}
 
     def _inertia(self) -> tuple[Matrix, Matrix]:
@@ -141,14 +147,14 @@ class AttitudeLoop(Loop):
         """Return what is not negative for inertias near the given one, as |q0 w + w x q| <= |w|."""
         if not self.near:
             return []
-        w, own = self.w, self.q[1:]
-        turned = [self.q[0] * x + c for x, c in zip(w, cross(w, own), strict=True)]
+        w, vector = self.w, self.q[1:]
+        turned = [self.q[0] * x + c for x, c in zip(w, cross(w, vector), strict=True)]
         return [self.off * dot(w, w) - dot(turned, minus(apply(self.J, w), apply(self.given, w)))]
 
     @property
     def divisors(self) -> dict[str, Poly]:
         """Return the polynomials that variables are inverses of."""
-        return {name: Poly(dict(own)) for own, name in self.ring.inverses.items()}
+        return {name: Poly(dict(terms)) for terms, name in self.ring.inverses.items()}
 
     @property
     def assumed(self) -> list[str]:
@@ -185,7 +191,7 @@ class AttitudeLoop(Loop):
     def balance(self, u: Sequence[Poly]) -> list[Poly]:
         """Return J w' under a torque of the law."""
         outside = minus(self.e, apply(self.J, self.speeding))
-        return [torque + own for torque, own in zip(u, minus(outside, cross(self.rate, self.H)), strict=True)]
+        return [torque + load for torque, load in zip(u, minus(outside, cross(self.rate, self.H)), strict=True)]
 
     @cached_property
     def acceleration(self) -> list[Poly]:
@@ -236,7 +242,7 @@ class AttitudeLoop(Loop):
 def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
     """Return the one case that holds around rest, where none of its conditions is on its border."""
     sides = [[(Poly(dict(p)).at(rest).number, truth) for p, truth in case.guards] for case in cases]
-    holds = [all(x != 0 and (x > 0) == truth for x, truth in own) for own in sides]
+    holds = [all(x != 0 and (x > 0) == truth for x, truth in guards) for guards in sides]
     demand(holds.count(True) == 1, "the law switches at rest")
     return cases[holds.index(True)]
 

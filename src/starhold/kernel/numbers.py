@@ -54,13 +54,13 @@ def longest(numbers: Iterable[Fraction]) -> int:
 def rational(given: Any) -> Fraction:
     """Read an exact number: -2, 3/4, or the hexadecimal form of a float, which is its exact value."""
     text = given if isinstance(given, str) else ""
-    if found := _FLOAT.fullmatch(text):
-        sign, whole, after, exponent = found.groups(default="")
+    if match := _FLOAT.fullmatch(text):
+        sign, whole, after, exponent = match.groups(default="")
         demand(abs(int(exponent)) <= 1100, "a float is out of range")
         return Fraction(int(sign + whole + after, 16), 16 ** len(after)) * Fraction(2) ** int(exponent)
-    found = _QUOTIENT.fullmatch(text)
-    upper, lower = found.groups(default="1") if found else ("", "")
-    demand(found is not None, "a number is not written as one")
+    match = _QUOTIENT.fullmatch(text)
+    upper, lower = match.groups(default="1") if match else ("", "")
+    demand(match is not None, "a number is not written as one")
     demand(int(lower) != 0, "a denominator is zero")
     return Fraction(int(upper), int(lower))
 
@@ -68,24 +68,24 @@ def rational(given: Any) -> Fraction:
 def read_list(given: Any, count: int | None = None) -> list[Any]:
     """Read a list, of so many entries if that is told."""
     demand(isinstance(given, list), "evidence is not a list")
-    found = cast(list[Any], given)
-    demand(count is None or len(found) == count, "a list has another length")
-    return found
+    entries = cast(list[Any], given)
+    demand(count is None or len(entries) == count, "a list has another length")
+    return entries
 
 
 def read_dict(given: Any, most: int) -> dict[str, Any]:
     """Read a table of no more than so many entries."""
     demand(isinstance(given, dict), "evidence is not a table")
-    found = cast(dict[str, Any], given)
-    demand(len(found) <= most, "a table is too long")
-    return found
+    entries = cast(dict[str, Any], given)
+    demand(len(entries) <= most, "a table is too long")
+    return entries
 
 
 def read_table(given: Any, *keys: str) -> list[Any]:
     """Read the entries of a table that has these keys and no other."""
-    found = read_dict(given, len(keys))
-    demand(set(found) == set(keys), f"a table has other keys than {', '.join(keys)}")
-    return [found[key] for key in keys]
+    entries = read_dict(given, len(keys))
+    demand(set(entries) == set(keys), f"a table has other keys than {', '.join(keys)}")
+    return [entries[key] for key in keys]
 
 
 def matrix(given: Any, rows: int, columns: int) -> Rows:
@@ -133,8 +133,8 @@ def inverse(a: Rows) -> Rows:
     for k in range(count):
         demand(rest[k][k] != 0, "a matrix has no inverse")
         Account.spend(2 * count * count, sum(map(longest, rest)))
-        own = [x / rest[k][k] for x in rest[k]]
-        rest = [plus([row], [own], -row[k])[0] if i != k else own for i, row in enumerate(rest)]
+        pivot = [x / rest[k][k] for x in rest[k]]
+        rest = [plus([row], [pivot], -row[k])[0] if i != k else pivot for i, row in enumerate(rest)]
     return [row[count:] for row in rest]
 
 

@@ -26,8 +26,8 @@ class PointLoop(Loop):
     def __init__(self, claim: Claim) -> None:
         super().__init__(claim, Asking())
         self.x, self.v = variables("x"), variables("v")
-        own = wired("position", self.x) | wired("velocity", self.v)
-        self.told = own | {f"measurement.{name}": p for name, p in own.items()}
+        state = wired("position", self.x) | wired("velocity", self.v)
+        self.inputs = state | {f"measurement.{name}": p for name, p in state.items()}
         self.rates = dict(zip(STATE, self.v, strict=False))
         self.field = self.single("field", 3)
         demand(not claim.taken.content, "the loop is taken with nothing")
@@ -41,7 +41,7 @@ class PointLoop(Loop):
         """Return v'."""
         return [a + u for a, u in zip(self.field, side.value, strict=True)]
 
-    def asked(self, side: Case) -> set[str]:
+    def depends_on(self, side: Case) -> set[str]:
         """Return the variables of the acceleration."""
         return {name for p in self.acceleration(side) for name in p.names}
 

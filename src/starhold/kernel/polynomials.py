@@ -38,11 +38,11 @@ class Poly:
             return Poly({(tuple(sorted(m + n)) if n else m): c * d for m, c in self.terms.items()})
         # In whole numbers, reduced once for each monomial.
         (left, below), (right, under) = whole([*self.terms.values()]), whole([*other.terms.values()])
-        found = dict[Monomial, int]()
+        terms = dict[Monomial, int]()
         for (m, c), (n, d) in product(zip(self.terms, left, strict=True), zip(other.terms, right, strict=True)):
             both = tuple(sorted(m + n))
-            found[both] = found.get(both, 0) + c * d
-        return Poly({m: Fraction(c, below * under) for m, c in found.items()})
+            terms[both] = terms.get(both, 0) + c * d
+        return Poly({m: Fraction(c, below * under) for m, c in terms.items()})
 
     def __neg__(self) -> Poly:
         Account.spend(len(self.terms))
@@ -70,19 +70,19 @@ class Poly:
     def slope(self, name: str) -> Poly:
         """Return the derivative: every monomial with the name loses one, and gains its count as a factor."""
         Account.spend(len(self.terms))
-        found: dict[Monomial, Fraction] = {}
+        terms: dict[Monomial, Fraction] = {}
         for m, c in self.terms.items():
             if name in m:
                 place = m.index(name)
-                found[m[:place] + m[place + 1 :]] = c * m.count(name)
-        return Poly(found)
+                terms[m[:place] + m[place + 1 :]] = c * m.count(name)
+        return Poly(terms)
 
     def powers(self, name: str) -> list[Poly]:
         """Return the coefficients of a polynomial in one variable, from the lowest on."""
-        found = [dict[Monomial, Fraction]() for _ in range(1 + max((m.count(name) for m in self.terms), default=0))]
+        powers = [dict[Monomial, Fraction]() for _ in range(1 + max((m.count(name) for m in self.terms), default=0))]
         for m, c in self.terms.items():
-            found[m.count(name)][tuple(x for x in m if x != name)] = c
-        return list(map(Poly, found))
+            powers[m.count(name)][tuple(x for x in m if x != name)] = c
+        return list(map(Poly, powers))
 
     def at(self, values: Mapping[str, Poly | Fraction | int]) -> Poly:
         """Return the polynomial with numbers or polynomials in place of variables, all at once."""
@@ -112,12 +112,12 @@ def variables(letter: str, first: int = 1, last: int = 3) -> list[Poly]:
 
 def total(parts: Iterable[Poly]) -> Poly:
     """Return a sum."""
-    found = dict[Monomial, list[Fraction]]()
+    coefficients = dict[Monomial, list[Fraction]]()
     for part in parts:
         Account.spend(len(part.terms) + 1, longest(part.terms.values()))
         for m, c in part.terms.items():
-            found.setdefault(m, []).append(c)
-    return Poly({m: own[0] if len(own) == 1 else added(own) for m, own in found.items()})
+            coefficients.setdefault(m, []).append(c)
+    return Poly({m: some[0] if len(some) == 1 else added(some) for m, some in coefficients.items()})
 
 
 def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) -> Poly:
@@ -127,10 +127,10 @@ def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) 
 
 def horner(parts: Sequence[Poly], x: Poly) -> Poly:
     """Return parts[0] + parts[1] x + parts[2] x^2 + ..."""
-    found = Poly({})
+    value = Poly({})
     for part in reversed(parts):
-        found = found * x + part
-    return found
+        value = value * x + part
+    return value
 
 
 def apply(rows: Sequence[Sequence[Poly | Fraction | int]], v: Sequence[Poly]) -> list[Poly]:
@@ -151,7 +151,7 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     """Return a number that |p| does not exceed where no variable exceeds its size."""
     ratios = {name: sizes[name].as_integer_ratio() for name in p.names}
-    found, places = 0, 64
+    bound, places = 0, 64
     for m, c in p.terms.items():
         upper, lower = abs(c.numerator), c.denominator
         for name in m:
@@ -160,8 +160,8 @@ def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
         Account.spend(len(m) + 1, upper.bit_length() + lower.bit_length())
         finer = max(0, 64 + lower.bit_length() - upper.bit_length() - places)
         places += finer
-        found = (found << finer) - ((-upper << places) // lower)
-    return up(Fraction(found, 1 << places))
+        bound = (bound << finer) - ((-upper << places) // lower)
+    return up(Fraction(bound, 1 << places))
 
 
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:
@@ -174,9 +174,9 @@ def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:
 
 def read_poly(given: Any) -> Poly:
     """Read a polynomial of the evidence: {"q0 w1 w1": "3/4"}."""
-    found: dict[Monomial, Fraction] = {}
+    terms: dict[Monomial, Fraction] = {}
     for names, c in read_dict(given, TERMS).items():
         m = tuple(sorted(names.split()))
-        demand(m not in found and len(m) <= DEGREE, "a monomial stands twice, or is of too high a degree")
-        found[m] = rational(c)
-    return Poly(found)
+        demand(m not in terms and len(m) <= DEGREE, "a monomial stands twice, or is of too high a degree")
+        terms[m] = rational(c)
+    return Poly(terms)

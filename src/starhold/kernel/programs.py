@@ -41,7 +41,7 @@ class Program:
         demand(len(steps) <= STEPS and len(inputs) <= STEPS, "a program is too long")
         demand(all(isinstance(n, str) and _NAME.fullmatch(n) is not None for n in inputs), "an input has no proper name")
         demand(len(set(inputs)) == len(inputs), "an input stands twice")
-        kinds, found = ["n"] * len(inputs), list[tuple[str, Any]]()
+        kinds, operations = ["n"] * len(inputs), list[tuple[str, Any]]()
 
         def place(k: Any, kind: str) -> int:
             demand(type(k) is int and 0 <= k < len(kinds), "a step reads what is not there yet")
@@ -51,16 +51,16 @@ class Program:
         for step in map(read_list, steps):
             demand(len(step) > 0 and isinstance(step[0], str), "a step has no operation")
             if step[0] == "constant":
-                found.append(("constant", rational(step[1] if len(step) == 2 else None)))
+                operations.append(("constant", rational(step[1] if len(step) == 2 else None)))
                 kinds.append("n")
                 continue
             demand(step[0] in OPERATIONS, "there is no such operation")
             takes, gives = OPERATIONS[step[0]].split(">")
             operands = step[1:]
             demand(len(operands) == len(takes), f"{step[0]} takes another number of values")
-            found.append((step[0], tuple(place(k, kind) for k, kind in zip(operands, takes, strict=True))))
+            operations.append((step[0], tuple(place(k, kind) for k, kind in zip(operands, takes, strict=True))))
             kinds.append(gives)
-        return cls(tuple(inputs), tuple(found), tuple(place(k, "n") for k in outputs), digest(given))
+        return cls(tuple(inputs), tuple(operations), tuple(place(k, "n") for k in outputs), digest(given))
 
     def run(self, given: Mapping[str, Piecewise], ring: Exactly, count: int) -> list[Piecewise]:
         """Return the outputs, of which there have to be so many, case by case."""
@@ -129,12 +129,12 @@ def single(cases: Piecewise) -> Poly:
 
 def joined(values: Iterable[Piecewise], most: int = CASES) -> Piecewise:
     """Return the cases of some values together, without those whose guards contradict each other."""
-    found = [Case(frozenset(), [])]
+    together = [Case(frozenset(), [])]
     for cases in values:
-        pairs = ((a.guards | b.guards, [*a.value, b.value]) for a in found for b in cases)
-        found = [Case(guards, value) for guards, value in pairs if not contradictory(guards)]
-        demand(len(found) <= most, "a program has too many cases")
-    return found
+        pairs = ((a.guards | b.guards, [*a.value, b.value]) for a in together for b in cases)
+        together = [Case(guards, value) for guards, value in pairs if not contradictory(guards)]
+        demand(len(together) <= most, "a program has too many cases")
+    return together
 
 
 def contradictory(guards: Guards) -> bool:
@@ -149,8 +149,8 @@ def positive(guards: Guards, p: Poly) -> bool | None:
     """Tell whether p > 0 where guards hold, as far as one of them alone decides it: None where none does."""
     if not p.names:
         return p.number > 0
-    for own, above in guards:
-        g = Poly(dict(own))
+    for terms, above in guards:
+        g = Poly(dict(terms))
         factor, offset = multiple(p, g if above else -g)
         if factor > 0 and (offset > 0 or (above and offset == 0)):
             return True
@@ -170,9 +170,11 @@ class Exactly:
         chosen = [operands]
         if operation == "select":
             chosen = [[[truth], operands[1 if truth.value else 2]] for truth in operands[0]]
-        found = [new for own in chosen for case in joined(own) for new in self.cases(case.guards, operation, case.value)]
-        demand(len(found) <= CASES, "a program has too many cases")
-        return found
+        results = [
+            new for values in chosen for case in joined(values) for new in self.cases(case.guards, operation, case.value)
+        ]
+        demand(len(results) <= CASES, "a program has too many cases")
+        return results
 
     def cases(self, guards: Guards, operation: str, x: list[Any]) -> Piecewise:
         """Return the one case of a value, or the two of a comparison that the guards do not decide."""
@@ -181,9 +183,9 @@ class Exactly:
         # a <= b is that not b < a.
         strict = operation == "less"
         gap = x[1] - x[0] if strict else x[0] - x[1]
-        told = positive(guards, gap)
-        if told is not None:
-            return [Case(guards, told == strict)]
+        decided = positive(guards, gap)
+        if decided is not None:
+            return [Case(guards, decided == strict)]
         return [Case(guards | {(condition(gap), sign)}, sign == strict) for sign in (False, True)]
 
     def value(self, guards: Guards, operation: str, x: list[Any]) -> Any:
@@ -230,5 +232,5 @@ class Asking(Exactly):
             return x[0] * self._named(self.inverses, "s", x[1])
         return super().value(guards, operation, x)
 
-    def _named(self, found: dict[Condition, str], letter: str, p: Poly) -> Poly:
-        return var(found.setdefault(tuple(sorted(p.terms.items())), f"{letter}{len(found)}"))
+    def _named(self, names: dict[Condition, str], letter: str, p: Poly) -> Poly:
+        return var(names.setdefault(tuple(sorted(p.terms.items())), f"{letter}{len(names)}"))

@@ -46,9 +46,9 @@ class Numbers(Told[Fraction]):
     """The numbers of a claim: bounds, which are not negative, and coordinates of places, which are read as such."""
 
     def __getitem__(self, key: str) -> Fraction:
-        found = self.coordinate(key)
-        demand(found >= 0, "a bound is negative")
-        return found
+        bound = self.coordinate(key)
+        demand(bound >= 0, "a bound is negative")
+        return bound
 
     def get(self, key: str) -> Fraction | None:
         """Return a bound that may be absent."""
@@ -73,8 +73,8 @@ class Claim:
 
     def close(self) -> None:
         """Refuse what was told and not read."""
-        for told in (self.taken, self.programs, self.subject, self.numbers, self.evidence):
-            told.close()
+        for table in (self.taken, self.programs, self.subject, self.numbers, self.evidence):
+            table.close()
 
 
 def read_certificate(text: str) -> list[Claim]:
@@ -86,15 +86,15 @@ def read_certificate(text: str) -> list[Claim]:
         raise RefusedError(f"the certificate is no JSON: {fault.msg} in line {fault.lineno}") from None
     except RecursionError:
         raise RefusedError("the certificate is nested too deeply") from None
-    own = {key: part for key, part in read_dict(content, 3 + len(ASIDE)).items() if key not in ASIDE}
-    kind, programs, claims = read_table(own, "format", "programs", "claims")
+    proof = {key: part for key, part in read_dict(content, 3 + len(ASIDE)).items() if key not in ASIDE}
+    kind, programs, claims = read_table(proof, "format", "programs", "claims")
     demand(kind == FORMAT, f"the format is not {FORMAT!r}")
-    found = Told("programs", _table(programs, Program.read))
-    for name in found.content:
-        demand(found.content[name].digest == name, "a program is another one than its digest says")
+    tables = Told("programs", _table(programs, Program.read))
+    for name in tables.content:
+        demand(tables.content[name].digest == name, "a program is another one than its digest says")
     demand(1 <= len(read_list(claims)) <= CLAIMS, "there are no claims, or too many")
-    read = [_claim(claim, found) for claim in claims]
-    found.close()
+    read = [_claim(claim, tables) for claim in claims]
+    tables.close()
     return read
 
 
@@ -118,9 +118,9 @@ def _table(given: Any, read: Callable[[Any], _T]) -> dict[str, _T]:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    demand(len(found) == len(pairs), "a key stands twice")
-    return found
+    table = dict(pairs)
+    demand(len(table) == len(pairs), "a key stands twice")
+    return table
 
 
 def _stray(text: str) -> Any:

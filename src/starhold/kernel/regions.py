@@ -42,12 +42,12 @@ def least_form(p: Poly, region: Region) -> Rows:
     in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
     sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
     ratios = {name: sizes[name].as_integer_ratio() for name in p.names}
-    found: dict[tuple[int, int], tuple[list[Fraction], list[Fraction]]] = {}
+    bounds: dict[tuple[int, int], tuple[list[Fraction], list[Fraction]]] = {}
     for m, c in p.terms.items():
-        own, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
-        demand(set(own[-2:]) <= set(place) and len(own) > 1, "the torque is not zero at rest on target")
+        factors, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
+        demand(set(factors[-2:]) <= set(place) and len(factors) > 1, "the torque is not zero at rest on target")
         # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
-        *left, i, k = own
+        *left, i, k = factors
         upper, lower = c.as_integer_ratio()
         for name in left:
             n, d = ratios[name]
@@ -56,11 +56,11 @@ def least_form(p: Poly, region: Region) -> Rows:
         size = Fraction(abs(upper), lower)
         high = up(size)
         low = high if not even else Fraction(0) if left else up(-size * region.least**power)
-        below, above = found.setdefault((place[i], place[k]), ([], []))
+        below, above = bounds.setdefault((place[i], place[k]), ([], []))
         below.append(high if c < 0 else low)
         above.append(low if c < 0 else high)
     middle, radius = scalar(0, 6), scalar(0, 6)
-    for (i, k), ends in found.items():
+    for (i, k), ends in bounds.items():
         below, above = map(added, ends)
         for a, b in ((i, k), (k, i)):
             middle[a][b] += (above - below) / 4
@@ -79,18 +79,18 @@ def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
 def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
     """Return a bound of how much longer a matrix of polynomials makes a vector: |y x z| <= |y| |z|, and what is left by its
     entries. Vectors from outside are no longer than each of their components may be."""
-    found = Fraction(0)
+    bound = Fraction(0)
     for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
         names = [f"{letter}{k + 1}" for k in AXES]
         c = rows[1][0].terms.get((names[2],))
         if c is None:
             continue
         alone = [(name,) for name in names]
-        own = [[[p.terms.get(m, 0) for m in alone] for p in row] for row in rows]
-        if own == [[[(0, c, -c)[x] for x in axis] for axis in row] for row in TURNED]:
+        slopes = [[[p.terms.get(m, 0) for m in alone] for p in row] for row in rows]
+        if slopes == [[[(0, c, -c)[x] for x in axis] for axis in row] for row in TURNED]:
             rows = [[Poly({m: x for m, x in p.terms.items() if m not in alone}) for p in row] for row in rows]
-            found += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
-    return found + stretch([[most(p, sizes) for p in row] for row in rows])
+            bound += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
+    return bound + stretch([[most(p, sizes) for p in row] for row in rows])
 
 
 def lengths(X: Rows) -> Sizes:
@@ -127,16 +127,16 @@ def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
 
 def stretch(rows: Rows) -> Fraction:
     """Return a bound of how much longer a matrix makes a vector: of the sums of its rows and of its columns, or of all."""
-    across, down = (max(sum(map(abs, row), Fraction(0)) for row in own) for own in (rows, transpose(rows)))
+    across, down = (max(sum(map(abs, row), Fraction(0)) for row in lines) for lines in (rows, transpose(rows)))
     return min(root(across * down), norm(x for row in rows for x in row))
 
 
 def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:
     """Return bounds that a monotone change leaves bounds: what begins within them at no time leaves them."""
-    found = begun or [Fraction(0)] * 3
+    bounds = begun or [Fraction(0)] * 3
     for _ in range(ITERATIONS):
-        further = change(found)
-        if all(x <= y for x, y in zip(further, found, strict=True)):
-            return found
-        found = [up(x + x / 2**20) for x in further]
+        further = change(bounds)
+        if all(x <= y for x, y in zip(further, bounds, strict=True)):
+            return bounds
+        bounds = [up(x + x / 2**20) for x in further]
     raise RefusedError("the period is too long for the rates")

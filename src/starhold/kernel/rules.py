@@ -19,10 +19,10 @@ def combination(cofactors: Any, relations: Sequence[Poly]) -> Poly:
 
 def weighted(weights: Any, parts: Sequence[Poly], strict: int) -> Poly:
     """Return the sum of parts, each times its number of the evidence: none is negative, and the first are positive."""
-    found = [rational(x) for x in read_list(weights, len(parts))]
-    demand(all(x >= 0 for x in found), "a multiplier is negative")
-    demand(all(x > 0 for x in found[:strict]), "a multiplier is not positive")
-    return dot(found, parts)
+    multipliers = [rational(x) for x in read_list(weights, len(parts))]
+    demand(all(x >= 0 for x in multipliers), "a multiplier is negative")
+    demand(all(x > 0 for x in multipliers[:strict]), "a multiplier is not positive")
+    return dot(multipliers, parts)
 
 
 def form(rows: Any, z: Sequence[Poly], strictly: bool) -> Poly:
@@ -87,11 +87,11 @@ class Sum:
         for part in read_list(parts):
             places, names, rows = read_table(part, "of", "z", "gram")
             z = [read_poly({name: "1"} if isinstance(name, str) else name) for name in read_list(names)]
-            found = form(rows, z, False)
+            term = form(rows, z, False)
             for k in read_list(places):
                 demand(type(k) is int and 0 <= k < len(self.known), "a part has a factor that is not known")
-                found = found * self.known[k]
-            rest = rest - found
+                term = term * self.known[k]
+            rest = rest - term
         demand(not rest.terms, "a sum of squares is another one")
 
 

@@ -24,6 +24,7 @@ ASSUMPTIONS = {
     "gaussian-noise": "noise is Gaussian, and independent from sample to sample",
     "linear-estimate": "noise drives errors of what the law is told linearly, as for the target's rate at the start",
     "settled-estimate": "an estimate has settled before",
+    "valid-estimate": "an estimate is valid throughout",
     "target-at-rest": "the target is at rest",
     "known-target": "the target's motion is as the law is told",
     "bounded-target": "the target turns, and its rate changes, no faster than told",

@@ -16,7 +16,7 @@ from starhold.laws.point import PointMeasurement
 from starhold.trace.straight_line import straight_line
 
 ASKED: dict[str, Any] = {
-    "rigid-body": Measurement((1.0, *ZERO), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO, ZERO, 0.0),
+    "rigid-body": Measurement((1.0, *ZERO), ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, ZERO, ZERO, 0.0, 1.0),
     "libration-point": PointMeasurement(ZERO, ZERO, 0.0, 0.0),
 }
 """For each body a measurement with every number an input."""

@@ -33,15 +33,16 @@ class ModeTargets:
         names = ", ".join(part.name for part in self.parts)
         return Card("Targets of modes", names, ("definition",), ())
 
-    @property
-    def NEEDS(self) -> tuple[str, ...]:  # noqa: N802
-        """Parts that any of the targets needs."""
-        return tuple(dict.fromkeys(need for part in self.parts for need in part.needs))
+    def needs(self, params: tuple[Any, ...]) -> tuple[str, ...]:
+        """Return the parts that any of the targets needs."""
+        return tuple(dict.fromkeys(need for target in self._fitted(params) for need in target.needs))
 
-    @property
-    def ABOUT(self) -> str:  # noqa: N802
-        """The one body that their orbit may be about, where one of them says so."""
-        return next((part.about for part in self.parts if part.about), "")
+    def about(self, params: tuple[Any, ...]) -> str:
+        """Return the one body that their orbit may be about, where one of them says so."""
+        return next((target.about for target in self._fitted(params) if target.about), "")
+
+    def _fitted(self, params: tuple[Any, ...]) -> list[Fitted]:
+        return [Fitted(part, numbers) for part, numbers in zip(self.parts, params, strict=True)]
 
     @property
     def STILL(self) -> bool:  # noqa: N802
@@ -55,7 +56,7 @@ class ModeTargets:
 
     def prepare(self, params: tuple[Any, ...], period: float) -> tuple[Any, ...]:
         """Their parameters as equations take them."""
-        return tuple(Fitted(part, numbers).prepared(period) for part, numbers in zip(self.parts, params, strict=True))
+        return tuple(target.prepared(period) for target in self._fitted(params))
 
     def check(self, params: tuple[Any, ...], craft: Any) -> None:
         """ValueError where one of them does not fit a craft."""

@@ -61,6 +61,14 @@ class Slewing:
             raise AttributeError(name)
         return getattr(self.part.module, name)
 
+    def needs(self, params: tuple[Any, Slew]) -> tuple[str, ...]:
+        """Return what the target itself needs."""
+        return Fitted(self.part, params[0]).needs
+
+    def about(self, params: tuple[Any, Slew]) -> str:
+        """Return the one body that the orbit of the target itself may be about."""
+        return Fitted(self.part, params[0]).about
+
     def prepare(self, params: tuple[Any, Slew], period: float) -> Reached:
         """The numbers of the target and of the slew as equations take them."""
         return Reached(Fitted(self.part, params[0]).prepared(period), params[1], period)

@@ -17,7 +17,7 @@ from starhold.laws.conditions import Sight
 from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import Carry, Composition, can_be_inactive, is_recorded
 from starhold.parts.actuators.limits import LIMITS
-from starhold.parts.contract import CLOCK, FIX
+from starhold.parts.contract import CLOCK, FIX, IS_VALID
 from starhold.parts.part import Part
 from starhold.parts.random import RANGE, Dice
 from starhold.parts.roles import Loads, Scene
@@ -71,7 +71,7 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
     slews = target is not None and target.flag("SLEWS")
     # Such a law of modes looks at more than its measurement to decide which one commands.
     watches = named.modes is not None and named.modes.WATCHES
-    timed = any(CLOCK in part.reads for part in (parts.law, *parts.effectors))
+    asked_for = {name for part in (parts.law, *parts.effectors) for name in part.reads}
     command_of = parts.law.module.command if by_mode or watches else parts.law.command
 
     def goal_of(carry, state, step, setup):
@@ -96,13 +96,15 @@ def make_equations(parts: Composition, dice: Callable[..., Dice] = Dice) -> Step
             every.append(reading)
             if is_recorded(sensor):
                 shown.append(reading)
-        if timed and not hasattr(readings, CLOCK):
+        if CLOCK in asked_for and not hasattr(readings, CLOCK):
             vars(readings)[CLOCK] = number_of(step) * setup.period
         estimate, estimator, values = memories.estimate, memories.estimator, vars(readings)
         estimates, watching = estimated(values, tuple(every), memories, craft, setup)
         if parts.estimator is not None:
             (estimate, *estimates), (estimator, *watching) = estimates, watching
             values = estimate._asdict()
+        if IS_VALID in asked_for:
+            vars(readings)[IS_VALID] = getattr(estimate, IS_VALID, 1.0)
         shown += estimates
         known = state._replace(**{name: x for name, x in values.items() if name in state._fields})
         telling = [one for one in named.torques if one.part.flag("MODELLED")]

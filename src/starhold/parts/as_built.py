@@ -34,12 +34,18 @@ MOUNTING = Parameter(
 )
 """The declaration of a mounting error, common to all parts."""
 AXES = Parameter(
-    shape=(3, 3), text="errors of its axes: of their scales on the diagonal, beside it those of non-orthogonal ones"
+    shape=(3, 3),
+    plain=(0.5, "ppm"),
+    text="errors of its axes: of their scales on the diagonal, beside it those of non-orthogonal ones",
 )
 """The declaration of errors of a sensor's axes, common to all sensors."""
-JITTER = Parameter("s", at_least=0.0, text="deviation of the instant at which it is read from the control instant")
+JITTER = Parameter(
+    "s", at_least=0.0, plain=(10.0, "ms"), text="deviation of the instant at which it is read from the control instant"
+)
 """The declaration of sampling jitter, common to all sensors."""
-DELAY = Parameter("s", at_least=0.0, text="dead time: from the instant at which it is read to its reading")
+DELAY = Parameter(
+    "s", at_least=0.0, plain=(60.0, "ms"), text="dead time: from the instant at which it is read to its reading"
+)
 """The declaration of dead time, common to all sensors."""
 LONGEST = 64
 """Control periods that a dead time may last."""

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 from starhold.errors import is_interrupt
 from starhold.files import read_bytes
 from starhold.parts import roles
-from starhold.parts.contract import CLOCK, Card
+from starhold.parts.contract import GIVEN, Card
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import ROLES
 
@@ -55,6 +55,8 @@ BOUNDS: dict[str, tuple[str, ...]] = {
     "recursion": ("params", "noise", "period", "rate"),
 }
 """Functions of a part of any role that bound what it does, and their arguments."""
+BY_NUMBERS: dict[str, tuple[str, ...]] = {"needs": ("params",), "about": ("params",)}
+"""Functions of a part of any role in place of `NEEDS` and `ABOUT`, where these depend on its parameters."""
 
 AnyPart = TypeVar("AnyPart", bound=Part)
 
@@ -96,7 +98,7 @@ def telling(readings: Iterable[str]) -> list[Fitted]:
     """Installed sensors that give these readings, one for each or for several, with parameters of their examples.
     LookupError where there is none."""
     chosen: dict[str, Fitted] = {}
-    for reading in (one for one in readings if one != CLOCK):
+    for reading in (one for one in readings if one not in GIVEN):
         sensors = (one for one in parts("sensor").values() if not one.table and reading in one.module.Reading._fields)
         sensor = next(sensors, None)
         if sensor is None:
@@ -171,7 +173,7 @@ def as_part(module: ModuleType, path: Path | None = None) -> Part:
 def _check_equations(part: Part) -> None:
     """ValueError for an equation, or a bound, that does not take the arguments of its role."""
     acts = part.role in ("actuator", "effector")
-    wanted = BOUNDS | {"error": ("params", "envelope") if acts else ("params",)}
+    wanted = BOUNDS | BY_NUMBERS | {"error": ("params", "envelope") if acts else ("params",)}
     protocol: Any = getattr(roles, part.role.capitalize())
     declarations: dict[str, Any] = {**vars(protocol)}
     for name, declared in declarations.items():

@@ -21,6 +21,13 @@ from starhold.parts.craft import compact
 CLOCK = "time"
 """The reading that every loop gives to a law that declares it: seconds since the start. No sensor is needed for it."""
 
+IS_VALID = "is_valid"
+"""Whether an estimate can be relied on, which all estimators tell; a law that declares it as a reading gets that of its
+estimate, and 1 where there is no estimator."""
+
+GIVEN = (CLOCK, IS_VALID)
+"""Readings that no sensor has to give."""
+
 
 FIX = "fix"
 """The reading that an estimator gets which another one starts: the other's estimate, to be used once it is valid."""
@@ -195,13 +202,16 @@ class Parameter:
 
     def _check_bounds(self, array: Any) -> None:
         if self.above is not None and not (array > self.above).all():
-            raise ValueError(f"must be above {self.above:g}")
+            raise ValueError(f"must be above {self._bound(self.above)}")
         if self.at_least is not None and not (array >= self.at_least).all():
-            raise ValueError(f"must be at least {self.at_least:g}")
+            raise ValueError(f"must be at least {self._bound(self.at_least)}")
         if self.at_most is not None and not (array <= self.at_most).all():
-            raise ValueError(f"must be at most {self.at_most:g}")
+            raise ValueError(f"must be at most {self._bound(self.at_most)}")
         if self.whole and float(array) != math.floor(float(array)):
             raise ValueError("must be a whole number")
+
+    def _bound(self, bound: float) -> str:
+        return f"{math.degrees(bound):.6g} deg" if bound and self.unit == "rad" else f"{bound:g}"
 
     def describe(self) -> str:
         """Describe the values that may be written for this parameter."""

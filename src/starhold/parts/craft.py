@@ -15,6 +15,9 @@ from starhold.algebra.vector import inverse as inverse_matrix
 EARTH = 3.986e14
 """Gravitational parameter of the Earth, m3/s2, as the published experiment uses it."""
 
+DENSEST = 22_600.0
+"""The density of osmium, rounded up, kg/m3."""
+
 
 class Craft(NamedTuple):
     """A rigid spacecraft. The inertia, about the centre of mass in body axes, is three moments where these are principal,
@@ -78,6 +81,13 @@ def check_inertia(inertia: Any) -> NDArray[np.float64]:
     tensor = 0.5 * (tensor + tensor.T)
     check_moments(compact(tensor))
     return tensor
+
+
+def heaviest(inertia: Any) -> float:
+    """The largest mass (kg) of a body with this inertia (kg m2): that of a ball of the densest metal, for no other body of
+    its mass is as compact."""
+    moments = 0.5 * float(np.trace(tensor(inertia)))
+    return (moments / 0.6 * (4.0 / 3.0 * math.pi * DENSEST) ** (2.0 / 3.0)) ** 0.6
 
 
 def check_moments(inertia: Matrix | Vector) -> None:

@@ -1,10 +1,11 @@
-"""A time in which a sensor gives nothing new, for sensors that declare one."""
+"""Times at which a sensor gives nothing new, for sensors that declare them: an outage, and those between its updates."""
 
 from __future__ import annotations
 
 from typing import TypeAlias
 
-from starhold.algebra.scalar import Scalar, Truth, both, less, less_equal
+from starhold.algebra.circular import nearest
+from starhold.algebra.scalar import Scalar, Truth, absolute, both, either, less, less_equal
 from starhold.algebra.words import number_of
 from starhold.parts.contract import Parameter
 
@@ -12,17 +13,31 @@ Window: TypeAlias = tuple[Scalar, Scalar]
 OUTAGE = Parameter("s", shape=(2,), spread=False, at_least=0.0, text="begin and end without readings; none if equal")
 """The declaration of outages, common to all sensors."""
 NEVER: Window = (0.0, 0.0)
+INTERVAL = Parameter("s", at_least=0.0, plain=(300.0, "ms"), text="between updates; each control step if 0")
+"""The declaration of the time from update to update, common to all sensors."""
+Silence: TypeAlias = tuple[Scalar, ...]
+"""Begin and end of an outage in control steps, and where they are more than one those from update to update."""
 
 
-def in_steps(outage: Window, period: float) -> Window:
-    """The outage in control steps. ValueError where it ends before it begins."""
+def in_steps(outage: Window, period: float, interval: float = 0.0) -> Silence:
+    """The outage, and the interval (s), in control steps. ValueError where the outage ends before it begins."""
     begin, end = outage
     if end < begin:
         raise ValueError(f"the outage ends at {end:g} s, before it begins at {begin:g} s")
-    return (begin / period, end / period)
+    every = steps_of(interval, period)
+    return (begin / period, end / period, *([every] if every > 1.0 else []))
 
 
-def is_out(step: int, window: Window) -> Truth:
-    """Tell whether a control step lies in the outage, given in steps: at or after its begin, and before its end."""
-    now = number_of(step)
-    return both(less_equal(window[0], now), less(now, window[1]))
+def steps_of(interval: float, period: float) -> float:
+    """Return the control steps from update to update."""
+    return float(max(1, round(interval / period)))
+
+
+def is_out(step: int, silence: Silence) -> Truth:
+    """Tell whether a control step lies in the outage, at or after its begin and before its end, or between updates, which
+    are counted from the start."""
+    now, (begin, end, *interval) = number_of(step), silence
+    out = both(less_equal(begin, now), less(now, end))
+    for every in interval:
+        out = either(out, less(0.5, absolute(now - every * nearest(now / every))))
+    return out

@@ -43,12 +43,13 @@ class Part:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Other parts of the loop, or readings, that it cannot do without, by name."""
+        """Other parts of the loop, or readings, that it cannot do without, by name; `Fitted.needs` for its numbers."""
         return getattr(self.module, "NEEDS", ())
 
     @property
     def about(self) -> str:
-        """The one body, by its name among `parts.orbit.BODIES`, that its orbit may be about; "" for any."""
+        """The one body, by its name among `parts.orbit.BODIES`, that its orbit may be about; "" for any, `Fitted.about` for
+        its numbers."""
         return getattr(self.module, "ABOUT", "")
 
     @property
@@ -104,6 +105,18 @@ class Fitted:
     def called(self) -> str:
         """Its name in the loop, by default the part's."""
         return self.name or self.part.name
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Other parts of the loop, or readings, that it cannot do without with its parameters, by name."""
+        tell = self.part.hook("needs")
+        return self.part.needs if tell is None else tell(self.params)
+
+    @property
+    def about(self) -> str:
+        """The one body that its orbit may be about with its parameters; "" for any."""
+        tell = self.part.hook("about")
+        return self.part.about if tell is None else tell(self.params)
 
     def prepared(self, period: float) -> Any:
         """Its parameters as equations take them, for a control period (s)."""

@@ -17,9 +17,8 @@ START = Parameter(
     "1", shape=(4,), spread=False, text="assumed attitude at the start: quaternion, inertial to body, scalar first"
 )
 """The declaration of the initial estimate, common to all estimators."""
-IS_VALID = "is_valid"
 VALID = Quantity("1", "1 where the estimated attitude rests on one that was measured, else 0")
-"""The quantity says whether an estimate can be relied on; all estimators have it."""
+"""The quantity that says whether an estimate can be relied on."""
 
 
 def unit_quaternion(stated: Quaternion) -> Quaternion:

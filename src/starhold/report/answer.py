@@ -8,11 +8,10 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from starhold.certification.wording import coverage, statement, strongest, unclaimed
-from starhold.report.campaign_units import plain_measure
 from starhold.report.commands import Cell, Column, Table
 from starhold.report.commands.verify import amount
 from starhold.report.tables import Markup, note, pill, swatch, table_html
-from starhold.report.text import lost_text, unflown_text, unknown_text
+from starhold.report.text import lost_text, plain_measure, unflown_text, unknown_text
 from starhold.studies.requirements import LOST
 from starhold.studies.verification import verdicts_of_flight
 

@@ -17,11 +17,12 @@ from starhold.campaign.verdicts import percent
 from starhold.files import write_text
 from starhold.report import campaign_tables as tables
 from starhold.report.campaign_tables import Section, drivers, indices, picture
-from starhold.report.campaign_units import Wording, count_text, flown_text, headings_of, headline, outcome_of, plain_measure
+from starhold.report.campaign_units import Wording, count_text, flown_text, headings_of, headline, outcome_of
 from starhold.report.page_parts import beside, document, fold, plot_box, rounded, versions
 from starhold.report.plots import colour
 from starhold.report.results import PAGE, write_run
 from starhold.report.tables import code, note, pill, swatch, table_html
+from starhold.report.text import plain_measure
 
 if TYPE_CHECKING:
     from starhold.campaign.envelopes import Envelope

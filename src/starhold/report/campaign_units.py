@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from starhold.analysis.ranking import Measure, MetricSet
 from starhold.campaign.verdicts import percent
 from starhold.certification.wording import listed
+from starhold.report.text import plain_measure
 from starhold.studies.body import body_module
 
 if TYPE_CHECKING:
@@ -76,19 +77,6 @@ class Wording:
         if self.is_loss(name):
             return "lost" if value < 0.0 else "not lost"
         return "no value" if math.isinf(value) else with_unit(value, self.required(name))
-
-
-def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
-    """Return how a quantity is shown if only its SI unit is known; angles in degrees."""
-    heading = name.replace("_", " ")
-    if unit == "rad" or unit.startswith("rad/"):
-        return Measure(heading, f"deg{pretty_unit(unit[3:])}", meaning, 180.0 / math.pi)
-    return Measure(heading, "" if unit == "1" else pretty_unit(unit), meaning)
-
-
-def pretty_unit(unit: str) -> str:
-    """Show a unit with raised exponents."""
-    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def figure(value: float, digits: int = 4) -> str:

@@ -27,16 +27,18 @@ def without_runs(flights: Sequence[Flight]) -> list[Flight]:
     return [replace(flight, recording=NOTHING) for flight in flights]
 
 
-def paint(what: Picture, folder: Path, part: slice = slice(None)) -> list[Path]:
-    """Write the figures, or some of them, into `folder`, which exists, and return their paths."""
+def paint(what: Picture, folder: Path) -> list[Path]:
+    """Write the figures into `folder`, which exists, and return their paths."""
     with warnings.catch_warnings():
         # A name in a script that the font lacks is drawn as boxes; a warning would not help the user.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
-        return [save(make(), folder / f"{key}.png") for key, make in list(what.items())[part]]
+        return [save(make(), folder / f"{key}.png") for key, make in what.items()]
 
 
 def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str, shaded: Any = ()) -> Any:
     """A figure of panels over one time axis, grey where the estimate is not valid."""
+    from starhold.report.ticks import label_ticks
+
     count = len(plot.panels)
     end = max(float(times[-1]), 1e-9)
     rows = word_rows(marks, end)
@@ -50,12 +52,13 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
             axis.plot(times[: len(curve)], curve, color=colour(number), linewidth=width)
         if panel.log:
             axis.set_yscale("log")
+            label_ticks(axis.yaxis, log=True)
             # Ticks take most of the drawing time.
             if panel.decades() > 2.0:
                 axis.minorticks_off()
         else:
             # Digits of small numbers would push the labels out of the figure.
-            axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+            label_ticks(axis.yaxis)
             axis.yaxis.get_offset_text().set_size(8.5)
         for level in panel.levels:
             axis.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))

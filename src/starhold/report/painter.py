@@ -1,4 +1,4 @@
-"""Draws the figures in processes of their own, while proofs and the page are made."""
+"""Draws the figures in a process of its own, while proofs and the page are made."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
 
-AT_ONCE = 2
+AT_ONCE = 1
 
 
 class Painter:
@@ -37,35 +37,33 @@ class Painter:
         # A copy of this process has nearly everything loaded.
         context: Any = get_context("fork" if can_fork() else "spawn")
         self._folder, (self._failures, self._told) = folder, context.Pipe(duplex=False)
-        given = [(picture, folder.absolute(), slice(first, None, AT_ONCE), self._told) for first in range(AT_ONCE)]
-        self._processes = [context.Process(target=_draw, args=args) for args in given if draw]
-        for process in self._processes:
-            process.start()
+        self._process = context.Process(target=_draw, args=(picture, folder.absolute(), self._told)) if draw else None
+        if self._process is not None:
+            self._process.start()
 
     def __enter__(self) -> Painter:
         return self
 
     def __exit__(self, *failure: object) -> None:
-        late = [process for process in self._processes if process.is_alive()]
-        for process in late:
-            process.kill()
-            process.join()
-        if late:
+        if self._process is not None and self._process.is_alive():
+            self._process.kill()
+            self._process.join()
             clear_unfinished(self._folder)
 
     def finish(self) -> None:
         """Wait for the files. InputError where they cannot be written; RuntimeError for any other failure."""
-        for process in self._processes:
-            process.join()
+        if self._process is None:
+            return
+        self._process.join()
         failure = self._failures.recv() if self._failures.poll() else ""
         if isinstance(failure, InputError):
             raise failure
-        if failure or any(process.exitcode for process in self._processes):
+        if failure or self._process.exitcode:
             raise RuntimeError(f"the figures could not be drawn: {failure}")
 
 
-def _draw(picture: Picture, folder: Path, part: slice, failures: Connection) -> None:
-    """Draw a part of the figures; what prevents that goes to `failures`, and what libraries say to nobody."""
+def _draw(picture: Picture, folder: Path, failures: Connection) -> None:
+    """Draw the figures; what prevents that goes to `failures`, and what libraries say to nobody."""
     # Ctrl-C goes to the original process alone, which ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
@@ -73,7 +71,7 @@ def _draw(picture: Picture, folder: Path, part: slice, failures: Connection) -> 
     from starhold.report.figures import paint
 
     try:
-        paint(picture, folder, part)
+        paint(picture, folder)
     except InputError as error:
         failures.send(error)
     except Exception:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from starhold.analysis.ranking import Measure
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate
@@ -81,3 +84,16 @@ def unknown_text(flight: Flight) -> str:
 def lost_text(flight: Flight, digits: int = 6) -> str:
     """Show the time at which a flight diverged; empty if it did not."""
     return "" if flight.lost is None else flight.metric_set.moment(flight.lost, digits)
+
+
+def plain_measure(name: str, unit: str, meaning: str = "") -> Measure:
+    """Return how a quantity is shown if only its SI unit is known; angles in degrees."""
+    heading = name.replace("_", " ")
+    if unit == "rad" or unit.startswith("rad/"):
+        return Measure(heading, f"deg{pretty_unit(unit[3:])}", meaning, 180.0 / math.pi)
+    return Measure(heading, "" if unit == "1" else pretty_unit(unit), meaning)
+
+
+def pretty_unit(unit: str) -> str:
+    """Show a unit with raised exponents."""
+    return unit.replace("^2", "²").replace("^3", "³")

@@ -5,14 +5,17 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.modes import loop_of_mode
 from starhold.scenario.checking import check_substeps, try_law
 from starhold.scenario.parts import check_fit, try_parts
+from starhold.scenario.possible import check_possible
 from starhold.scenario.reading import LawEntry, Scenario
 
 
-def build(scenario: Scenario, entry: LawEntry) -> ClosedLoop:
-    """Build the closed loop of one law of a scenario. InputError where the law cannot work with its gains, or the
-    integration cannot follow the loop."""
+def build(scenario: Scenario, entry: LawEntry, drawn: bool = False) -> ClosedLoop:
+    """Build the closed loop of one law of a scenario. InputError where the law cannot work with its gains, the integration
+    cannot follow the loop, or, unless its numbers are drawn, a condition of a mode can never hold."""
     loop = scenario.hooks.build(scenario, entry)
     check_fit(loop, scenario.where)
+    if not drawn:
+        check_possible(loop, scenario.where, f"law {entry.name}")
     try_parts(loop, scenario.where, f"law {entry.name}")
     check_substeps(loop, scenario.where)
     try_law(loop, scenario.where, f"law {entry.name}")

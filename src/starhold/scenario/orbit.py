@@ -184,13 +184,18 @@ class Orbit(Table):
 
     @model_validator(mode="after")
     def _possible(self) -> Orbit:
-        gravity = self.gravitational_parameter
-        check_gravity("gravitational_parameter", gravity)
+        check_gravity("gravitational_parameter", self.gravitational_parameter)
         try:
-            position, velocity = self.start
+            start = self.start
         except ValueError as error:
             key = "true_anomaly" if "anomaly" in str(error) else "semi_major_axis"
             raise at_key(key, str(error), getattr(self, key)) from None
+        self.check_start(*start)
+        return self
+
+    def check_start(self, position: Vector, velocity: Vector) -> None:
+        """Raise an error where the orbit begins inside the central body, or leads through its centre."""
+        gravity = self.gravitational_parameter
         key, value = ("semi_major_axis", self.semi_major_axis) if self.position is None else ("position", list(position))
         distance, fast = norm(position), norm(velocity)
         if not distance:
@@ -204,11 +209,11 @@ class Orbit(Table):
             raise at_key(key, allowed, value)
         if norm(cross(position, velocity)) <= STRAIGHT * distance * fast:
             raise at_key("velocity", "an orbit that does not pass through the centre of attraction", list(velocity))
-        return self
 
-    def check_flight(self, duration: float) -> None:
-        """An error where the spacecraft comes down to the body's surface during a run; a warning where it would later."""
-        position, velocity = self.start
+    def check_flight(self, duration: float, start: tuple[Vector, Vector] | None = None) -> None:
+        """An error where the spacecraft comes down to the body's surface during a run; a warning where it would later.
+        start: where that is known already."""
+        position, velocity = self.start if start is None else start
         gravity, surface = self.gravitational_parameter, self.surface
         escape = math.sqrt(2.0 * gravity / norm(position))
         if body_of(gravity) is not None and norm(velocity) > FASTEST * escape:

@@ -17,7 +17,7 @@ from starhold.laws.modes import Modes
 from starhold.loop.closed_loop import ClosedLoop, before_first, can_be_inactive, is_recorded
 from starhold.loop.step import make_equations
 from starhold.parts.catalogue import PACKAGES, as_part, error_line, from_file, parts, read_module, role_of
-from starhold.parts.contract import CLOCK
+from starhold.parts.contract import FIX, GIVEN, IS_VALID
 from starhold.parts.orbit import body_of
 from starhold.parts.part import Fitted, Part
 from starhold.parts.roles import Goal
@@ -25,6 +25,7 @@ from starhold.scenario.assumed import with_assumed
 from starhold.scenario.checking import free_name, in_file, nearest, show, try_law, validate
 from starhold.scenario.csv_files import csv_lines, number_in
 from starhold.scenario.schema import columns
+from starhold.scenario.sensing import check_sensors
 from starhold.scenario.starting import check_starts
 from starhold.scenario.tables import Name, Table, own_fields, refuse_own, values_of
 
@@ -147,6 +148,7 @@ def with_rows(part: Part, table: dict[str, Any], folder: Path, where: str, key: 
 
 def check_fit(loop: ClosedLoop, where: str) -> None:
     """Raise InputError where the parts of a loop do not fit together."""
+    loop = _with_watched(loop, where)
     fitted = loop.parts
     for role, most in SINGLE.items():
         used = loop.used(role)
@@ -154,21 +156,22 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
             raise InputError(where, _key(used[1]), f"a second {role}, beside {used[0].called}", most)
     check_starts(loop, where)
     _check_effectors(loop, where)
-    readings = _check_sensors(loop, where)
+    readings = check_sensors(loop, where)
     there = {f.part.name for f in fitted}
     for one in fitted:
         estimates = one.part.role == "estimator"
-        for need in one.part.needs:
-            if need not in (readings if estimates else there):
+        present = readings | ({FIX} if one.started_by else set()) if estimates else there
+        for need in one.needs:
+            if need not in present:
                 allowed = _measuring(need) if estimates else f"the part {need}"
                 raise InputError(where, _key(one), f"no {need}, which {one.called} needs", allowed)
-        about = one.part.about
+        about = one.about
         if about and body_of(loop.craft.gravity) != about:
             given = f"an orbit about {body_of(loop.craft.gravity) or 'an unknown body'}"
             raise InputError(where, _key(one), given, f"an orbit about {about}, the body of its model")
     for one, key in (*((f.part, _key(f)) for f in fitted), (loop.law, f"law {loop.law.name}")):
         for need in one.reads:
-            if need not in {*readings, CLOCK}:
+            if need not in {*readings, *GIVEN}:
                 raise InputError(where, key, f"no {need}, which {one.name} needs", _measuring(need))
     _check_estimates(loop, where)
     late = next((f for f in loop.used("actuator") if f.part.hook("rates") is not None), None)
@@ -176,57 +179,30 @@ def check_fit(loop: ClosedLoop, where: str) -> None:
     if late is not None and switched is not None:
         allowed = f"none before {switched.called}, which reads the command only at control instants"
         raise InputError(where, _key(late), "an actuator whose output moves between control instants", allowed)
-    if loop.used("effector") and "rate" not in loop.body.module.State._fields:
-        raise InputError(
-            where, _key(loop.used("effector")[0]), f"an effector on the body {loop.body.name}", "a body that turns"
-        )
+    acting = loop.used("effector")
+    if acting and "rate" not in loop.body.module.State._fields:
+        raise InputError(where, _key(acting[0]), f"an effector on the body {loop.body.name}", "a body that turns")
 
 
 def _check_estimates(loop: ClosedLoop, where: str) -> None:
     """InputError where a law needs what no estimator gives, or another body than the one that is orbited."""
     there = [name for fitted in loop.used("estimator") for name in fitted.part.module.Estimate._fields]
-    for name in getattr(loop.law.module, "ESTIMATES", ()):
+    says = [IS_VALID] if loop.used("estimator") and IS_VALID in loop.law.reads else []
+    for name in (*getattr(loop.law.module, "ESTIMATES", ()), *says):
         if name not in there:
             giving = [one for one, part in parts("estimator").items() if name in part.module.Estimate._fields]
             allowed = f"an estimator that gives {name}, such as {' or '.join(giving)}"
-            raise InputError(where, f"law {loop.law.name}", f"no {name}, which a condition or a monitor needs", allowed)
+            raise InputError(where, f"law {loop.law.name}", f"no {name}, which it needs", allowed)
     about = loop.law.about
     if about and (not loop.has("two-body") or body_of(loop.craft.gravity) != about):
         given = f"no orbit about {about}, which conditions on the Sun or a station need"
         raise InputError(where, f"law {loop.law.name}", given, f"an [orbit] about {about}")
 
 
-def _check_sensors(loop: ClosedLoop, where: str) -> set[str]:
-    """Return the names of what the sensors read. InputError where two read what is taken of one only."""
-    single = {*loop.law.reads} - {*getattr(loop.law.module, "SEVERAL", ())}
-    single |= {name for fitted in loop.parts for name in fitted.part.reads}
-    for estimator in loop.estimating:
-        single |= {name for name in estimator.part.needs if name not in _several(estimator)}
-    single |= set() if loop.used("estimator") else set(loop.body.module.State._fields)
-    sensors: dict[str, list[str]] = {}
-    for sensor in loop.used("sensor"):
-        for name in sensor.part.module.Reading._fields:
-            if name in sensors and name in single:
-                given = f"a second sensor of {name}, beside {sensors[name][0]}"
-                raise InputError(where, _key(sensor), given, "one of each, or an estimator that fuses them all")
-            sensors.setdefault(name, []).append(sensor.called)
-    for estimator in loop.estimating:
-        for name, key in _several(estimator).items():
-            others = sensors.get(name, [])[1:]
-            rows = len(getattr(estimator.params, key)) if key else len(others)
-            if rows != len(others):
-                given = f"{key} of length {rows} for {', '.join(others) or 'no second sensor'}"
-                allowed = f"a row for each sensor of {name} after the first, in the order of the file"
-                raise InputError(where, _key(estimator), given, allowed)
-    return set(sensors)
-
-
-def _several(estimator: Fitted) -> dict[str, str]:
-    return getattr(estimator.part.module, "SEVERAL", {})
-
-
 def _measuring(reading: str) -> str:
     """Describe a sensor of a reading, with installed examples."""
+    if reading == FIX:
+        return "started_by, the estimator whose first valid attitude it begins with"
     known = [name for name, part in parts("sensor").items() if reading in part.module.Reading._fields and not part.table]
     return f"a sensor that measures {reading}{', such as ' * bool(known)}{' or '.join(known)}"
 
@@ -291,7 +267,7 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
                 begin(params, loop.start, loop.craft)
     if all(fitted.part.file is None for fitted in loop.parts):
         return
-    tried = replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))
+    tried = _with_watched(loop, where)
     try:
         # The step is not cached, because it is flown once.
         step, carry, setup = make_equations(tried.composition()), tried.carry(), tried.setup()
@@ -309,6 +285,10 @@ def try_parts(loop: ClosedLoop, where: str, key: str) -> None:
         guilty = next(f for f in loop.parts if f.part.file is not None)
         allowed = "its equations must return states of the form of their arguments"
         raise InputError(where, _key(guilty), "", allowed) from None
+
+
+def _with_watched(loop: ClosedLoop, where: str) -> ClosedLoop:
+    return replace(loop, parts=tuple(f if f.part.file is None else _watched(f, loop, where) for f in loop.parts))
 
 
 def _watched(fitted: Fitted, loop: ClosedLoop, where: str) -> Fitted:

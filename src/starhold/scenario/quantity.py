@@ -21,6 +21,11 @@ PLAIN = {
     "T": (1e-3, "nT"),
     "T/sqrt(Hz)": (1e-6, "nT/sqrt(Hz)"),
     "A m^2": (5e3, "mA m^2"),
+    "rad/s^2": (1.0, "deg/s^2"),
+    "N m/s": (1e3, "mN m/s"),
+    "kg": (1e6, "g"),
+    "kg m": (1e-2, "g mm"),
+    "W": (1e4, "mW"),
 }
 """By unit: the largest plain number that is accepted, and the unit that was probably meant with a larger one."""
 MOST_WHOLE = 2**53
@@ -142,7 +147,10 @@ def plain(gain: Gain) -> tuple[float, str]:
 
 def ask_for_unit(value: float, unit: str, within: str, other: str) -> str:
     """Return the text that asks for the unit of an implausible plain number; other: the unit probably meant."""
-    return f'a plain number is in {unit}, {within}; with a unit it is "{value:g} {other}" or "{value:g} {unit}"'
+    meant = f'with a unit it is "{value:g} {other}"'
+    if unit == "1":
+        return f"a plain number is a share, {within}; {meant}"
+    return f'a plain number is in {unit}, {within}; {meant} or "{value:g} {unit}"'
 
 
 def _check_size(value: Any) -> None:

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
 
 TORQUE = Gain(
-    "N m", above=0.0, text="largest about each body axis, for which rate and acceleration are lowered; none if absent"
+    "N m",
+    above=0.0,
+    plain=(1e3, "mN m"),
+    text="largest about each body axis, for which rate and acceleration are lowered; none if absent",
 )
 
 

@@ -3,7 +3,7 @@
 from starhold.errors import InputError
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.catalogue import parts
-from starhold.parts.stated_attitude import IS_VALID
+from starhold.parts.contract import IS_VALID
 from starhold.scenario.checking import nearest, show
 
 

@@ -1,7 +1,7 @@
 """Loops that differ only in numbers fly as batches, a vector of lanes at a time; each is recorded as by `fly`."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, NamedTuple
@@ -185,7 +185,20 @@ class Metered(NamedTuple):
     windows: Array
 
 
+def windows_of(
+    phases: Sequence[Phase], cuts: Sequence[int], late: int
+) -> Iterator[tuple[int, list[tuple[Phase, int, int]]]]:
+    """Yield for each window that ends at one of the cuts which observer takes notes, and each phase's first control step
+    and their number there."""
+    done = 0
+    for cut in cuts:
+        spans = ((phase, max(done, phase.first), min(cut, phase.last)) for phase in phases)
+        yield int(done >= late), [(phase, first, last - first) for phase, first, last in spans if first < last]
+        done = cut
+
+
 def begin_metered(
+    pool: ThreadPool,
     loop: ClosedLoop,
     carries: Array,
     phases: Sequence[Phase],
@@ -195,7 +208,6 @@ def begin_metered(
     cuts: Sequence[int],
     late: int,
     rows: Sequence[int],
-    pool: ThreadPool,
 ) -> Callable[..., Metered]:
     """Begin to fly lanes through phases, noting also the instant after the last step, whose command does not fly. Return a
     function that waits for the end and reports progress.
@@ -212,14 +224,10 @@ def begin_metered(
     end, kept = phases[-1].last, list(rows)
 
     def work(piece: range) -> None:
-        span, done = slice(piece.start, piece.stop), 0
-        for window, cut in enumerate(cuts):
-            observer = observers[done >= late]
-            for phase in phases:
-                first, last = max(done, phase.first), min(cut, phase.last)
-                if first < last:
-                    batch.fly(phase, piece, first, last - first, observer)
-            done = cut
+        span = slice(piece.start, piece.stop)
+        for window, (place, legs) in enumerate(windows_of(phases, cuts, late)):
+            for phase, first, count in legs:
+                batch.fly(phase, piece, first, count, observers[place])
             if window == len(cuts) - 1:
                 carried = batch.x[span].copy()
                 batch.fly(phases[-1], piece, end, 1, observers[1])

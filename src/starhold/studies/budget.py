@@ -196,7 +196,8 @@ def study(
     still, rows = flown[0], list[Contribution]()
     for name, errors in zip(names, flown, strict=True):
         kind = "loop" if name == LOOP else "together" if name == TOGETHER else "source"
-        moved = errors if kind != "source" else tuple(_less(a, b) for a, b in zip(errors, still, strict=True))
+        less = (0.0, 0.0) if kind != "source" else still
+        moved = (None if a is None or b is None else a - b for a, b in zip(errors, less, strict=True))
         rows.append(Contribution(name, kind, _figures(clock, *moved)))
     combined = {
         index: {axis: root_sum_square([row.figures[index][axis] for row in rows[:-1]]) for axis in axes}
@@ -212,10 +213,12 @@ def faultless(scenario: Scenario) -> Scenario:
 
 
 def without(scenario: Scenario, entry: LawEntry, away: Sequence[Source]) -> ClosedLoop:
-    """Return the loop of a law without some sources."""
+    """Return the loop of a law without some sources; estimators go on to assume that they are there."""
     changes = {key: value for source in away for key, value in source.without.items()}
     gone = {f.part.name for f in scenario.parts if changes.get(f"part.{f.called}", ...) is None}
-    return build(scenario.with_(changes), _without_effectors(entry, gone))
+    changed, assuming = scenario.with_(changes), {f.called: f for f in scenario.parts if f.part.role == "estimator"}
+    parts = tuple(assuming.get(fitted.called, fitted) for fitted in changed.parts)
+    return build(replace(changed, parts=parts), _without_effectors(entry, gone))
 
 
 def check_budget(scenario: Scenario) -> tuple[Requirement, ...]:
@@ -377,10 +380,6 @@ def _flown(scenario: Scenario, loop: ClosedLoop, entry: LawEntry, clock: _Clock,
         raise InputError(scenario.where, f"law.{entry.name}", reason, "a law that holds the attitude")
     errors = noted.reshape(-1, len(instants), size)[:runs]
     return errors[..., :3], errors[..., 3:] if knows else None
-
-
-def _less(errors: Array | None, still: Array | None) -> Array | None:
-    return None if errors is None or still is None else errors - still
 
 
 def _figures(clock: _Clock, errors: Array | None, knowledge: Array | None) -> dict[str, dict[str, Figures]]:

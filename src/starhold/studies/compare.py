@@ -14,7 +14,7 @@ from starhold.scenario.reading import Scenario
 from starhold.simulation.lane import Progress, Recording, fly
 from starhold.studies.body import study_of
 from starhold.studies.flight import Flight
-from starhold.studies.modes import epoch_of, modes_flown
+from starhold.studies.modes import epoch_of, modes_flown, never_begun
 from starhold.version import __version__
 
 Notice: TypeAlias = Callable[[str, int, int], None]
@@ -33,7 +33,8 @@ def fly_law(scenario: Scenario, entry: Any, loop: Any, notice: Notice | None = N
         for item, value in zip(entry.law.fields(), entry.gains, strict=True)
     }
     values, modes = gains | study.resources(entry), modes_flown(entry.law, run, epoch_of(scenario, entry.law))
-    return Flight(entry.name, entry.law.name, run, metrics, values, study.metric_set(run), modes=modes)
+    never = never_begun(entry.law, entry.gains, run) if modes else ()
+    return Flight(entry.name, entry.law.name, run, metrics, values, study.metric_set(run), modes=modes, never=never)
 
 
 def timed(scenario: Scenario, loop: Any, flight: Flight) -> Flight:

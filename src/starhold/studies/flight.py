@@ -53,6 +53,8 @@ class Flight:
 
     modes: tuple[Begun, ...] = ()
     """The modes that flew, in order, for a law with modes."""
+    never: tuple[str, ...] = ()
+    """Sentences about modes that could have begun, and did not."""
 
     def __repr__(self) -> str:
         shown = self.metric_set

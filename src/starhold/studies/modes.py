@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from starhold.algebra.structure import leaves
 from starhold.analysis.mode_notes import Span, span
-from starhold.laws.modes import Modes
+from starhold.laws.conditions import Facts, Sight, Watch, needs_sky, sky_at, station_at
+from starhold.laws.modes import Modes, Switch
 from starhold.loop.modes import loop_of_mode
 from starhold.parts.epoch import Date, date_after
 from starhold.parts.outage import NEVER
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 
 
 NEXT = "another mode begins"
+SEEN = 2_000
+"""The number of samples of a run at which conditions that never held are looked at again."""
 STORED = "wheel_momentum_above"
 """The test of a switch for the wheels' momentum."""
 
@@ -68,6 +72,53 @@ def modes_flown(law: Law, run: Recording, epoch: Date | None = None) -> tuple[Be
         date, name = date_after(epoch, time) if epoch else "", module.monitors[monitor - 1].name if monitor else ""
         begun.append(Begun(module.modes[mode - 1].name, time, date, name))
     return tuple(begun)
+
+
+def never_begun(law: Law, gains: Any, run: Recording) -> tuple[str, ...]:
+    """Sentences, without their full stop, about the modes that a mode of a recorded run could have led to, and none of its
+    modes did; that of a loss aside."""
+    module: Any = law.module
+    flown = {one.mode - 1 for one in stretches(run)}
+    said: list[str] = []
+    for to in (place for place in range(len(module.modes) if flown else 0) if place not in {*flown, module.on_loss}):
+        ways = [
+            (switch, numbers)
+            for place, (_, _, switches) in enumerate(module.parts(gains))
+            for switch, numbers in switches
+            if place in flown and switch.to == to
+        ]
+        reasons = dict.fromkeys(_missed(module, gains, run, switch, numbers) for switch, numbers in ways)
+        if reasons:
+            said.append(f"{module.modes[to].name} never begins{': ' * any(reasons)}{'; '.join(filter(None, reasons))}")
+    return tuple(said)
+
+
+def _missed(module: Modes, gains: Any, run: Recording, switch: Switch, numbers: list[Any]) -> str:
+    """Why the condition of a switch, with these numbers, held nowhere in a run, as far as one of its tests says it alone;
+    the place of the craft and the time are all that is looked at."""
+    (after, dwell, *levels), end = numbers, float(run["time"][-1])
+    given = dict(zip(switch.keys, levels, strict=True))
+    begin = max(after, given.get("not_before", 0.0)) + dwell
+    if begin > end:
+        return f"its condition needs {begin:g} s, and the flight ends at {end:g} s"
+    period = run.attrs["control_period"]
+    watch = Watch(0.0, sky_at(gains.epoch, module.ephemeris) if needs_sky(switch.tests) else (), (), 0.0)
+    if "latitude" in given:
+        given["station"] = station_at(given)
+    count = len(run["time"])
+    instants = range(0, count, max(1, count // SEEN))
+    for test in (one for one in switch.tests if one.rpartition("_")[0] in ("elevation", "sunlight")):
+        if not any(_holds(test, given, watch, run, k, period) for k in instants):
+            return f"{test} holds at no time of this flight"
+    return ""
+
+
+def _holds(test: str, given: dict[str, Any], watch: Any, run: Recording, place: int, period: float) -> bool:
+    """Whether a test that looks at the craft's place holds at a sample."""
+    state: Any = SimpleNamespace(position=tuple(run["position"][place].tolist()))
+    clock = watch._replace(clock=round(float(run["time"][place]) / period))
+    measurement: Any = SimpleNamespace(period=period)
+    return bool(Facts(measurement, clock, Sight(state, (), None)).holds(test, given[test], given))
 
 
 def epoch_of(scenario: Scenario, law: Law) -> Date | None:

@@ -5,17 +5,21 @@ import base64
 import shutil
 import time
 import traceback
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.report import commands
 from starhold.scenario.reading import Scenario, parse
 from starhold.studio.apart import begin
+
+if TYPE_CHECKING:
+    from starhold.campaign.worst import Sought
 
 PULSE = 0.2
 """Seconds between two lines of progress at least."""
@@ -123,11 +127,13 @@ def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
     from starhold.report.campaign_page import write_campaign
 
     scenario = with_campaign(scenario, {})
-    total, done = scenario.table.campaign.runs * len(scenario.laws), [0]
+    runs, done = scenario.table.campaign.runs * len(scenario.laws), Counter[str]()
 
-    def notice(law: str, more: int) -> None:
-        done[0] += more
-        tell(done[0], total, f"{law} flies")
+    def notice(law: str, more: int, sought: Sought | None = None) -> None:
+        what, total = (f"{law} flies", runs) if sought is None else (f"worst {sought.name} of {law}", sought.flights)
+        key = "" if sought is None else what
+        done[key] += more
+        tell(done[key], total, what)
 
     result = fly_campaign(scenario, folder, None, Options(engine_of(None, None, None), force=True), notice)
     tell(0, 0, "the report is written")

@@ -1,8 +1,8 @@
 """A program is printed as assembly of another machine, from the same intermediate representation: PTX of NVIDIA's GPUs,
 where each thread is a lane, and of any processor that LLVM knows, for one lane.
 
-No test runs it on a GPU. The text for LLVM is run on the processor at hand, one thread after the other, and the PTX
-that LLVM makes of it is checked: every operation rounds to nearest and none is fused.
+No test runs it on a GPU. The text for LLVM is run on the processor at hand, one thread after the other. The PTX that
+LLVM makes of it is checked, every operation rounds to nearest and none is fused, and run by a reader of PTX.
 """
 
 from importlib import import_module

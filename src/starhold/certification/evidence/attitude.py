@@ -61,16 +61,16 @@ class Loop(RecordedLoop):
             for words in (self.words, [w for w in self.words if w != OUTSIDE])
         ]
         for theorem, words in ways:
-            own = signs if theorem == CONVERGES else []
-            more: dict[str, Any] = widths if own else {}
-            if SHORTEST in own:
+            chosen = signs if theorem == CONVERGES else []
+            more: dict[str, Any] = widths if chosen else {}
+            if SHORTEST in chosen:
                 # Below the V at which the sign changes.
-                level = Fraction(self.cap(theorem, own, V) * (1.0 - float(GIVEN_AWAY[0])))
+                level = Fraction(self.cap(theorem, chosen, V) * (1.0 - float(GIVEN_AWAY[0])))
                 more = {"level": level, **self.contents(self.form(V), level)}
-            if self.try_to_show(self.claim(theorem, [*words, *own], V, **more), self.scales(V)):
-                self.show_limits(theorem, [*words, *own], V, widths if own else {}, turn)
+            if self.try_to_show(self.claim(theorem, [*words, *chosen], V, **more), self.scales(V)):
+                self.show_limits(theorem, [*words, *chosen], V, widths if chosen else {}, turn)
                 more = {name: x for name, x in more.items() if name != "rate"}
-                self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *own], V, more)
+                self.show_any_inertia(theorem, [*(w for w in words if w == WHEELS), *chosen], V, more)
                 return
         if signs or not self.show_strictly(turn):
             self.show_bounded([*(w for w in self.words if w != OUTSIDE), *signs], widths, turn)
@@ -91,20 +91,20 @@ class Loop(RecordedLoop):
         """Find V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw that decreases strictly: V' is linear in s and epsilon."""
         words = [w for w in self.words if w != OUTSIDE]
         try:
-            base, *own = (self.descent_of(words, *pair) for pair in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+            base, *stepped = (self.descent_of(words, *pair) for pair in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
         except RefusedError as reason:
             self.failed[STRICTLY] = str(reason)
             return False
-        steps = [o.p - base.p for o in own]
+        steps = [o.p - base.p for o in stepped]
         others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, 18), strict=True) for c in parts]
         unit = (
             sqrt(float(abs(steps[0].terms[("q1", "w1")]) / tensor(self.loop.craft.inertia).max())) if steps[0].terms else 1.0
         )
-        found = solved(posed(base.p, [-p for p in steps], others, base.z[:18]), {f"w{k}": unit for k in (1, 2, 3)})
-        if found is None:
+        solution = solved(posed(base.p, [-p for p in steps], others, base.z[:18]), {f"w{k}": unit for k in (1, 2, 3)})
+        if solution is None:
             self.failed[STRICTLY] = "no V was found"
             return False
-        V = self.crossed(*(float(f"{x:.4g}") for x in found[:2]))
+        V = self.crossed(*(float(f"{x:.4g}") for x in solution[:2]))
         shown = self.try_to_show(self.claim(STRICTLY, words, V), self.scales(V))
         # The law's own V decreases where the body is not too fast, and has the larger sets within the limits.
         self.show_limits(STRICTLY, words, self.leaning(LEANS), {"fastest": 1}, turn)
@@ -112,15 +112,15 @@ class Loop(RecordedLoop):
 
     def show_bounded(self, words: list[str], widths: dict[str, Any], turn: float | None) -> None:
         """Find a set in which the law's own V decreases, because the rate is bounded there, and a set within limits."""
-        own = self.form(self.lyapunov())
-        if not (np.linalg.eigvalsh(curvature(own, "w"))[0] > 0.0 > own.terms.get(("q0",), 0)):
+        form = self.form(self.lyapunov())
+        if not (np.linalg.eigvalsh(curvature(form, "w"))[0] > 0.0 > form.terms.get(("q0",), 0)):
             return
         for theorem, V in ((CONVERGES, self.lyapunov()), (STRICTLY, self.leaning(LEANS))):
             level = self.highest_decreasing(theorem, words, V, widths)
             if level is None:
                 continue
-            told = widths | self.slowly(V, level) | self.contents(self.form(V), level)
-            if self.try_to_show(self.claim(theorem, words, V, level=level, **told), self.scales(V, float(level))):
+            numbers = widths | self.slowly(V, level) | self.contents(self.form(V), level)
+            if self.try_to_show(self.claim(theorem, words, V, level=level, **numbers), self.scales(V, float(level))):
                 self.show_limits(theorem, words, V, widths | {"fastest": 1}, turn)
                 return
 
@@ -128,9 +128,9 @@ class Loop(RecordedLoop):
         """Return about the largest level up to which V decreases, also where the quaternion's sign changes."""
 
         def decreases(level: float) -> bool:
-            told = widths | self.slowly(V, Fraction(level))
+            numbers = widths | self.slowly(V, Fraction(level))
             try:
-                wanted, _ = obligations(self.claim(theorem, words, V, level=level, **told), self.by_digest)
+                wanted, _ = obligations(self.claim(theorem, words, V, level=level, **numbers), self.by_digest)
             except RefusedError as reason:
                 self.failed[theorem] = str(reason)
                 return False
@@ -141,13 +141,13 @@ class Loop(RecordedLoop):
         if isfinite(cap) and decreases(cap):
             return Fraction(cap)
         tried = [min(cap, self.potential(V) * 4.0**k) for k in range(-5, 16)]
-        held = [decreases(tried[0])]
-        while held[-1] and len(held) < len(tried):
-            held.append(decreases(tried[len(held)]))
-        if not held[0]:
+        decreasing = [decreases(tried[0])]
+        while decreasing[-1] and len(decreasing) < len(tried):
+            decreasing.append(decreases(tried[len(decreasing)]))
+        if not decreasing[0]:
             self.failed.setdefault(theorem, "V decreases on no set that was tried")
             return None
-        low, high = (tried[-1],) * 2 if held[-1] else tried[len(held) - 2 : len(held)]
+        low, high = (tried[-1],) * 2 if decreasing[-1] else tried[len(decreasing) - 2 : len(decreasing)]
         for _ in range(BISECTIONS if high > low else 0):
             middle = sqrt(low * high)
             low, high = (middle, high) if decreases(middle) else (low, middle)
@@ -195,14 +195,14 @@ class Loop(RecordedLoop):
         # With a unit vector the first of them are too near to singular, and cost the most.
         for share in GIVEN_AWAY[2:] if "limit.norm" in numbers else GIVEN_AWAY:
             lower = Fraction(float(level * (1 - share)))
-            held = self.contents(form, lower)
-            if turn is not None and held["angle"] < turn:
+            contained = self.contents(form, lower)
+            if turn is not None and contained["angle"] < turn:
                 self.failed[f"{theorem}, limits"] = "the set found does not contain the turn"
                 break
-            told = numbers | held | ({} if turn is None else {"angle": max(turn, LEAST_TURN)})
+            claimed = numbers | contained | ({} if turn is None else {"angle": max(turn, LEAST_TURN)})
             if "fastest" in numbers:
-                told |= self.slowly(V, lower)
-            if self.try_to_show(self.claim(theorem, words, V, level=lower, **told), scales):
+                claimed |= self.slowly(V, lower)
+            if self.try_to_show(self.claim(theorem, words, V, level=lower, **claimed), scales):
                 return True
         return False
 
@@ -230,11 +230,11 @@ class Loop(RecordedLoop):
         level = cap
         for _ in range(3):
             scales = self.scales(V, level if isfinite(level) else None)
-            found = [highest(o, scales) for o in limits]
-            known = [x for x in found if x is not None and x > 0.0]
-            if len(known) < len(found):
+            levels = [highest(o, scales) for o in limits]
+            known = [x for x in levels if x is not None and x > 0.0]
+            if len(known) < len(levels):
                 return None
-            level = min(cap, *known) if found else cap
+            level = min(cap, *known) if levels else cap
             # Scales change what is found by little: the others stay higher.
             limits = [o for o, x in zip(limits, known, strict=True) if x < NEAR * level]
         return Fraction(level) if isfinite(level) else None
@@ -259,10 +259,10 @@ class Loop(RecordedLoop):
 
 def descent(wanted: Mapping[str, Obligation]) -> Squares:
     """Return the obligation about V'. RefusedError for a law that has cases."""
-    found = wanted.get("V is non-increasing")
-    if not isinstance(found, Squares):
+    obligation = wanted.get("V is non-increasing")
+    if not isinstance(obligation, Squares):
         raise RefusedError("the law switches")
-    return found
+    return obligation
 
 
 def highest(o: Squares, scales: Mapping[str, float]) -> float | None:

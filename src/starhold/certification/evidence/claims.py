@@ -59,17 +59,17 @@ def find_taken_over(subject: Subject, rate: float | None, angle: float | None) -
     """
     loop = Loop(subject, alone=True)
     loop.show_end()
-    found = next((c for c in loop.claims if c["theorem"] in ENDING and not LIMITS & c["numbers"].keys()), None)
-    if found is None or (rate is None and "level" in found["numbers"]):
+    ending = next((c for c in loop.claims if c["theorem"] in ENDING and not LIMITS & c["numbers"].keys()), None)
+    if ending is None or (rate is None and "level" in ending["numbers"]):
         return None
-    told, taken = dict(found["numbers"]), [*found["taken"], HANDED]
-    if "level" in told and rate is not None:
+    numbers, taken = dict(ending["numbers"]), [*ending["taken"], HANDED]
+    if "level" in numbers and rate is not None:
         # Which of its quaternions tells an attitude matters but for these.
-        either = found["theorem"] == EVENLY or SHORTEST in taken
-        told |= {"start.rate": rate, "start.angle": angle if angle is not None and either else float(ANY_ANGLE)}
+        either = ending["theorem"] == EVENLY or SHORTEST in taken
+        numbers |= {"start.rate": rate, "start.angle": angle if angle is not None and either else float(ANY_ANGLE)}
     loop.claims.clear()
-    V = found["programs"]["lyapunov"]
-    loop.try_to_show(loop.claim(found["theorem"], taken, V, **told), loop.scales(V))
+    V = ending["programs"]["lyapunov"]
+    loop.try_to_show(loop.claim(ending["theorem"], taken, V, **numbers), loop.scales(V))
     find_sampled(loop)
     against_sampling(loop)
     return loop
@@ -95,13 +95,13 @@ def find_sampled(loop: Loop) -> None:
     radius = float(np.abs(roots).max())
     ordered = sorted(map(complex, roots), key=lambda z: (-abs(z), z.imag))
     loop.eigenvalues = [[z.real, z.imag] for z in ordered]
-    told = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
+    numbers = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
     with np.errstate(all="ignore"):
         # They were made for twice the period.
         damping = plus(C.a, K.a, h / 2)
         longest = min(2.0 / largest_ratio(damping, plus(J.a, damping, h)), 4.0 / largest_ratio(K.a, damping))
     if longest > float(h) and loop.try_to_show(
-        loop.claim(SAMPLED, [], None, **told, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
+        loop.claim(SAMPLED, [], None, **numbers, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
     ):
         return
     if radius >= 1.0:
@@ -109,9 +109,9 @@ def find_sampled(loop: Loop) -> None:
         return
     other = longest_stable(floats(J.a) + float(h) * floats(damping), floats(damping), floats(K.a), float(h))
     for share in (1e-9, 1e-7, 1e-5, 1e-3):
-        if loop.try_to_show(loop.claim(SAMPLED, [], None, **told, other=other * (1.0 - share)), {}):
+        if loop.try_to_show(loop.claim(SAMPLED, [], None, **numbers, other=other * (1.0 - share)), {}):
             return
-    loop.try_to_show(loop.claim(SAMPLED, [], None, **told), {})
+    loop.try_to_show(loop.claim(SAMPLED, [], None, **numbers), {})
 
 
 def longest_stable(J: NDArray[np.float64], C: NDArray[np.float64], K: NDArray[np.float64], period: float) -> float:
@@ -138,26 +138,29 @@ def find_sliding(loop: Loop) -> None:
     roles, flown = loop.roles, loop.loop
     roles["surface"] = loop.add(flown.law.module.surface, measurement=ASKED, gains=flown.gains)
     m = [fraction(x + loop.known.disturbance) for x in loop.known.modelled]
-    told: dict[str, Any] = {f"outside.{k}": x for k, x in enumerate(m)} if any(m) else {}
+    numbers: dict[str, Any] = {f"outside.{k}": x for k, x in enumerate(m)} if any(m) else {}
     words = [*([OUTSIDE] if any(m) else []), *([MOVING] if MOVING in loop.words else [])]
     layer = float(getattr(flown.gains, "boundary_layer", 0.0))
     if layer > 0.0 and any(m):
-        told |= in_layer(loop, layer, list(map(float, m)))
+        numbers |= in_layer(loop, layer, list(map(float, m)))
     if signs := sign_words(flown):
-        told |= signed(loop, told)
-    loop.try_to_show(loop.claim(SLIDING, [*words, *signs], None, **told), {})
+        numbers |= signed(loop, numbers)
+    loop.try_to_show(loop.claim(SLIDING, [*words, *signs], None, **numbers), {})
     del roles["surface"]
 
 
-def signed(loop: Loop, told: dict[str, Any]) -> dict[str, Any]:
+def signed(loop: Loop, numbers: dict[str, Any]) -> dict[str, Any]:
     """Return the numbers of the set from which the quaternion's sign never changes."""
     J, K = tensor(loop.loop.craft.inertia), tensor(loop.loop.gains.surface_gain)
-    low = told.get("inertia.low", float(np.linalg.eigvalsh(J)[0]) * (1.0 - 1e-6))
-    k = told.get("surface.low", float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) * (1.0 - 1e-6))
+    low = numbers.get("inertia.low", float(np.linalg.eigvalsh(J)[0]) * (1.0 - 1e-6))
+    k = numbers.get("surface.low", float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) * (1.0 - 1e-6))
     level, moments = 0.5 * low * k * k * (1.0 - 1e-6), np.linalg.eigvalsh(J)
     sine = np.sqrt(2.0 * level / np.linalg.eigvalsh(K.T @ J @ K)[-1])
-    held = {"angle": 2.0 * asin(min(sine, 1.0)) * (1.0 - 1e-7), "rate": np.sqrt(2.0 * level / moments[-1]) * (1.0 - 1e-7)}
-    return {"inertia.low": low, "surface.low": k, "level": level, **held}
+    contained = {
+        "angle": 2.0 * asin(min(sine, 1.0)) * (1.0 - 1e-7),
+        "rate": np.sqrt(2.0 * level / moments[-1]) * (1.0 - 1e-7),
+    }
+    return {"inertia.low": low, "surface.low": k, "level": level, **contained}
 
 
 def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
@@ -170,15 +173,15 @@ def in_layer(loop: Loop, layer: float, m: list[float]) -> dict[str, Any]:
     moments, steep = np.linalg.eigvalsh(J), float(np.linalg.norm(K, 2)) * more
     low, high = float(moments[0]) / more, float(moments[-1]) * more
     k, size = float(np.linalg.eigvalsh(0.5 * (K + K.T))[0]) / more, float(np.sqrt(high / low * (far**2).sum())) * more
-    found: dict[str, Any] = {f"far.{i}": float(x) for i, x in enumerate(far)} | {"inertia.low": low, "inertia.high": high}
-    found |= {"surface.low": k, "surface.high": steep, "surface": size, "end.rate": (size + steep * size / k) * more}
-    return found | {"end.angle": 2.0 * asin(min(size / k, 1.0)) * more}
+    numbers: dict[str, Any] = {f"far.{i}": float(x) for i, x in enumerate(far)} | {"inertia.low": low, "inertia.high": high}
+    numbers |= {"surface.low": k, "surface.high": steep, "surface": size, "end.rate": (size + steep * size / k) * more}
+    return numbers | {"end.angle": 2.0 * asin(min(size / k, 1.0)) * more}
 
 
 def largest_ratio(a: Any, b: Any) -> float:
     """Return the largest eigenvalue of b^-1 a."""
-    found: Any = np.linalg.eigvals(np.linalg.solve(floats(b), floats(a)))
-    return float(found.real.max())
+    eigenvalues: Any = np.linalg.eigvals(np.linalg.solve(floats(b), floats(a)))
+    return float(eigenvalues.real.max())
 
 
 KNOWN = 18
@@ -193,9 +196,9 @@ def find_near(loop: Loop, tolerance: float | None = None) -> None:
     """Find the claim for the largest tolerance, at most 1, or for the one that is asked for. V = w.Jw/2 + 2 s (1 - q0) +
     epsilon q.Jw, of which V' is linear in s, epsilon and epsilon times the tolerance."""
     words = [word for word in loop.words if word == WHEELS]
-    told = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0))
+    corners = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0))
     try:
-        base, stiff, leaning, shifted = (falling(loop, words, *each) for each in told)
+        base, stiff, leaning, shifted = (falling(loop, words, *each) for each in corners)
     except RefusedError as reason:
         loop.failed[NEARBY] = str(reason)
         return
@@ -212,17 +215,17 @@ def find_near(loop: Loop, tolerance: float | None = None) -> None:
     tried = [1.0] if largest > 1.0 else [three_digits(largest * (1.0 - share)) for share in LESS]
     for t in tried if tolerance is None else [tolerance] * (tolerance <= tried[0]):
         mixed = B - D * Fraction(t)
-        found = solved(posed(base.p, [-A, -mixed], others, z), scales)
-        pairs = [] if found is None else [(found[0], found[1])]
+        solution = solved(posed(base.p, [-A, -mixed], others, z), scales)
+        pairs = [] if solution is None else [(solution[0], solution[1])]
         if pairs and HYSTERESIS in sign_words(loop.loop):
             # With a smaller cross term the set is larger.
             for epsilon in (share * pairs[0][1] for share in CALM):
-                found = solved(posed(base.p + mixed * Fraction(epsilon), [-A], others, z), scales)
-                pairs += [] if found is None else [(found[0], epsilon)]
+                solution = solved(posed(base.p + mixed * Fraction(epsilon), [-A], others, z), scales)
+                pairs += [] if solution is None else [(solution[0], epsilon)]
         choices = [made(loop, t, *(float(f"{x:.4g}") for x in pair)) for pair in pairs]
-        choices.sort(key=lambda told: told[1].get("level", 0), reverse=True)
-        for V, told in choices:
-            if loop.try_to_show(loop.claim(NEARBY, [*words, *sign_words(loop.loop)], V, **told), loop.scales(V)):
+        choices.sort(key=lambda choice: choice[1].get("level", 0), reverse=True)
+        for V, numbers in choices:
+            if loop.try_to_show(loop.claim(NEARBY, [*words, *sign_words(loop.loop)], V, **numbers), loop.scales(V)):
                 return
     loop.failed[NEARBY] = f"shown up to {100.0 * tried[0]:.3g} %"
 
@@ -237,17 +240,17 @@ def falling(loop: Loop, words: list[str], s: float, epsilon: float, tolerance: f
     """Return the obligation about V', less what is known of the inertia."""
     more = {"tolerance": tolerance, "lean": epsilon, "inertia.most": 1}
     claim = loop.claim(NEARBY, words, loop.crossed(s, epsilon), **more)
-    found = descent(obligations(claim, loop.by_digest)[0])
-    return replace(found, p=settled(found)[0], known=())
+    obligation = descent(obligations(claim, loop.by_digest)[0])
+    return replace(obligation, p=settled(obligation)[0], known=())
 
 
 def made(loop: Loop, tolerance: float, s: float, epsilon: float) -> tuple[str, dict[str, Any]]:
     """Return this V, and the numbers of the claim with it."""
     J, V, signs = tensor(loop.loop.craft.inertia), loop.crossed(s, epsilon), sign_words(loop.loop)
     most = (float(np.linalg.eigvalsh(J)[-1]) + tolerance * float(np.trace(J))) * (1.0 + 1e-9)
-    told: dict[str, Any] = {"tolerance": tolerance, "lean": epsilon, "inertia.most": most}
+    numbers: dict[str, Any] = {"tolerance": tolerance, "lean": epsilon, "inertia.most": most}
     if not signs:
-        return V, told
+        return V, numbers
     # V where the sign of the quaternion changes, at least.
     level = 2.0 * s - 0.5 * epsilon**2 * most
     if HYSTERESIS in signs:
@@ -255,11 +258,11 @@ def made(loop: Loop, tolerance: float, s: float, epsilon: float) -> tuple[str, d
         lost = epsilon**2 * most * (1.0 - h * h)
         x = max(s * h / lost - 0.5, 1e-3)
         level = 4.0 * s * h * x + 2.0 * s * (1.0 + h) - lost * (0.5 + 2.0 * x + 2.0 * x * x)
-        told |= {"hysteresis": h, "jump.lean": 2.0 * epsilon * x}
+        numbers |= {"hysteresis": h, "jump.lean": 2.0 * epsilon * x}
     level *= 1.0 - 1e-6
     if level <= 0.0:
-        return V, told
+        return V, numbers
     angle = loop.contents(loop.form(V), Fraction(level))["angle"]
-    told |= {"level": level, "angle": angle, "rate": sqrt(2.0 * level / most) * (1.0 - 1e-7)}
+    numbers |= {"level": level, "angle": angle, "rate": sqrt(2.0 * level / most) * (1.0 - 1e-7)}
     everywhere = sqrt(2.0 * max(level - 4.0 * s, 0.0) / most) - epsilon
-    return V, told | ({"start.angle": ANY_ANGLE, "start.rate": everywhere * (1.0 - 1e-6)} if everywhere > 0.0 else {})
+    return V, numbers | ({"start.angle": ANY_ANGLE, "start.rate": everywhere * (1.0 - 1e-6)} if everywhere > 0.0 else {})

@@ -49,14 +49,14 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
     """Return a claim with evidence, without the numbers and programs that it does not need. NotFoundError where an
     obligation does not hold, or no evidence for it was found."""
 
-    def found() -> dict[str, Any] | NotFoundError:
+    def search() -> dict[str, Any] | NotFoundError:
         try:
             return _completed(claim, programs, scales)
         except NotFoundError as reason:
             return reason
 
     # A claim names its programs by digests of all that stands in them.
-    completed = once(json.dumps(["complete", claim, dict(scales)]), found)
+    completed = once(json.dumps(["complete", claim, dict(scales)]), search)
     if isinstance(completed, NotFoundError):
         raise NotFoundError(str(completed))
     return completed
@@ -68,40 +68,40 @@ def _completed(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mappi
         with warnings.catch_warnings():
             # The kernel decides of what an ill-conditioned matrix gives.
             warnings.simplefilter("ignore", linalg.LinAlgWarning)
-            found = {name: evidence(name, wanted, scales) for name in wanted}
+            completed = {name: evidence(name, wanted, scales) for name in wanted}
     except RefusedError as reason:
         raise NotFoundError(str(reason)) from None
     subject, programs = (
-        {name: x for name, x in claim[part].items() if name not in told.unread}
-        for part, told in (("subject", known.subject), ("programs", known.programs))
+        {name: x for name, x in claim[part].items() if name not in table.unread}
+        for part, table in (("subject", known.subject), ("programs", known.programs))
     )
-    told = claim["evidence"] | {name: x for name, x in found.items() if x is not None}
-    return claim | {"subject": subject, "programs": programs, "evidence": told}
+    evidences = claim["evidence"] | {name: x for name, x in completed.items() if x is not None}
+    return claim | {"subject": subject, "programs": programs, "evidence": evidences}
 
 
 def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[str, float]) -> Any:
     """Return the evidence of an obligation, or None if it needs none."""
-    found: Any = None
+    shown: Any = None
     o = wanted[name]
     if isinstance(o, rules.Squares):
-        found = plainly(o) or squares(o, scales)
-        if found is None:
+        shown = plainly(o) or squares(o, scales)
+        if shown is None:
             raise NotFoundError(f"{name}: no sum of squares was found")
         # It was checked when it was found.
-        return found
+        return shown
     if isinstance(o, rules.Sum):
-        found = Reduced(o, scales).evidence()
+        shown = Reduced(o, scales).evidence()
     elif isinstance(o, rules.Vanishes) and o.modulo:
-        found = list(map(text, euler(name, wanted) if name.startswith("Euler") else combined(name, o)))
+        shown = list(map(text, euler(name, wanted) if name.startswith("Euler") else combined(name, o)))
     elif isinstance(o, rules.Contracts):
-        found = contracts(o)
+        shown = contracts(o)
     elif isinstance(o, rules.Persists):
-        found = persists(o)
+        shown = persists(o)
     try:
-        o.check(found)
+        o.check(shown)
     except RefusedError as reason:
         raise NotFoundError(f"{name}: {reason}") from None
-    return found
+    return shown
 
 
 def floats(rows: Rows) -> NDArray[np.float64]:
@@ -111,10 +111,10 @@ def floats(rows: Rows) -> NDArray[np.float64]:
 
 def combined(name: str, o: rules.Vanishes) -> list[Poly]:
     """Return numbers for cofactors: those with which the relations make a polynomial."""
-    found = solved(o.p, list(o.modulo))
-    if found is None:
+    cofactors = solved(o.p, list(o.modulo))
+    if cofactors is None:
         raise NotFoundError("the torque at rest vanishes elsewhere too" if name.startswith("only") else name)
-    return list(map(poly, found))
+    return list(map(poly, cofactors))
 
 
 def euler(name: str, wanted: Mapping[str, rules.Obligation]) -> list[Poly]:
@@ -129,8 +129,16 @@ def contracts(o: rules.Contracts) -> list[list[str]]:
     A = np.array([[float(x) for x in row] for row in o.A])
     size = np.eye(len(A))
     solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
-    found = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
-    return [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
+    solution = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
+    return _rounded(solution)
+
+
+def _rounded(P: Any) -> list[list[str]]:
+    """Return the symmetric part of a matrix, scaled, in exact numbers; LAPACK may answer a singular system with nan."""
+    largest = np.abs(P).max()
+    if not 0.0 < largest < np.inf:
+        raise NotFoundError("Lyapunov's equation has no solution in double precision")
+    return [[str(rounded(float(x), 15)) for x in row] for row in (P + P.T) / (2.0 * largest)]
 
 
 def persists(o: rules.Persists) -> list[list[str]]:
@@ -138,13 +146,9 @@ def persists(o: rules.Persists) -> list[list[str]]:
     A = np.array([[float(x) for x in row] for row in o.A])
     for c in (1.0, 1.0 + 1e-6, 1.0 + 1e-4, 1.0 + 1e-2):
         try:
-            found: Any = linalg.solve_discrete_lyapunov(A.T / c, -np.eye(len(A)))
-        except np.linalg.LinAlgError:
-            continue
-        rows = [[str(rounded(float(x), 15)) for x in row] for row in (found + found.T) / (2.0 * np.abs(found).max())]
-        try:
+            rows = _rounded(linalg.solve_discrete_lyapunov(A.T / c, -np.eye(len(A))))
             o.check(rows)
-        except RefusedError:
+        except (np.linalg.LinAlgError, NotFoundError, RefusedError):
             continue
         return rows
     raise NotFoundError("no form was found that grows")
@@ -153,5 +157,9 @@ def persists(o: rules.Persists) -> list[list[str]]:
 def certificate(programs: list[dict[str, Any]], claims: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the content of a certificate with these claims and those of the programs that they are about."""
     used = {name for claim in claims for name in claim["programs"].values()}
-    found = {digest(program): program for program in programs}
-    return {"format": "starhold certificate 3", "programs": {n: p for n, p in found.items() if n in used}, "claims": claims}
+    by_digest = {digest(program): program for program in programs}
+    return {
+        "format": "starhold certificate 3",
+        "programs": {n: p for n, p in by_digest.items() if n in used},
+        "claims": claims,
+    }

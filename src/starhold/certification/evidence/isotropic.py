@@ -82,14 +82,14 @@ class Reach(NamedTuple):
 
     shape: Shape
     V: str
-    asked: Sum
+    obligation: Sum
     level: float
 
     def decreases(self, level: float) -> bool:
         """Whether floats have a sum for a level."""
-        inside, *others = self.asked.known
-        asked = Sum(self.asked.p, [inside - 1 + Fraction(level), *others], (), self.asked.strict)
-        return Reduced(asked, units(level)).floats() is not None
+        inside, *others = self.obligation.known
+        obligation = Sum(self.obligation.p, [inside - 1 + Fraction(level), *others], (), self.obligation.strict)
+        return Reduced(obligation, units(level)).floats() is not None
 
 
 def find_isotropic(loop: Loop) -> None:
@@ -101,11 +101,11 @@ def find_isotropic(loop: Loop) -> None:
         return
     a, b = root
     try:
-        found = [reach(loop, in_seconds(shape, a)) for shape in (SIGNED if sign_words(flown) else near(a * b))]
+        reaches = [reach(loop, in_seconds(shape, a)) for shape in (SIGNED if sign_words(flown) else near(a * b))]
     except RefusedError as reason:
         loop.failed[ISOTROPIC] = str(reason)
         return
-    for one in sorted(found, key=lambda one: -one.shape.volume(one.level)):
+    for one in sorted(reaches, key=lambda one: -one.shape.volume(one.level)):
         for level in (short(one.level * (1.0 - less)) for less in LESS):
             claim = loop.claim(ISOTROPIC, words(loop), one.V, level=level, **contents(loop, one.shape, level))
             if one.decreases(level) and loop.try_to_show(claim, loop.scales(one.V, level) | units(level)):
@@ -141,7 +141,7 @@ def reach(loop: Loop, shape: Shape) -> Reach:
     V, hysteresis = loop.add(height, measurement=ASKED), loop.loop.hysteresis_width
     loop.written_by[V] = {name: float(x) for name, x in shape._asdict().items()}
     signed: dict[str, Any] = {"hysteresis": hysteresis} if HYSTERESIS in words(loop) else {}
-    asked = cast(
+    obligation = cast(
         Sum, obligations(loop.claim(ISOTROPIC, words(loop), V, level=1, **signed), loop.by_digest)[0]["V decreases"]
     )
     top = shape.other_equilibrium
@@ -151,13 +151,13 @@ def reach(loop: Loop, shape: Shape) -> Reach:
     fastest = max(abs(shape.g), abs(shape.g + 2.0 * shape.m)) + sqrt(2.0 * top + shape.g**2)
     u, x, v = np.meshgrid(np.linspace(0.0, 2.0, 61)[1:], np.linspace(-1.0, 1.0, 31), np.linspace(0.0, fastest, 61)[1:])
     at = {"u": u, "v": v, "t": x * np.sqrt(u * (2.0 - u))}
-    heights, slopes = 1.0 - valued(asked.known[0], at), valued(asked.p, at)
-    return Reach(shape, V, asked, min(top * (1.0 - 1e-6), float(heights[slopes <= 0.0].min(initial=np.inf))))
+    heights, slopes = 1.0 - valued(obligation.known[0], at), valued(obligation.p, at)
+    return Reach(shape, V, obligation, min(top * (1.0 - 1e-6), float(heights[slopes <= 0.0].min(initial=np.inf))))
 
 
 def contents(loop: Loop, shape: Shape, level: float) -> dict[str, Any]:
     """Return a turn from rest and a rate on target that are in the set, and the width of the hysteresis."""
     less = 1.0 - 1e-7
     u = 2.0 * level / (shape.p + sqrt(shape.p**2 + 4.0 * shape.c2 * level))
-    told: dict[str, Any] = {"angle": 2.0 * acos(1.0 - min(u, 1.98)) * less, "rate": sqrt(2.0 * level) * less}
-    return told | ({"hysteresis": loop.loop.hysteresis_width} if HYSTERESIS in words(loop) else {})
+    contained: dict[str, Any] = {"angle": 2.0 * acos(1.0 - min(u, 1.98)) * less, "rate": sqrt(2.0 * level) * less}
+    return contained | ({"hysteresis": loop.loop.hysteresis_width} if HYSTERESIS in words(loop) else {})

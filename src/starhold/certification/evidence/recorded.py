@@ -72,16 +72,16 @@ class RecordedLoop:
     def roles(self) -> dict[str, str]:
         """The digests of the programs that every claim is about."""
         loop, driven = self.loop, driven_errors(self.loop)
-        found = {
+        programs = {
             "law": self.keep(program.law_program(loop.law, loop.gains, loop.known, loop.period)),
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=self.plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
         if driven is not None:
-            told, noise = (V3,) * driven.recursion.size, (V3,) * driven.recursion.noises
-            found[CARRIED] = self.add(driven.recursion.carried, errors=told, noise=noise)
-            found[CORRECTED] = self.add(driven.recursion.corrected, errors=told, noise=noise)
-        return found
+            errors, noise = (V3,) * driven.recursion.size, (V3,) * driven.recursion.noises
+            programs[CARRIED] = self.add(driven.recursion.carried, errors=errors, noise=noise)
+            programs[CORRECTED] = self.add(driven.recursion.corrected, errors=errors, noise=noise)
+        return programs
 
     def add(self, equation: Callable[..., Any], **given: Any) -> str:
         """Record a program, and return its digest."""
@@ -96,16 +96,16 @@ class RecordedLoop:
         """Record V: the law's own, or the kinetic energy and 2 stiffness (1 - q0)."""
         loop = self.loop
         if stiffness is None:
-            own = self.add(loop.law.lyapunov, measurement=ASKED, gains=loop.gains, craft=self.plant)  # pyright: ignore
-            self.written_by[own] = WRITTEN
-            return own
+            declared = self.add(loop.law.lyapunov, measurement=ASKED, gains=loop.gains, craft=self.plant)  # pyright: ignore
+            self.written_by[declared] = WRITTEN
+            return declared
 
         def energy(measurement: Measurement, craft: Any) -> Any:
             return rigid_body.kinetic_energy(measurement.rate, craft) + 2.0 * stiffness * (1.0 - measurement.attitude[0])
 
-        found = self.add(energy, measurement=ASKED, craft=self.plant)
-        self.written_by[found] = WRITTEN | {"stiffness": stiffness}
-        return found
+        digest_of = self.add(energy, measurement=ASKED, craft=self.plant)
+        self.written_by[digest_of] = WRITTEN | {"stiffness": stiffness}
+        return digest_of
 
     def crossed(self, s: float, epsilon: float) -> str:
         """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw."""
@@ -118,45 +118,45 @@ class RecordedLoop:
                 + epsilon * lean
             )
 
-        found = self.add(energy, measurement=ASKED, craft=self.plant)
-        self.written_by[found] = WRITTEN | {"stiffness": s, "epsilon": epsilon}
-        return found
+        digest_of = self.add(energy, measurement=ASKED, craft=self.plant)
+        self.written_by[digest_of] = WRITTEN | {"stiffness": s, "epsilon": epsilon}
+        return digest_of
 
     def leaning(self, share: float) -> str:
         """Record the law's own V and epsilon q.Jw, at most this share of it."""
-        loop, own = self.loop, self.form(self.lyapunov())
-        scaled: Any = np.linalg.solve(np.linalg.cholesky(curvature(own, "w")), tensor(loop.craft.inertia))
+        loop, form = self.loop, self.form(self.lyapunov())
+        scaled: Any = np.linalg.solve(np.linalg.cholesky(curvature(form, "w")), tensor(loop.craft.inertia))
         most = float(np.linalg.norm(scaled, 2))
-        epsilon = float(f"{share * sqrt(-float(own.terms.get(('q0',), 0)) / 2.0) / most:.3g}")
+        epsilon = float(f"{share * sqrt(-float(form.terms.get(('q0',), 0)) / 2.0) / most:.3g}")
 
         def energy(measurement: Measurement, gains: Any, craft: Any) -> Any:
             lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
             return loop.law.lyapunov(measurement, gains, craft) + epsilon * lean  # pyright: ignore
 
-        found = self.add(energy, measurement=ASKED, gains=loop.gains, craft=self.plant)
-        self.written_by[found] = WRITTEN | {"epsilon": epsilon}
-        return found
+        digest_of = self.add(energy, measurement=ASKED, gains=loop.gains, craft=self.plant)
+        self.written_by[digest_of] = WRITTEN | {"epsilon": epsilon}
+        return digest_of
 
     @cached_property
     def subject(self) -> dict[str, str]:
         """The exact numbers that programs and the body may read."""
         loop, J = self.loop, tensor(self.loop.craft.inertia).tolist()
         named = [*labelled("gains", loop.gains), *labelled("craft", loop.known), ("measurement.period", float(loop.period))]
-        found = {name: x.hex() for name, x in named if isfinite(x)}
-        found |= {f"body.inertia.{i}.{k}": float(J[i][k]).hex() for i in range(3) for k in range(i, 3)}
+        numbers = {name: x.hex() for name, x in named if isfinite(x)}
+        numbers |= {f"body.inertia.{i}.{k}": float(J[i][k]).hex() for i in range(3) for k in range(i, 3)}
         if loop.wheels is not None:
             for k, (axis, p) in enumerate(zip(loop.wheels.axes, loop.rotors, strict=True)):
-                found |= {f"wheel.{k}.axis.{i}": float(x).hex() for i, x in enumerate(axis)}
-                found[f"wheel.{k}.momentum"] = float(p).hex()
-        return found
+                numbers |= {f"wheel.{k}.axis.{i}": float(x).hex() for i, x in enumerate(axis)}
+                numbers[f"wheel.{k}.momentum"] = float(p).hex()
+        return numbers
 
     @property
     def words(self) -> list[str]:
         """Name the assumptions about the loop that apply."""
         loop, known = self.loop, self.known
-        found = [OUTSIDE] if any(known.modelled) else []
-        found += [MOVING] if known.moving else []
-        return found + ([WHEELS] if loop.wheels is not None else [])
+        words = [OUTSIDE] if any(known.modelled) else []
+        words += [MOVING] if known.moving else []
+        return words + ([WHEELS] if loop.wheels is not None else [])
 
     def claim(self, theorem: str, taken: list[str], V: str | None, **numbers: Any) -> dict[str, Any]:
         """Return a claim without evidence."""
@@ -180,11 +180,11 @@ class RecordedLoop:
         """Return the approximate size of variables on {V <= level}."""
         known, J, top = self.known, tensor(self.loop.craft.inertia), self.potential(V)
         energy = min(level or top, top)
-        found = {f"q{k}": sqrt(energy / top) for k in (1, 2, 3)}
-        found |= {f"w{k}": sqrt(2.0 * energy / self.kinetic(V)[k - 1]) for k in (1, 2, 3)}
-        found |= {f"r{k}": float(known.target_rate) or 1.0 for k in (1, 2, 3)}
-        found |= {f"a{k}": float(known.target_acceleration) or 1.0 for k in (1, 2, 3)}
-        return found | {f"h{k}": float(known.total_momentum) or float(J.max()) * found["w1"] for k in (1, 2, 3)}
+        scales = {f"q{k}": sqrt(energy / top) for k in (1, 2, 3)}
+        scales |= {f"w{k}": sqrt(2.0 * energy / self.kinetic(V)[k - 1]) for k in (1, 2, 3)}
+        scales |= {f"r{k}": float(known.target_rate) or 1.0 for k in (1, 2, 3)}
+        scales |= {f"a{k}": float(known.target_acceleration) or 1.0 for k in (1, 2, 3)}
+        return scales | {f"h{k}": float(known.total_momentum) or float(J.max()) * scales["w1"] for k in (1, 2, 3)}
 
     def form(self, V: str | None) -> Poly:
         """Return V as a polynomial."""
@@ -207,12 +207,12 @@ class RecordedLoop:
 
     def bounds(self, words: list[str]) -> dict[str, Any]:
         """Return the numbers that bound the loop's assumptions."""
-        known, found = self.known, dict[str, Any]()
+        known, bounds = self.known, dict[str, Any]()
         if OUTSIDE in words:
-            found |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
+            bounds |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
         if MOVING in words:
-            found |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
-        return found | ({"momentum": float(known.total_momentum)} if WHEELS in words else {})
+            bounds |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
+        return bounds | ({"momentum": float(known.total_momentum)} if WHEELS in words else {})
 
     @property
     def limits(self) -> dict[str, Any]:

@@ -41,5 +41,5 @@ class Reduced(Guess):
 def powers(fast: int, turned: int, odd: int) -> list[Poly]:
     """Return all v^i u^j t^k with i up to `fast`, j + k up to `turned`, and i + k odd or even."""
     spare = range(turned + 1)
-    found = [(i, j, k) for i in range(fast + 1) for j in spare for k in spare if j + k <= turned and (i + k) % 2 == odd]
-    return [Poly({("t",) * k + ("u",) * j + ("v",) * i: Fraction(1)}) for i, j, k in found]
+    exponents = [(i, j, k) for i in range(fast + 1) for j in spare for k in spare if j + k <= turned and (i + k) % 2 == odd]
+    return [Poly({("t",) * k + ("u",) * j + ("v",) * i: Fraction(1)}) for i, j, k in exponents]

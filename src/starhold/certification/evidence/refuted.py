@@ -82,7 +82,9 @@ def against_near(loop: Loop) -> bool:
     except RefusedError as reason:
         loop.failed[RISES_NEAR] = str(reason)
         return False
-    return any(loop.try_to_show(loop.claim(theorem, [], V, **own), {}) for theorem, p in theorems for own in small_states(p))
+    return any(
+        loop.try_to_show(loop.claim(theorem, [], V, **numbers), {}) for theorem, p in theorems for numbers in small_states(p)
+    )
 
 
 def small_states(p: Poly) -> Iterator[dict[str, float]]:
@@ -92,11 +94,11 @@ def small_states(p: Poly) -> Iterator[dict[str, float]]:
     for part in (slice(0, 3), slice(3, 6), slice(0, 6)):
         values, vectors = np.linalg.eigh(form[part, part])
         if values[-1] > 0.0:
-            found = np.zeros(6)
-            found[part] = vectors[:, -1]
+            direction = np.zeros(6)
+            direction[part] = vectors[:, -1]
             for size in 10.0 ** -np.arange(8.0):
                 # Near the target the rotation is twice q.
-                yield state(0.5 * size * found[3:], size * found[:3])
+                yield state(0.5 * size * direction[3:], size * direction[:3])
 
 
 def quadratic(p: Poly) -> Floats:
@@ -126,12 +128,12 @@ def against_far(loop: Loop, rate: float) -> bool:
     for turned, length in product((0.0 * t, t), lengths):
         values = named(turned, length * w)
         for side, p in zip(sides, slopes, strict=False):
-            found = valued(p, values)
+            slopes = valued(p, values)
             for condition, truth in {guard for case in side for guard in case.guards}:
-                found[(valued(Poly(dict(condition)), values) > 0.0) != truth] = 0.0
-            place = int(np.argmax(found))
-            own = state(turned[:, place], length * w[:, place])
-            if found[place] > 0.0 and loop.try_to_show(loop.claim(RISES, [], V, **own, **more), {}):
+                slopes[(valued(Poly(dict(condition)), values) > 0.0) != truth] = 0.0
+            place = int(np.argmax(slopes))
+            steepest = state(turned[:, place], length * w[:, place])
+            if slopes[place] > 0.0 and loop.try_to_show(loop.claim(RISES, [], V, **steepest, **more), {}):
                 return True
     return False
 
@@ -169,8 +171,8 @@ def against_limit(loop: Loop, V: str, turn: float) -> bool:
             left = level - float(exact.lyapunov.at(at_rest(t)).number)
             if left < 0.0:
                 continue
-            own = state(t, (1.0 - 1e-7) * np.sqrt(left) * damp)
-            numbers = {name: limit, "angle": angle, **own, **{f"rest.{k}": x for k, x in enumerate(rest)}}
+            beside = state(t, (1.0 - 1e-7) * np.sqrt(left) * damp)
+            numbers = {name: limit, "angle": angle, **beside, **{f"rest.{k}": x for k, x in enumerate(rest)}}
             if loop.try_to_show(loop.claim(EXCEEDS, [], V, **numbers), {}):
                 return True
     return False
@@ -212,6 +214,9 @@ def pushes(loop: Loop) -> list[tuple[float, list[float] | None]]:
     directions = np.random.default_rng(0).normal(size=(2000, 3))
     directions *= distance / np.linalg.norm(directions, axis=1, keepdims=True)
     strength = 3.0 * flown.craft.gravity / distance**5
-    found = np.array([gravity_gradient(tuple(d), strength, flown.craft) for d in directions.tolist()])
+    torques = np.array([gravity_gradient(tuple(d), strength, flown.craft) for d in directions.tolist()])
     # Floats found the position.
-    return [((most + float(own.max())) * (1.0 - 1e-9), directions[int(np.argmax(own))].tolist()) for own in found.T]
+    return [
+        ((most + float(along_axis.max())) * (1.0 - 1e-9), directions[int(np.argmax(along_axis))].tolist())
+        for along_axis in torques.T
+    ]

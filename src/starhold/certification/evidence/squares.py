@@ -57,10 +57,10 @@ def squares(o: Squares, scales: Mapping[str, float]) -> dict[str, Any] | None:
         guess = solved(problem, scales)
         ways = [] if guess is None else [exactly] if o.least else [exactly, on_a_face]
         for way, digits in [(way, digits) for way in ways for digits in DIGITS]:
-            found = way(problem, guess, digits)
-            if found is None:
+            shown = way(problem, guess, digits)
+            if shown is None:
                 continue
-            evidence = written(o, problem, found, fixed, ansatz)
+            evidence = written(o, problem, shown, fixed, ansatz)
             try:
                 o.check(evidence)
             except RefusedError:
@@ -75,8 +75,8 @@ def plainly(o: Squares) -> dict[str, Any] | None:
     problem = posed(p, known, [], o.z)
     if o.modulo or not p.terms.keys() <= {m for q in problem.columns for m in q.terms}:
         return None
-    found = exactly(problem, [0.0] * len(problem.columns), 1)
-    evidence = None if found is None else written(o, problem, found, fixed, [])
+    shown = exactly(problem, [0.0] * len(problem.columns), 1)
+    evidence = None if shown is None else written(o, problem, shown, fixed, [])
     try:
         o.check(evidence)
     except RefusedError:
@@ -89,8 +89,8 @@ def counts(o: Squares) -> list[int]:
     kinds = ["".join(sorted(name[0] for name in max(z.terms))) for z in o.z]
     ends = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]]
     names = {name for p in (o.p, *o.known) for name in p.names}
-    told = next((k for k, z in enumerate(o.z) if not z.names <= names), len(o.z))
-    return sorted({o.least or max(told, 1), *(k for k in ends if k > o.least > 0), len(o.z)})
+    count = next((k for k, z in enumerate(o.z) if not z.names <= names), len(o.z))
+    return sorted({o.least or max(count, 1), *(k for k in ends if k > o.least > 0), len(o.z)})
 
 
 def free(columns: Sequence[Poly], z: Sequence[Poly]) -> Sequence[Poly]:
@@ -104,10 +104,10 @@ def free(columns: Sequence[Poly], z: Sequence[Poly]) -> Sequence[Poly]:
 def settled(o: Squares) -> tuple[Poly, list[Poly], dict[int, Fraction]]:
     """Return p and what is known, without what is known of variables that z has not: p has as much of it as its coefficient
     says, if it has the sign."""
-    own, p, fixed = {name for z in o.z for name in z.names}, o.p, dict[int, Fraction]()
+    names, p, fixed = {name for z in o.z for name in z.names}, o.p, dict[int, Fraction]()
     known = [*o.strict, *o.known]
     for place, g in enumerate(known):
-        strange = next((m for m in g.terms if not own.issuperset(m)), None)
+        strange = next((m for m in g.terms if not names.issuperset(m)), None)
         if strange is not None:
             fixed[place] = max(p.terms.get(strange, Fraction(0)) / g.terms[strange], Fraction(0))
             p = p - g * fixed[place]
@@ -119,9 +119,10 @@ def ansatzes(o: Squares, p: Poly, known: list[Poly], count: int) -> list[list[li
     leaves can be put on the matrix."""
     whole = cofactors(o, p, count)
     grams = [a * b for k, a in enumerate(o.z[:count]) for b in o.z[: k + 1]]
-    held = {m for q in (p, *known, *grams) for m in q.terms}
+    monomials = {m for q in (p, *known, *grams) for m in q.terms}
     fitting = [
-        [c for c in parts if (c * relation).terms.keys() <= held] for relation, parts in zip(o.modulo, whole, strict=True)
+        [c for c in parts if (c * relation).terms.keys() <= monomials]
+        for relation, parts in zip(o.modulo, whole, strict=True)
     ]
     return [fitting, whole] if fitting != whole and any(fitting) else [whole]
 
@@ -129,12 +130,12 @@ def ansatzes(o: Squares, p: Poly, known: list[Poly], count: int) -> list[list[li
 def cofactors(o: Squares, p: Poly, count: int) -> list[list[Poly]]:
     """Return for each relation the monomials of its cofactor, of degrees that fit."""
     top = max([degree(p), *(2 * degree(z) for z in o.z[:count]), *(degree(g) for g in o.known)])
-    found: list[list[Poly]] = []
+    cofactors: list[list[Poly]] = []
     for relation in o.modulo:
         names = sorted({name for z in o.z[:count] for name in z.names})
         spare = range(top - degree(relation) + 1)
-        found.append([Poly({m: Fraction(1)}) for d in spare for m in combinations_with_replacement(names, d)])
-    return found
+        cofactors.append([Poly({m: Fraction(1)}) for d in spare for m in combinations_with_replacement(names, d)])
+    return cofactors
 
 
 def degree(p: Poly) -> int:
@@ -208,8 +209,8 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
     matrix = sparse.csc_matrix(A)
 
     def solve() -> Any | None:
-        found = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, matrix, b, cones, settings).solve()
-        return np.array(found.x) if "Solved" in str(found.status) or "Insufficient" in str(found.status) else None
+        solution = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, matrix, b, cones, settings).solve()
+        return np.array(solution.x) if "Solved" in str(solution.status) or "Insufficient" in str(solution.status) else None
 
     numbers = tuple(x.tobytes() for x in (cost, matrix.data, matrix.indices, matrix.indptr, b))
     return once((numbers, matrix.shape, equal, signed, *sides), solve)
@@ -224,7 +225,7 @@ def optimum(
     count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
     right = [b, np.zeros(len(signed))]
     if margin:
-        entries += [(k, count, 1.0) for k, own in enumerate([*signed, True]) if own]
+        entries += [(k, count, 1.0) for k, shared in enumerate([*signed, True]) if shared]
         right.append(np.ones(1))
     height, at = len(signed) + margin, count - sum(map(len, blocks))
     for pairs in blocks:
@@ -273,15 +274,15 @@ def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:
     """Return exact factors near the guess; None where there are none."""
     x, head = [rounded(float(v), digits) for v in guess], len(problem.columns) - len(problem.pairs)
     x[: problem.signed] = [max(v, Fraction(0)) for v in x[: problem.signed]]
-    found = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
-    if found is not None:
-        return found
+    shown = shared_out(problem, x, head) if all(len(z.terms) == 1 for z in problem.z) else None
+    if shown is not None:
+        return shown
     rest, count = problem.p - dot(x, problem.columns), len(x)
     A = matrix_of([*problem.columns, rest])
     echelon, rank = fmpq_mat(count, A.nrows(), [A[r, k] for k in range(count) for r in range(A.nrows())]).rref()
     kept = [next(c for c in range(A.nrows()) if echelon[r, c] != 0) for r in range(rank)]
-    own = fmpq_mat(rank, count, [A[r, k] for r in kept for k in range(count)])
-    step = own.transpose() * (own * own.transpose()).solve(fmpq_mat(rank, 1, [A[r, count] for r in kept]))
+    square = fmpq_mat(rank, count, [A[r, k] for r in kept for k in range(count)])
+    step = square.transpose() * (square * square.transpose()).solve(fmpq_mat(rank, 1, [A[r, count] for r in kept]))
     return [v + fraction(step[k, 0]) for k, v in enumerate(x)]
 
 
@@ -294,10 +295,10 @@ def coefficients(polys: Sequence[Poly]) -> tuple[tuple[int, int], list[tuple[int
 def matrix_of(polys: Sequence[Poly]) -> Any:
     """Return the exact matrix of coefficients."""
     (height, width), entries = coefficients(polys)
-    found = fmpq_mat(max(height, 1), max(width, 1))
+    matrix = fmpq_mat(max(height, 1), max(width, 1))
     for r, k, c in entries:
-        found[r, k] = exact(c)
-    return found
+        matrix[r, k] = exact(c)
+    return matrix
 
 
 def sparse_of(polys: Sequence[Poly]) -> Any:
@@ -328,16 +329,16 @@ def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | Non
         for k, place in enumerate(places):
             row[place] = -Fraction(float(null[k, i])).limit_denominator(SHORT)
     face = posed(problem.p, [], problem.columns[:head], [dot(row, problem.z) for row in taken])
-    found = exactly(
+    shown = exactly(
         replace(face, signed=problem.signed), [*guess[:head], *(G[rest[i], rest[k]] for i, k in face.pairs)], digits
     )
-    if found is None:
+    if shown is None:
         return None
-    own = [[Fraction(0)] * len(rest) for _ in rest]
-    for (i, k), v in zip(face.pairs, found[head:], strict=True):
-        own[i][k] = own[k][i] = v
-    whole = times(transpose(taken), times(own, taken))
-    return [*found[:head], *(whole[i][k] for i, k in problem.pairs)]
+    gram = [[Fraction(0)] * len(rest) for _ in rest]
+    for (i, k), v in zip(face.pairs, shown[head:], strict=True):
+        gram[i][k] = gram[k][i] = v
+    whole = times(transpose(taken), times(gram, taken))
+    return [*shown[:head], *(whole[i][k] for i, k in problem.pairs)]
 
 
 def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction] | None:
@@ -348,11 +349,11 @@ def shared_out(problem: Problem, x: list[Fraction], head: int) -> list[Fraction]
         places.setdefault(next(iter(column.terms)), []).append(k)
     rest = problem.p - dot(x, problem.columns)
     for m, c in rest.terms.items():
-        own = places.get(m)
-        if own is None:
+        places_of = places.get(m)
+        if places_of is None:
             return None
-        share = c / sum((problem.columns[k].terms[m] for k in own), Fraction(0))
-        for k in own:
+        share = c / sum((problem.columns[k].terms[m] for k in places_of), Fraction(0))
+        for k in places_of:
             x[k] += share
     return x
 

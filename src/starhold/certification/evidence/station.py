@@ -91,14 +91,14 @@ class Station:
         loop, circle = self.circle
         spread = Fraction(level) / circle.weights[0]
         low, inside = Fraction(root(spread, 0.0)), circle.square - Fraction(root(spread, inf))
-        found = {
+        numbers = {
             "level": level,
             "inner": root(circle.square - low, inf) if inside > 0 else 0.0,
             "outer": root(circle.square + low, 0.0),
             "velocity": root(Fraction(level) / max(circle.weights[1:]), 0.0),
         }
         bodies = loop.ring.divisors or len(loop.ring.roots) > (circle.size != "")
-        return found | ({"clear": root(inside / 2, 0.0)} if bodies and inside > 0 else {})
+        return numbers | ({"clear": root(inside / 2, 0.0)} if bodies and inside > 0 else {})
 
     def show_circle(self) -> None:
         """Find the claim that motions converge to the circle, from the largest level."""
@@ -138,15 +138,15 @@ class Station:
         cap = float(circle.weights[0] * circle.square**2 * ALMOST)
         level = cap
         for _ in range(2):
-            found = [highest(o, self.scales(level)) for o in limits]
-            level = max(min(cap, *(x or 0.0 for x in found)), 0.0)
+            levels = [highest(o, self.scales(level)) for o in limits]
+            level = max(min(cap, *(x or 0.0 for x in levels)), 0.0)
             if level == 0.0:
                 break
         for less in GIVEN_AWAY:
             if level > 0.0:
                 try:
-                    told = self.contents(level * (1.0 - less))
-                    return self.show(self.claim(CIRCLE, **told, **{name: limit}), self.scales(level))
+                    contained = self.contents(level * (1.0 - less))
+                    return self.show(self.claim(CIRCLE, **contained, **{name: limit}), self.scales(level))
                 except NotFoundError:
                     continue
         raise NotFoundError("no level is small enough")
@@ -155,13 +155,13 @@ class Station:
         """Return the largest square of the control on the circle, and where: where it crosses Y or Z."""
         loop, circle = self.circle
         radius = Fraction(isqrt(circle.square.numerator), isqrt(circle.square.denominator))
-        found: list[tuple[Fraction, dict[str, Fraction]]] = []
+        peaks: list[tuple[Fraction, dict[str, Fraction]]] = []
         for y, z in ((radius, Fraction(0)), (Fraction(0), radius)):
             at = {"x1": 0, "x2": y, "x3": z, "v1": 0, "v2": -circle.rate * z, "v3": circle.rate * y, circle.size: 0}
             side = next(s for s in loop.sides if circle.inverse not in {name for p in s.value for name in p.names})
             squares = [p.at(at).number ** 2 for p in side.value]
-            found.append((max(squares) if kind == "axis" else sum(squares, Fraction(0)), {"y": y, "z": z}))
-        return max(found, key=lambda one: one[0])
+            peaks.append((max(squares) if kind == "axis" else sum(squares, Fraction(0)), {"y": y, "z": z}))
+        return max(peaks, key=lambda one: one[0])
 
     def scales(self, level: float) -> dict[str, float]:
         """Return about how large variables become on {V <= level}."""

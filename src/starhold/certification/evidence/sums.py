@@ -94,7 +94,7 @@ class Guess:
             if room >= 0:
                 self.blocks.append(Block(places, factor, self.z(names, room // 2, places)))
         self.cofactors = [monomials(names, top - degree(q)) for q in self.modulo]
-        self.loose = [[times(q, m) for m in own] for q, own in zip(self.modulo, self.cofactors, strict=True)]
+        self.loose = [[times(q, m) for m in basis] for q, basis in zip(self.modulo, self.cofactors, strict=True)]
         self.reduce()
 
     def z(self, names: Sequence[str], top: int, places: tuple[int, ...]) -> list[Poly]:
@@ -103,26 +103,28 @@ class Guess:
             stays = any(not self.moving.intersection(m) for m in product_of(self.known, places).terms)
             every = monomials(names, top)
             return [z for z in every if self.moving.intersection(*z.terms)] if self.moving and stays else every
-        own = [self.scaled(q) for q in self.basis]
-        made = [times(q, m) for q in own for m in monomials(names, min(max(top - degree(q), 0), 2)) if degree(q) <= top]
+        scaled_basis = [self.scaled(q) for q in self.basis]
+        made = [
+            times(q, m) for q in scaled_basis for m in monomials(names, min(max(top - degree(q), 0), 2)) if degree(q) <= top
+        ]
         # A factor may vanish with the basis: then its squares are of anything.
-        if any(solved(self.known[k], multiples(own, self.known[k])) is not None for k in places):
+        if any(solved(self.known[k], multiples(scaled_basis, self.known[k])) is not None for k in places):
             return monomials(names, min(top, 2))
         return independent(made)
 
     def scaled(self, q: Poly) -> Poly:
         """Return a polynomial in scaled units."""
-        found: Terms = {}
+        terms: Terms = {}
         for m, c in q.terms.items():
             for x in m:
                 c = c * self.scale[x]
-            found[m] = c
-        return Poly(found)
+            terms[m] = c
+        return Poly(terms)
 
     def reduce(self) -> None:
         """Leave out what cannot have a square: nothing else has its monomial, or all that has has its sign."""
         while True:
-            free = {m for q in (self.p, *(c for own in self.loose for c in own)) for m in q.terms}
+            free = {m for q in (self.p, *(c for columns in self.loose for c in columns)) for m in q.terms}
             squares: dict[Monomial, list[tuple[int, int, bool]]] = defaultdict(list)
             for q in self.strict:
                 for m, c in q.terms.items():
@@ -135,9 +137,9 @@ class Guess:
                         squares[m].append((b, i, c > 0))
             gone = {
                 (b, i)
-                for m, own in squares.items()
-                if m not in free and len({sign for _, _, sign in own}) == 1
-                for b, i, _ in own
+                for m, entries in squares.items()
+                if m not in free and len({sign for _, _, sign in entries}) == 1
+                for b, i, _ in entries
                 if b >= 0
             }
             if not gone:
@@ -149,7 +151,7 @@ class Guess:
     @cached_property
     def columns(self) -> tuple[list[Poly], list[Poly]]:
         """Return the columns of the positive and free numbers, and those of the matrices."""
-        return [*self.strict, *(c for own in self.loose for c in own)], [c for b in self.blocks for c in b.columns()]
+        return [*self.strict, *(c for columns in self.loose for c in columns)], [c for b in self.blocks for c in b.columns()]
 
     def floats(self) -> Any | None:
         """Return the numbers in floats that make the matrices most definite; None where they are not."""
@@ -181,8 +183,8 @@ class Guess:
         self.loose.pop()
         if x is None:
             return None
-        found = {m: round(Fraction(float(v)) * self.size * 2**12) for m, v in zip(made, x[first:], strict=False)}
-        return Poly({m: Fraction(v, 2**12) for m, v in found.items()})
+        rounded = {m: round(Fraction(float(v)) * self.size * 2**12) for m, v in zip(made, x[first:], strict=False)}
+        return Poly({m: Fraction(v, 2**12) for m, v in rounded.items()})
 
     def exactly(self, x: Any) -> dict[str, Any] | None:
         """Return evidence near floats that the kernel accepts; None where none was found."""
@@ -238,23 +240,23 @@ class Guess:
         at, size = len(self.strict), self.size
         numbers = [str(v * size) for v in y[:at]]
         cofactors: list[dict[str, str]] = []
-        for own in self.cofactors:
-            found = [self.unscaled(m) * (v * size) for m, v in zip(own, y[at : at + len(own)], strict=True)]
-            cofactors.append(text(total(found)))
-            at += len(own)
+        for basis in self.cofactors:
+            terms = [self.unscaled(m) * (v * size) for m, v in zip(basis, y[at : at + len(basis)], strict=True)]
+            cofactors.append(text(total(terms)))
+            at += len(basis)
         parts: list[dict[str, Any]] = []
         for block in self.blocks:
             count, factor = len(block.z), Fraction(1)
             for k in block.places:
                 factor *= self.units[k]
-            own = [[Fraction(0)] * count for _ in range(count)]
+            gram = [[Fraction(0)] * count for _ in range(count)]
             for (i, k), v in zip(block.pairs, y[at : at + len(block.pairs)], strict=True):
-                own[i][k] = own[k][i] = v * size / factor
+                gram[i][k] = gram[k][i] = v * size / factor
             at += len(block.pairs)
             z, powers = [self.unscaled(q) for q in block.z], list[Fraction]()
             for q in z:
                 powers.append(next(iter(q.terms.values())) if len(q.terms) == 1 else Fraction(1))
-            rows = [[str(v * a * b) for v, b in zip(row, powers, strict=True)] for row, a in zip(own, powers, strict=True)]
+            rows = [[str(v * a * b) for v, b in zip(row, powers, strict=True)] for row, a in zip(gram, powers, strict=True)]
             named = [" ".join(next(iter(q.terms))) if len(q.terms) == 1 else text(q) for q in z]
             if any(v != "0" for row in rows for v in row):
                 parts.append({"of": list(block.places), "z": named, "gram": rows})
@@ -262,12 +264,12 @@ class Guess:
 
     def unscaled(self, q: Poly) -> Poly:
         """Return a polynomial of scaled variables in the variables."""
-        found: Terms = {}
+        terms: Terms = {}
         for m, c in q.terms.items():
             for x in m:
                 c = c / self.scale[x]
-            found[m] = c
-        return Poly(found)
+            terms[m] = c
+        return Poly(terms)
 
 
 def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
@@ -276,13 +278,13 @@ def divided(o: Sum, *more: Any) -> dict[str, Any] | None:
         parts = [quotient(p, q) for p in (o.p, *o.strict)] if q.names else [None]
         if None not in parts:
             p, *strict = (part for part in parts if part is not None)
-            found = find(Sum(p, o.known, o.modulo, strict), *more)
-            if found:
-                found["cofactors"] = [text(read_poly(c) * q) for c in found["cofactors"]]
-                for part in found["parts"]:
+            evidence = find(Sum(p, o.known, o.modulo, strict), *more)
+            if evidence:
+                evidence["cofactors"] = [text(read_poly(c) * q) for c in evidence["cofactors"]]
+                for part in evidence["parts"]:
                     part["of"].append(k)
-            if found is not None:
-                return found
+            if evidence is not None:
+                return evidence
     return None
 
 
@@ -290,21 +292,21 @@ def eliminated(o: Sum, q: Poly, x: str, *more: Any) -> dict[str, Any] | None:
     """Return evidence by that without a variable, which a relation tells."""
     instead = {x: Poly({(x,): Fraction(1)}) - q * (1 / q.terms[(x,)])}
     others = [r for r in o.modulo if r is not q]
-    found = find(Sum(o.p.at(instead), *([r.at(instead) for r in own] for own in (o.known, others, o.strict))), *more)
-    if not found:
-        return found
-    cofactors = [read_poly(c) for c in found["cofactors"]]
-    rest = o.p - dot([Fraction(v) for v in found["numbers"]], o.strict) - dot(cofactors, others)
-    for part in found["parts"]:
+    evidence = find(Sum(o.p.at(instead), *([r.at(instead) for r in polys] for polys in (o.known, others, o.strict))), *more)
+    if not evidence:
+        return evidence
+    cofactors = [read_poly(c) for c in evidence["cofactors"]]
+    rest = o.p - dot([Fraction(v) for v in evidence["numbers"]], o.strict) - dot(cofactors, others)
+    for part in evidence["parts"]:
         z = [read_poly({name: "1"} if isinstance(name, str) else name) for name in part["z"]]
         form = dot(z, apply([[Fraction(v) for v in row] for row in part["gram"]], z))
         rest = rest - form * product_of(o.known, part["of"])
-    own = quotient(rest, q)
-    if own is None:
+    cofactor = quotient(rest, q)
+    if cofactor is None:
         return None
     loose = iter(cofactors)
-    found["cofactors"] = [text(own if r is q else next(loose)) for r in o.modulo]
-    return found
+    evidence["cofactors"] = [text(cofactor if r is q else next(loose)) for r in o.modulo]
+    return evidence
 
 
 def find(
@@ -315,11 +317,11 @@ def find(
     exact: bool = True,
 ) -> dict[str, Any] | None:
     """Return evidence that the kernel accepts (exact False: that floats have some); None where none was found."""
-    found = identity(o)
-    if found is None:
-        found = divided(o, scales, basis, degrees, exact)
-    if found is not None:
-        return found
+    simple = identity(o)
+    if simple is None:
+        simple = divided(o, scales, basis, degrees, exact)
+    if simple is not None:
+        return simple
     for q in o.modulo:
         alone = [x for x in q.names if (x,) in q.terms and sum(x in m for m in q.terms) == 1]
         if alone:

@@ -24,11 +24,11 @@ PAIRED = 10
 
 def times(a: Poly, b: Poly, c: int = 1) -> Poly:
     """Return c a b, without an account."""
-    found: dict[Monomial, Fraction] = defaultdict(Fraction)
+    terms: dict[Monomial, Fraction] = defaultdict(Fraction)
     for m, x in a.terms.items():
         for n, y in b.terms.items():
-            found[tuple(sorted(m + n)) if m and n else m or n] += x * y * c
-    return Poly(found)
+            terms[tuple(sorted(m + n)) if m and n else m or n] += x * y * c
+    return Poly(terms)
 
 
 def monomials(names: Sequence[str], most: int, least: int = 0) -> list[Poly]:
@@ -56,10 +56,10 @@ def multiples(basis: Sequence[Poly], p: Poly) -> list[Poly]:
 
 def valued(p: Poly, at: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return a polynomial in floats, of many states at once."""
-    found = np.zeros(np.broadcast_shapes(*(x.shape for x in at.values())))
+    values = np.zeros(np.broadcast_shapes(*(x.shape for x in at.values())))
     for m, c in p.terms.items():
-        found = found + float(c) * np.prod([at[name] for name in m], axis=0)
-    return found
+        values = values + float(c) * np.prod([at[name] for name in m], axis=0)
+    return values
 
 
 def largest(q: Poly) -> float:
@@ -76,17 +76,19 @@ def identity(o: Sum) -> dict[str, Any] | None:
     loose = [monomials(names, top - degree(q)) for q in o.modulo]
     few = [k for k, q in enumerate(o.known) if degree(q) <= top]
     places = [(), *((k,) for k in few), *combinations(few[:PAIRED], 2)]
-    made: dict[tuple[int, ...], Poly] = {own: q for own in places if degree(q := product_of(o.known, own)) <= top}
-    free = [times(q, m) for q, own in zip(o.modulo, loose, strict=True) for m in own]
+    made: dict[tuple[int, ...], Poly] = {
+        factors: q for factors in places if degree(q := product_of(o.known, factors)) <= top
+    }
+    free = [times(q, m) for q, factors in zip(o.modulo, loose, strict=True) for m in factors]
     used = needed(o.p, free, made)
-    y = None if used is None else solved(o.p, [*free, *(made[own] for own in used)])
+    y = None if used is None else solved(o.p, [*free, *(made[factors] for factors in used)])
     if used is None or y is None:
         return None
     cofactors, at = list[dict[str, str]](), 0
-    for own in loose:
-        cofactors.append(text(dot(y[at : at + len(own)], own)))
-        at += len(own)
-    parts = [{"of": [*own], "z": [""], "gram": [[str(c)]]} for own, c in zip(used, y[at:], strict=True) if c]
+    for factors in loose:
+        cofactors.append(text(dot(y[at : at + len(factors)], factors)))
+        at += len(factors)
+    parts = [{"of": [*factors], "z": [""], "gram": [[str(c)]]} for factors, c in zip(used, y[at:], strict=True) if c]
     evidence = {"numbers": [], "cofactors": cofactors, "parts": parts}
     try:
         o.check(evidence)
@@ -97,10 +99,10 @@ def identity(o: Sum) -> dict[str, Any] | None:
 
 def product_of(known: Sequence[Poly], places: Iterable[int]) -> Poly:
     """Return the product of the known polynomials of some places."""
-    found = poly(1)
+    product = poly(1)
     for k in places:
-        found = times(found, known[k])
-    return found
+        product = times(product, known[k])
+    return product
 
 
 def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list[tuple[int, ...]] | None:
@@ -111,8 +113,12 @@ def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list
     A, b = whole[:, :-1], whole[:, -1]
     cost = np.r_[np.zeros(len(free)), np.ones(len(made))]
     linprog: Any = import_module("scipy.optimize").linprog
-    found = linprog(cost, A_eq=A, b_eq=b, bounds=[(None, None)] * len(free) + [(0, None)] * len(made))
-    return [own for own, v in zip(made, found.x[len(free) :], strict=True) if v > 1e-9] if found.status == 0 else None
+    solution = linprog(cost, A_eq=A, b_eq=b, bounds=[(None, None)] * len(free) + [(0, None)] * len(made))
+    return (
+        [factors for factors, v in zip(made, solution.x[len(free) :], strict=True) if v > 1e-9]
+        if solution.status == 0
+        else None
+    )
 
 
 def solved(p: Poly, every: list[Poly]) -> list[Fraction] | None:
@@ -136,9 +142,9 @@ def quotient(p: Poly, q: Poly) -> Poly | None:
         items = a.terms.items()
         return ring.from_dict({tuple(m.count(x) for x in names): exact(c) for m, c in items})
 
-    found, rest = divmod(within(p), within(q))
+    quotient, rest = divmod(within(p), within(q))
     if rest != 0:
         return None
-    items = found.to_dict().items()
+    items = quotient.to_dict().items()
     powers = {tuple(x for x, n in zip(names, e, strict=True) for _ in range(int(n))): c for e, c in items}
     return Poly({m: fraction(c) for m, c in powers.items()})

@@ -64,9 +64,9 @@ def certify(problem: InvariantProblem) -> SetCertificate:
 
 def write(certificate: SetCertificate, path: Path) -> None:
     """Write what is proved or refuted as the kernel reads it."""
-    told = [one for one in certificate.shown if one.kernel is not None]
-    programs = [program for one in told for program in one.programs]
-    content = kernel_certificate(programs, [one.kernel for one in told if one.kernel is not None])
+    proofs = [one for one in certificate.shown if one.kernel is not None]
+    programs = [program for one in proofs for program in one.programs]
+    content = kernel_certificate(programs, [one.kernel for one in proofs if one.kernel is not None])
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
@@ -129,8 +129,8 @@ class _File:
         tables = [self._table(item, f"claim[{k}]") for k, item in enumerate(cast(list[Any], claims), 1)]
         wanted = [self._claim(table, f"claim[{k}]") for k, table in enumerate(tables, 1)]
         functions = [f for item, _ in wanted for f in (indicator(item), item.core or 0, *item.start, *item.unsafe)]
-        held = {x for value in (*read_rates, *functions) for x in _names(value)}
-        angles = (x for x in self.variables if held.intersection(turned(f, x) for f in TURNED))
+        named = {x for value in (*read_rates, *functions) for x in _names(value)}
+        angles = (x for x in self.variables if named.intersection(turned(f, x) for f in TURNED))
         system = System(self.variables, read_rates, tuple(self.parameters), tuple(angles))
         for k, (item, _) in enumerate(wanted, 1):
             self._fits(system, item, f"claim[{k}]")
@@ -166,7 +166,7 @@ class _File:
         for count, most, what in ((len(self.variables), MOVING, "variables"), (len(self.names), MOST, "with parameters")):
             if count > most:
                 raise InputError(self.where, "variables", f"{count} {what}", f"at most {most}")
-        self.names |= {own: Polynomial.variable(own) for x in self.variables for own in (turned(f, x) for f in TURNED)}
+        self.names |= {turn: Polynomial.variable(turn) for x in self.variables for turn in (turned(f, x) for f in TURNED)}
         self.parameters = {name: self._interval(value, f"parameters.{name}") for name, value in parameters.items()}
 
     def _claim(self, table: dict[str, Any], key: str) -> tuple[WantedSet, tuple[float, ...] | None]:
@@ -204,8 +204,8 @@ class _File:
 
     def _fits(self, system: System, wanted: WantedSet, key: str) -> None:
         if system.angles and wanted.theorem in ("unstable", "avoids"):
-            found = f'"{wanted.theorem}" of a system with sin or cos'
-            raise InputError(self.where, f"{key}.theorem", found, "another theorem")
+            described = f'"{wanted.theorem}" of a system with sin or cos'
+            raise InputError(self.where, f"{key}.theorem", described, "another theorem")
         for name, given in (("core", wanted.core is not None), ("start", bool(wanted.start))):
             if system.angles and given:
                 raise InputError(self.where, f"{key}.{name}", f"a {name} of a system with sin or cos", "V alone")
@@ -241,10 +241,10 @@ class _File:
         return tuple(self._polynomial(h, f"{key}[{k}]") for k, h in enumerate(self._list(value, key), 1))
 
     def _polynomial(self, value: Any, key: str) -> Any:
-        found = self._expression(value, key)
-        if len(pieces(found)) > 1:
+        expression = self._expression(value, key)
+        if len(pieces(expression)) > 1:
             raise InputError(self.where, key, "a piecewise function", "one polynomial")
-        return found
+        return expression
 
     def _box(self, table: dict[str, Any], key: str) -> tuple[tuple[float, float], ...]:
         place = f"{key}.box" if "box" in table else "box"
@@ -256,17 +256,17 @@ class _File:
     def _state(self, value: Any, key: str) -> tuple[Fraction, ...]:
         table = self._table(value, key)
         self._exactly(table, self.variables, key)
-        found: list[Fraction] = []
+        coordinates: list[Fraction] = []
         for name in self.variables:
             x = table[name]
             try:
                 if isinstance(x, bool):
                     raise ValueError
                 # As written: 0.1 is one tenth, and a text may be a fraction.
-                found.append(as_written(str(x)))
+                coordinates.append(as_written(str(x)))
             except (ValueError, ZeroDivisionError):
                 raise InputError(self.where, f"{key}.{name}", _show(x), 'a number, or a fraction such as "1/3"') from None
-        return tuple(found)
+        return tuple(coordinates)
 
     def _interval(self, value: Any, key: str) -> tuple[float, float]:
         ends = cast(list[Any], value) if isinstance(value, list) else []
@@ -286,7 +286,7 @@ class _File:
         try:
             return read(_written(value), self.names)
         except ExpressionError as error:
-            raise InputError(self.where, key, error.found, error.allowed) from None
+            raise InputError(self.where, key, error.written, error.allowed) from None
 
     def _fresh(self, name: str, key: str) -> None:
         if not name.isidentifier() or keyword.iskeyword(name) or name in RESERVED:

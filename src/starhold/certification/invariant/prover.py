@@ -52,8 +52,8 @@ class Attempt:
     def claim(self, evidence: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Return the claim as a certificate has it."""
         roles = {role: digest(program) for role, program in self.programs.items()}
-        told = {"theorem": self.theorem, "taken": list(self.taken), "programs": roles, "subject": self.subject}
-        return told | {"numbers": self.numbers, "evidence": self.hints | dict(evidence or {})}
+        claim = {"theorem": self.theorem, "taken": list(self.taken), "programs": roles, "subject": self.subject}
+        return claim | {"numbers": self.numbers, "evidence": self.hints | dict(evidence or {})}
 
     def read(self) -> Claim:
         """Return the claim as the kernel has it, without a limit on work."""
@@ -70,19 +70,19 @@ class Attempt:
 
     def missing(self, exact: bool = False, every: bool = False) -> tuple[list[str], dict[str, Any]]:
         """Return the names of obligations without evidence (the first, or every one), and the evidence of the others."""
-        found, lacking = dict[str, Any](), list[str]()
+        evidence, lacking = dict[str, Any](), list[str]()
         for name, o in self.obligations().items():
             key = (exact, name, str(o))
             if key not in self._done:
-                evidence = None if not exact and self._done.get((True, *key[1:]), 0) is None else self.shown(o, exact, name)
-                self._done[key] = evidence
+                shown = None if not exact and self._done.get((True, *key[1:]), 0) is None else self.shown(o, exact, name)
+                self._done[key] = shown
             if self._done[key] is None:
                 lacking.append(name)
                 if not every:
                     break
             else:
-                found[name] = self._done[key]
-        return lacking, found
+                evidence[name] = self._done[key]
+        return lacking, evidence
 
     def holds(self, surface: int) -> bool:
         """Return whether there is evidence for the obligations on a surface that is crossed."""
@@ -110,15 +110,15 @@ def proved(attempt: Attempt, top: float, escape: Poly | None) -> dict[str, Any] 
         if why:
             return why
         if not levelled:
-            lacking, found = attempt.missing(exact=True)
-            return f"no exact evidence was found: {lacking[0]}" if lacking else attempt.claim(found)
+            lacking, evidence = attempt.missing(exact=True)
+            return f"no exact evidence was found: {lacking[0]}" if lacking else attempt.claim(evidence)
         lacking: list[str] = []
         best = largest(attempt, float(rational(attempt.numbers["level"])), top)
         for less in LESS:
             attempt.numbers["level"] = written(best * (1.0 - less))
-            lacking, found = attempt.missing(exact=True)
+            lacking, evidence = attempt.missing(exact=True)
             if not lacking:
-                return attempt.claim(found)
+                return attempt.claim(evidence)
         return f"no exact evidence was found: {lacking[0]}"
     except RefusedError as reason:
         return str(reason)
@@ -183,11 +183,11 @@ def candidates(attempt: Attempt, V: Function) -> Iterator[Any]:
     system = V.system
     if V.at_point and attempt.theorem == "attracts":
         slopes = [-system.slope(V.on(i), system.all[i].rates) for i in system.cells]
-        own = shape(slopes, system.names)
-        yield own
+        powers = shape(slopes, system.names)
+        yield powers
         yield 1
-        if own != [1] * len(own):
-            yield [max(2, n) for n in own]
+        if powers != [1] * len(powers):
+            yield [max(2, n) for n in powers]
         yield 2
         return
     yield from (1, 2, 3)
@@ -195,11 +195,11 @@ def candidates(attempt: Attempt, V: Function) -> Iterator[Any]:
 
 def shape(functions: Sequence[Poly], names: Sequence[str]) -> list[int]:
     """Return halves of the least even powers that variables have alone in all of some functions."""
-    found: list[int] = []
+    powers: list[int] = []
     for x in names:
         alone = [[len(m) for m, c in p.terms.items() if set(m) == {x} and len(m) % 2 == 0 and c > 0] for p in functions]
-        found.append(max(max((min(own, default=2) for own in alone), default=2) // 2, 1))
-    return found
+        powers.append(max(max((min(exponents, default=2) for exponents in alone), default=2) // 2, 1))
+    return powers
 
 
 def completed(attempt: Attempt, role: str, escape: Poly | None) -> list[str]:
@@ -229,13 +229,13 @@ def pair(name: str) -> list[int]:
 
 def weakened(attempt: Attempt, role: str, names: list[str], escape: Poly | None) -> bool:
     """Let V be non-increasing for some pairs, and find a function that grows there."""
-    told = f"weakly of {role}"
-    pairs = [*attempt.hints.get(told, []), *(pair(name) for name in names)]
-    pairs = [own for k, own in enumerate(pairs) if own not in pairs[:k]]
-    if pairs == attempt.hints.get(told, []):
+    hint = f"weakly of {role}"
+    pairs = [*attempt.hints.get(hint, []), *(pair(name) for name in names)]
+    pairs = [cells for k, cells in enumerate(pairs) if cells not in pairs[:k]]
+    if pairs == attempt.hints.get(hint, []):
         return False
-    attempt.hints[told] = pairs
-    tried = [escape, -escape] if escape is not None else [escaping(attempt, role, own) for own in pairs[:1]]
+    attempt.hints[hint] = pairs
+    tried = [escape, -escape] if escape is not None else [escaping(attempt, role, cells) for cells in pairs[:1]]
     before = len(names) + 1
     for E in tried:
         if E is None:
@@ -247,14 +247,14 @@ def weakened(attempt: Attempt, role: str, names: list[str], escape: Poly | None)
     return False
 
 
-def escaping(attempt: Attempt, role: str, own: list[int]) -> Poly | None:
+def escaping(attempt: Attempt, role: str, cells: list[int]) -> Poly | None:
     """Return a function of low degree that grows where V' vanishes; None where none was found."""
     attempt.hints[f"escape of {role}"] = {}
-    name = next(n for n in attempt.obligations() if n.endswith("escapes") and pair(n) == own)
+    name = next(n for n in attempt.obligations() if n.endswith("escapes") and pair(n) == cells)
     o, system = attempt.obligations()[name], attempt.system
     for degree in (2, 3, 4):
         guess = Guess(o, attempt.scales, max(degree + 2, *(len(m) for m in o.p.terms or [()]), 4), [], attempt.basis)
-        made = {next(iter(q.terms)): system.slope(q, system.all[own[1]].rates) for q in monomials(system.names, degree, 1)}
+        made = {next(iter(q.terms)): system.slope(q, system.all[cells[1]].rates) for q in monomials(system.names, degree, 1)}
         grown = guess.freed(made)
         if grown is not None:
             return grown

@@ -35,23 +35,23 @@ def sides(names: Sequence[str], box: Sequence[tuple[float, float]]) -> dict[str,
 class Cell:
     """A cell as the kernel has it, and V' in it."""
 
-    own: Wired
+    wired: Wired
     slope: Poly
 
     @cached_property
     def sides(self) -> list[Poly]:
         """The polynomials that are not negative in it."""
-        return [Poly(dict(surface)) * sign for surface, sign in self.own.signs.items() if sign]
+        return [Poly(dict(surface)) * sign for surface, sign in self.wired.signs.items() if sign]
 
     @cached_property
     def zero(self) -> list[Poly]:
         """The polynomials that vanish in it, if it is a thin one."""
-        return [Poly(dict(surface)) for surface, sign in self.own.signs.items() if not sign]
+        return [Poly(dict(surface)) for surface, sign in self.wired.signs.items() if not sign]
 
     @property
     def function(self) -> Poly:
         """V in it."""
-        return self.own.V[0]
+        return self.wired.V[0]
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Candidate:
     @cached_property
     def cells(self) -> list[Cell]:
         """All cells."""
-        return [Cell(own, self.wired.slope(own.V[0], own.rates)) for own in self.wired.all]
+        return [Cell(cell, self.wired.slope(cell.V[0], cell.rates)) for cell in self.wired.all]
 
     @cached_property
     def whole(self) -> list[Cell]:
@@ -89,7 +89,7 @@ class Candidate:
     @cached_property
     def rates(self) -> "Fields":
         """The rates of all variables at points."""
-        return Fields(self, lambda cell: cell.own.rates)
+        return Fields(self, lambda cell: cell.wired.rates)
 
     def at(self, p: Poly, state: State) -> Fraction:
         """The value of a polynomial at an exact state."""
@@ -107,8 +107,8 @@ class Candidate:
 
     def value(self, state: State) -> Fraction | None:
         """V at an exact state, None where its cells do not agree."""
-        found = {self.at(cell.function, state) for cell in self.near(state)}
-        return found.pop() if len(found) == 1 else None
+        values = {self.at(cell.function, state) for cell in self.near(state)}
+        return values.pop() if len(values) == 1 else None
 
 
 class Floats:
@@ -181,8 +181,8 @@ def wrong(what: Candidate, sense: int, count: int = 8) -> list[Array]:
         if len(starts) == count:
             break
     points_each = max(5 if len(what.box) < 7 else 3, round(4_000 ** (1.0 / len(what.box))))
-    found = [_refined(what, start, sense, spread, points_each, (floor, tolerance)) for start in starts]
-    return sorted(found, key=lambda x: float(Values(what, x[:, None]).V[0]))
+    refined = [_refined(what, start, sense, spread, points_each, (floor, tolerance)) for start in starts]
+    return sorted(refined, key=lambda x: float(Values(what, x[:, None]).V[0]))
 
 
 def _refined(what: Candidate, start: Array, sense: int, spread: Array, count: int, least: tuple[float, float]) -> Array:
@@ -199,12 +199,12 @@ def _refined(what: Candidate, start: Array, sense: int, spread: Array, count: in
 
 def stuck(what: Candidate) -> list[Array]:
     """Rests of single cells with V > 0, by Newton's method from a coarse grid."""
-    found: list[Array] = []
+    states: list[Array] = []
     system, moving = what.system, len(what.system.variables)
     units = [[poly(int(j == k)) for j in range(moving)] for k in range(moving)]
     for place, cell in enumerate(what.whole):
-        rates = [Floats(rate, system.inputs) for rate in cell.own.rates]
-        slopes = [[Floats(what.wired.slope(rate, unit), system.inputs) for unit in units] for rate in cell.own.rates]
+        rates = [Floats(rate, system.inputs) for rate in cell.wired.rates]
+        slopes = [[Floats(what.wired.slope(rate, unit), system.inputs) for unit in units] for rate in cell.wired.rates]
         points = grid(what.box, 7 if len(what.box) < 6 else 3)
         for _ in range(12):
             turned = system.with_angles(points)
@@ -217,9 +217,9 @@ def stuck(what: Candidate) -> list[Array]:
         values = Values(what, points)
         size = np.max(np.abs([rate.at(system.with_angles(points)) for rate in rates]), axis=0)
         for k in np.flatnonzero((size < 1e-9) & (values.cell == place) & (values.V > 1e-9)):
-            if all(np.max(np.abs(points[:, k] - other)) > 1e-6 for other in found):
-                found.append(points[:, k])
-    return found
+            if all(np.max(np.abs(points[:, k] - other)) > 1e-6 for other in states):
+                states.append(points[:, k])
+    return states
 
 
 def ceiling(what: Candidate, equilibria: bool = True) -> float:
@@ -256,7 +256,7 @@ def rising(what: Candidate, level: float, sense: int = 1, digits: Sequence[int] 
             if cell is None:
                 continue
             V, slope = what.at(cell.function, state), what.at(cell.slope, state)
-            still = slope == 0 and (sense < 0 or not any(what.at(rate, state) for rate in cell.own.rates))
+            still = slope == 0 and (sense < 0 or not any(what.at(rate, state) for rate in cell.wired.rates))
             if 0 < V <= level and (sense * slope > 0 or still):
                 return {"state": named(what, state), "V": float(V), "V'": float(slope)}
     return None
@@ -304,7 +304,7 @@ def jump(what: Candidate) -> Found:
     """A state of two closed cells at which their V differ, verified, on a linear surface; None if none is found."""
     names = what.system.names
     for one, other in combinations(what.cells, 2):
-        between = (Poly(dict(surface)) for surface in what.wired.surfaces if one.own.on(surface, other.own))
+        between = (Poly(dict(surface)) for surface in what.wired.surfaces if one.wired.on(surface, other.wired))
         surface = next((p for p in between if max(map(len, p.terms)) == 1), None)
         if surface is None:
             continue
@@ -336,7 +336,7 @@ def ray(what: Candidate) -> dict[str, Fraction] | None:
         along = {x: var("t") * int(d) + e for x, d, e in zip(what.system.names, choice, what.equilibrium, strict=True)}
         for cell in what.whole:
             terms = [p.at(along).terms for p in (cell.function, *cell.sides)]
-            if all(own and own[min(own, key=len)] > 0 for own in terms):
+            if all(coefficients and coefficients[min(coefficients, key=len)] > 0 for coefficients in terms):
                 return {x: Fraction(int(d)) for x, d in zip(what.system.names, choice, strict=True)}
     return None
 

@@ -45,10 +45,10 @@ class System:
         derivative of every variable. It may use + - *, division by numbers, and `starhold.algebra.scalar`, whose `where`
         and `less` make pieces."""
         system = cls(tuple(variables), (), tuple(parameters), tuple(angles))
-        found = tuple(system.function(rates))
-        if len(found) != len(variables):
-            raise ValueError(f"{len(found)} derivatives for {len(variables)} variables")
-        return replace(system, rates=found)
+        rates_given = tuple(system.function(rates))
+        if len(rates_given) != len(variables):
+            raise ValueError(f"{len(rates_given)} derivatives for {len(variables)} variables")
+        return replace(system, rates=rates_given)
 
     def function(self, equation: Callable[..., Any]) -> Any:
         """An equation over the same inputs, as polynomials."""
@@ -71,10 +71,10 @@ def turned(f: str, name: str) -> str:
 def check_sizes(system: System, V: Any) -> None:
     """ValueError where a system and a function have too many cells, or V' too many terms."""
     degree = 0
-    for _, (*rates, own) in jointly([*system.rates, V], MOST_CELLS):
+    for _, (*rates, function) in jointly([*system.rates, V], MOST_CELLS):
         # Of an angle's sine and cosine the rates are of one degree more.
         speeds = [_degree(rate) + (name in system.angles) for name, rate in zip(system.variables, rates, strict=True)]
-        degree = max(degree, *(_degree(own) + speed for speed in speeds))
+        degree = max(degree, *(_degree(function) + speed for speed in speeds))
     count = len(system.inputs)
     if math.comb(count + degree, degree) > MOST_TERMS:
         raise ValueError(f"V' of degree {degree} in {count} variables")
@@ -125,12 +125,12 @@ class Line:
 
 def _where(cases: Sequence[Case], condition: Any, side: bool) -> list[Case]:
     """Return the cases where a condition has one truth, without it."""
-    found: list[Case] = []
+    kept: list[Case] = []
     for case in cases:
         others = tuple(truth for truth in case.truths if truth[0].key != condition.key)
         if not any(c.key == condition.key and truth != side for c, truth in case.truths):
-            found.append(Case(others, case.value))
-    return found
+            kept.append(Case(others, case.value))
+    return kept
 
 
 def program(values: Sequence[Any], names: Sequence[str]) -> dict[str, Any]:

@@ -30,9 +30,9 @@ ALLOWED = "numbers, variables, + - * / **, comparisons, 'a if b else c', and whe
 class ExpressionError(ValueError):
     """An expression that cannot be read: what was found, and what is allowed."""
 
-    def __init__(self, found: str, allowed: str = ALLOWED) -> None:
-        self.found, self.allowed = found, allowed
-        super().__init__(f"found {found}; allowed: {allowed}")
+    def __init__(self, written: str, allowed: str = ALLOWED) -> None:
+        self.written, self.allowed = written, allowed
+        super().__init__(f"found {written}; allowed: {allowed}")
 
 
 def as_written(text: str) -> Fraction:
@@ -135,15 +135,15 @@ class _Reader:
     def _power(self, base: Any, node: ast.expr) -> Any:
         if not (isinstance(node, ast.Constant) and type(node.value) is int and 0 <= node.value <= HIGHEST):
             raise ExpressionError(f"the power {self._shown(node)}", f"a whole number from 0 to {HIGHEST}")
-        found: Any = Polynomial.constant(1)
+        product: Any = Polynomial.constant(1)
         for _ in range(node.value):
-            self._spend(_size(found), _size(base))
-            found = self._sized(found * base)
-        return found
+            self._spend(_size(product), _size(base))
+            product = self._sized(product * base)
+        return product
 
-    def _sized(self, found: Any) -> Any:
+    def _sized(self, polynomial: Any) -> Any:
         """The value, if it is not too large; else an ExpressionError."""
-        parts = pieces(found)
+        parts = pieces(polynomial)
         if len(parts) > MOST_CASES:
             raise ExpressionError(f"{len(parts)} pieces", f"at most {MOST_CASES}")
         for piece in parts:
@@ -153,7 +153,7 @@ class _Reader:
             for number in (part for c in terms.values() for part in (int(c.p), int(c.q))):
                 if number.bit_length() > MOST_DIGITS * 10 // 3:
                     raise ExpressionError("a number that is too long", f"at most {MOST_DIGITS} digits")
-        return found
+        return polynomial
 
     def _spend(self, *factors: int) -> None:
         """Count a product of numbers of terms or pieces as work."""

@@ -198,12 +198,14 @@ class _Proof:
         point: dict[str, Any] = {}
         if wanted.equilibrium is not None:
             point = dict(zip(system.variables, map(fraction, wanted.equilibrium), strict=True))
-        told = {f"equilibrium.{x}": v for x, v in point.items()} | numbers
+        all_numbers = {f"equilibrium.{x}": v for x, v in point.items()} | numbers
         sizes = scales(box, {x: float(v) for x, v in point.items()})
         for x in system.angles:
             sizes |= {turned("sin", x): min(sizes[x], 1.0), turned("cos", x): min(sizes[x] ** 2 / 2.0, 2.0)}
         basis = [self.polynomial(h) for h in wanted.squares] or None
-        return Attempt(theorem, self.programs, subject, {x: str(v) for x, v in told.items()}, sizes, basis, taken=taken)
+        return Attempt(
+            theorem, self.programs, subject, {x: str(v) for x, v in all_numbers.items()}, sizes, basis, taken=taken
+        )
 
     def polynomial(self, function: Any) -> Exact:
         """Return a function that is not piecewise as the kernel has it: from the equilibrium, of a cosine what it lacks."""
@@ -230,8 +232,8 @@ class _Proof:
             inner = self.inner()
             if isinstance(inner, str):
                 return inner
-            told = {"core.level" if name == "level" else name: Fraction(x) for name, x in inner["numbers"].items()}
-            numbers |= {name: x for name, x in told.items() if not name.startswith("equilibrium")}
+            inherited = {"core.level" if name == "level" else name: Fraction(x) for name, x in inner["numbers"].items()}
+            numbers |= {name: x for name, x in inherited.items() if not name.startswith("equilibrium")}
             given = {f"{name[:-1]}core": hint for name, hint in inner["evidence"].items() if name.endswith(" of V")}
             self.numbers["core"] = float(numbers["core.level"])
         if what.equilibrium is None and not any(name.startswith("member") for name in numbers):
@@ -260,10 +262,10 @@ class _Proof:
         names = self.what.system.names
         numbers = {f"{role}.{x}": v for role, at in self.states.items() for x, v in zip(names, at, strict=True)}
         for self.numbers["within"] in (False, True):
-            found = proved(self.attempt("avoids", numbers, within=self.numbers["within"]), math.inf, None)
-            if not isinstance(found, str):
+            proof = proved(self.attempt("avoids", numbers, within=self.numbers["within"]), math.inf, None)
+            if not isinstance(proof, str):
                 break
-        return found
+        return proof
 
     def refutations(self) -> list[tuple[str, str, Callable[[], dict[str, Any] | None]]]:
         """Return what may refute the claim: the names of what is needed and of how V fails, and a search for a state."""
@@ -271,13 +273,13 @@ class _Proof:
         if what.system.angles or self.states:
             return []
         sense, word = (-1, "does not grow") if self.unstable else (1, "does not decrease")
-        found: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
-        found.append(("continuous", "jumps", lambda: search.jump(what)))
+        attempts: list[tuple[str, str, Callable[[], dict[str, Any] | None]]] = []
+        attempts.append(("continuous", "jumps", lambda: search.jump(what)))
         if what.equilibrium is not None and not self.unstable:
-            found.append(("positive", "is not positive", lambda: search.not_positive(what)))
+            attempts.append(("positive", "is not positive", lambda: search.not_positive(what)))
         if not self.unstable or what.equilibrium is None:
             border = 0.0 if level is None or self.unstable else level
-            found.append(("bounded", "reaches the border", lambda: search.reaching(what, border)))
+            attempts.append(("bounded", "reaches the border", lambda: search.reaching(what, border)))
         least = math.inf if self.unstable else level if level is not None else self.near()
         name = "grows" if self.unstable else "falls"
 
@@ -286,7 +288,7 @@ class _Proof:
             weak = self.wanted.theorem == "stable" and state is not None and state["V'"] <= 0.0
             return None if weak else state
 
-        return [*found, (name, word, changes)]
+        return [*attempts, (name, word, changes)]
 
     def near(self) -> float:
         """Return a V so small that no level can be claimed if it increases there."""
@@ -296,12 +298,12 @@ class _Proof:
     def against(self, word: str, state: dict[str, Any]) -> dict[str, Any] | None:
         """Return the claim that V fails at a state, where the kernel accepts it."""
         numbers = {f"state.{x}": Fraction(v) for x, v in state["state"].items()}
-        found = self.attempt("fails", numbers, (word,)).claim()
+        refutation = self.attempt("fails", numbers, (word,)).claim()
         try:
-            kernel_proves(claim_of(found, self.programs))
+            kernel_proves(claim_of(refutation, self.programs))
         except RefusedError:
             return None
-        return found
+        return refutation
 
     def tell(self) -> None:
         """Say how near the level is to what refutes, and about how large the set."""
@@ -309,7 +311,7 @@ class _Proof:
         if self.wanted.theorem in ("region", "intersection") and self.wanted.level is None and not what.system.angles:
             rising, border = (find(what, math.inf, digits=search.NEAR) for find in (search.rising, search.reaching))
             kinds = {"V rises": rising, "border": border}
-            above = {kind: float(found["V"]) for kind, found in kinds.items() if found}
+            above = {kind: float(state["V"]) for kind, state in kinds.items() if state}
             if above:
                 numbers["limited_by"] = min(above, key=lambda kind: above[kind])
                 numbers["refuted_level"] = above[numbers["limited_by"]]

@@ -26,6 +26,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts.bodies.rigid_body import State
 from starhold.parts.catalogue import PACKAGES, fit, parts, telling
+from starhold.parts.contract import GIVEN
 from starhold.parts.part import Fitted, Part
 from starhold.scenario.building import build
 from starhold.scenario.reading import parse
@@ -43,14 +44,15 @@ def loop_with(part: Part, params: Any) -> ClosedLoop:
     loop = sample_loop(law, law.examples()[0])
     if part.role == "target":
         loop = loop.without("target")
-    needs = () if part.role == "estimator" else part.needs
+    fitted = Fitted(part, params)
+    needs = () if part.role == "estimator" else fitted.needs
     others = [one for role in PACKAGES for one in parts(role).values() if one.name in needs and not loop.has(one.name)]
     loop = loop.with_parts(*(Fitted(one, one.examples()[0]) for one in others))
     try:
-        loop = loop.with_parts(*telling(part.needs if part.role == "estimator" else part.reads))
+        loop = loop.with_parts(*telling(fitted.needs if part.role == "estimator" else part.reads))
     except LookupError as error:
         raise NotApplicableError(str(error)) from None
-    return loop.with_parts(Fitted(part, params))
+    return loop.with_parts(fitted)
 
 
 def is_pure(law: Law) -> None:
@@ -65,8 +67,13 @@ def reads_alike(law: Law) -> None:
     for gains in law.examples():
         loop = sample_loop(law, gains)
         # The other lanes that start alike draw other random numbers of their sensors.
-        lanes = (0,) if law.reads else (0, 2)
+        lanes = (0,) if _senses(law) else (0, 2)
         agree(loop, [replace_rate(loop.start, factor) for factor in (1.0, 0.5, 1.0, 2.0)], lanes)
+
+
+def _senses(law: Law) -> bool:
+    """Whether the law needs the reading of a sensor."""
+    return not {*law.reads} <= {*GIVEN}
 
 
 def replace_rate(state: Any, factor: float) -> Any:
@@ -97,7 +104,7 @@ def treats_quaternion_sign_as_stated(law: Law) -> None:
 
 def ignores_inertial_frame(law: Law) -> None:
     """Turning the inertial frame changes nothing."""
-    if law.reads:
+    if _senses(law):
         raise NotApplicableError("what it reads is fixed in inertial axes")
     for gains, turn in zip(law.examples(), random_quaternions(len(law.examples())), strict=True):
         loop = sample_loop(law, gains)

@@ -40,18 +40,18 @@ def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, n
 def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
     """Every motion comes to rest on target, on either quaternion, or at a half turn, each of which is unstable."""
     loop = AttitudeLoop(claim, any_inertia)
-    own, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), claim.numbers.get("level")
-    yield from least_on_target(loop, own)
+    vector, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), claim.numbers.get("level")
+    yield from least_on_target(loop, vector)
     said = yield from is_non_increasing(loop, [*loop.w, *(q * x for q in loop.q for x in loop.w)], 3)
-    at_half_turns, *pull = (-dot(own, loop.balance(loop.quiet.value)).at(loop.still)).powers("q0")
+    at_half_turns, *pull = (-dot(vector, loop.balance(loop.quiet.value)).at(loop.still)).powers("q0")
     demand(not at_half_turns.terms, "the torque at rest is not zero at every half turn")
-    yield "rests at half turns only", Squares(horner(pull, loop.q[0]), own, 3, modulo=[loop.sphere])
+    yield "rests at half turns only", Squares(horner(pull, loop.q[0]), vector, 3, modulo=[loop.sphere])
     demand(all(len(m) == 2 and "q0" not in m for m in resting.terms), "V at rest is no form of q1, q2, q3")
     at_axes = [resting.terms.get((name, name), 0) for name in ("q1", "q2", "q3")]
     if level is None or level >= min(at_axes):
         said.append("comes to rest on target or at a half turn, each of which is unstable")
     else:
-        yield "half turns are outside", Squares(resting - level, [poly(1), *own], 1, modulo=[dot(own, own) - 1])
+        yield "half turns are outside", Squares(resting - level, [poly(1), *vector], 1, modulo=[dot(vector, vector) - 1])
         said.append("comes to rest on target")
     return (yield from finished(loop, said))
 
@@ -97,11 +97,14 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
         slope = loop.slopes_along(V, NONE if loop.any_inertia else apply(loop.J_inverse, motion))
         slope = slope + dot(loop.leaning, motion) * loop.any_inertia
         loop.autonomous([slope])
-        name, held = f"V is non-increasing {case}" if len(loop.sides) > 1 else "V is non-increasing", [*known, *side.known]
+        name, conditions = (
+            f"V is non-increasing {case}" if len(loop.sides) > 1 else "V is non-increasing",
+            [*known, *side.known],
+        )
         if side is loop.quiet:
-            yield name, Squares(-slope, z, least, held, [loop.sphere])
+            yield name, Squares(-slope, z, least, conditions, [loop.sphere])
         else:
-            yield name, Squares(-slope, [poly(1), *z], 0, held, [loop.sphere], [poly(1)])
+            yield name, Squares(-slope, [poly(1), *z], 0, conditions, [loop.sphere], [poly(1)])
     return said
 
 
@@ -144,14 +147,14 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
 
 def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:
     """Add what the set holds and the limits, and say all that was shown."""
-    held = yield from contents(loop, loop.lyapunov)
+    contained = yield from contents(loop, loop.lyapunov)
     limited = yield from within_limits(loop)
     if loop.near:
         said = [f"with every J_ik off by up to {below(loop.claim.numbers['tolerance'])} sqrt(J_ii J_kk),", *said]
     handed = loop.claim.taken.get(HANDED)
-    told = "level" not in loop.claim.numbers or "start.rate" in loop.claim.numbers
-    demand(not handed or told, "what is handed over is not bounded")
-    text = "; ".join(part for part in (" ".join(said), enumerated(held), limited.text) if part)
+    bounded = "level" not in loop.claim.numbers or "start.rate" in loop.claim.numbers
+    demand(not handed or bounded, "what is handed over is not bounded")
+    text = "; ".join(part for part in (" ".join(said), enumerated(contained), limited.text) if part)
     label = limited.label or ("inertia" if loop.any_inertia else "hand-over" if handed else "convergence")
     return Statement(text, (*loop.assumed, "continuous-torque", *limited.assumptions, *assumed), label)
 
@@ -220,7 +223,7 @@ def turned(loop: AttitudeLoop, p: Poly, axis: int) -> Poly:
     """Return the derivative of p where q and w are turned together about an axis."""
     along = [poly(i == axis) for i in range(3)]
     vectors = [("q", loop.q[1:]), ("w", loop.w)]
-    return total(p.slope(f"{x}{i}") * rate for x, own in vectors for i, rate in enumerate(cross(along, own), 1))
+    return total(p.slope(f"{x}{i}") * rate for x, vector in vectors for i, rate in enumerate(cross(along, vector), 1))
 
 
 def reduced(p: Poly) -> Poly:

@@ -49,11 +49,11 @@ class Function:
 
     def positive(self, name: str, i: int) -> list[Poly]:
         """Return what is positive together where V is: even powers of all variables, or a power of V."""
-        told = self.hint(name)
-        if name != "shape" and type(told) is int:
-            return [power(self.on(i), told)]
-        demand(self.at_point and 0 not in read_list(told, len(self.system.names)), "a power is not told")
-        return [power(var(x) * var(x), n) for x, n in zip(self.system.names, told, strict=True)]
+        powers = self.hint(name)
+        if name != "shape" and type(powers) is int:
+            return [power(self.on(i), powers)]
+        demand(self.at_point and 0 not in read_list(powers, len(self.system.names)), "a power is not told")
+        return [power(var(x) * var(x), n) for x, n in zip(self.system.names, powers, strict=True)]
 
     def confined(self, most: Fraction | int = 0) -> Shown:
         """{V <= l} is compact and inside of the box for each l < level, and M is as told and not empty: V >= level all

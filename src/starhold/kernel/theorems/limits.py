@@ -26,9 +26,9 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
     limit, longest = numbers.get("limit"), numbers.get("limit.norm")
     count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
     motors, stored = ([numbers.get(f"{name}.{k}") for k in range(count)] for name in ("motors", "stored"))
-    told = [x for x in (*motors, *stored) if x is not None]
-    unlimited = ["unlimited-wheels"] * (loop.wheels and (not told or len(told) < 2 * count))
-    if limit is None and longest is None and not told:
+    limits = [x for x in (*motors, *stored) if x is not None]
+    unlimited = ["unlimited-wheels"] * (loop.wheels and (not limits or len(limits) < 2 * count))
+    if limit is None and longest is None and not limits:
         return Statement("", ("unlimited-torque", *unlimited))
     known, squared, bounded = list[Poly](), list[Poly](), list[list[Poly]]()
     bounds, assumed = list[str](), list[str]()
@@ -52,27 +52,27 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
         assumed += ["spare-momentum"] * any(numbers.get(name) for name in ("error", "error.per.rate"))
     known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
     said, none = list[str](), poly(0)
-    asked = [None if x is None else x - less for x in (limit, longest)]
-    limited = [(*load, none) for load in loads("torque", *asked)]
+    reduced = [None if x is None else x - less for x in (limit, longest)]
+    limited = [(*load, none) for load in loads("torque", *reduced)]
     if limit is not None:
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if longest is not None:
         said.append(f"the law asks for a torque of no more than {above(longest)} N m")
-    if told:
+    if limits:
         shares, kept = allocated(loop, motors)
         # The rotors' momenta change by share.(torque), the wheels' together by its negative.
-        stores = [own - p for own, p in zip(kept, apply(shares, loop.stored), strict=True)]
+        stores = [keeps - p for keeps, p in zip(kept, apply(shares, loop.stored), strict=True)]
         for k, row in enumerate(shares):
             given = motors[k]
             driven = None if given is None else given - norm(row) * less
-            for name, most, own, rest in (("motor", driven, row, none), ("wheel", stored[k], NONE, stores[k])):
+            for name, most, load, rest in (("motor", driven, row, none), ("wheel", stored[k], NONE, stores[k])):
                 if most is None:
                     continue
                 for sign in (1, -1):
-                    limited.append((f"{name} {sign * (k + 1):+d}", most, [sign * x for x in own], sign * rest))
-        for text, unit, own in (("motors give", "N m", motors), ("wheels store", "N m s", stored)):
-            if any(x is not None for x in own):
-                said.append(f"{text} no more than {', '.join('inf' if x is None else above(x) for x in own)} {unit}")
+                    limited.append((f"{name} {sign * (k + 1):+d}", most, [sign * x for x in load], sign * rest))
+        for text, unit, bound_of in (("motors give", "N m", motors), ("wheels store", "N m s", stored)):
+            if any(x is not None for x in bound_of):
+                said.append(f"{text} no more than {', '.join('inf' if x is None else above(x) for x in bound_of)} {unit}")
     for name, bound, row, rest in limited:
         used = [k for k in AXES if poly(row[k]).terms]
         cases = joined(loop.law[k] for k in used)
@@ -87,7 +87,7 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
                 full = name if len(cases) == 1 else f"{name} {n}"
                 yield full, within(bound, load, z, w, [*case.known, *squared * turned, *known], [loop.sphere])
     with_ = f"with {enumerated(bounds)} " if bounds else ""
-    return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if told else TORQUE)
+    return Statement(with_ + enumerated(said), tuple(assumed), "wheels" if limits else TORQUE)
 
 
 def loads(name: str, axis: Fraction | None, norm: Fraction | None) -> Iterator[tuple[str, Fraction, Row]]:
@@ -107,9 +107,9 @@ def within(
         return Squares(bound - load, z, 0, known, modulo)
     more = [*UNIT, *(d * x for d in UNIT for x in paired)]
     # A torque with products of attitudes in it needs their squares.
-    own = [x for x in z if x.names & {"q1", "q2", "q3"}]
+    attitude = [x for x in z if x.names & {"q1", "q2", "q3"}]
     if any(sum(name[0] == "q" for name in m) == 2 for m in load.terms):
-        more += [a * b for k, a in enumerate(own) for b in [var("q0"), *own[k:]]]
+        more += [a * b for k, a in enumerate(attitude) for b in [var("q0"), *attitude[k:]]]
     return Squares(bound - load, [*z, *more], 0, known, [*modulo, dot(UNIT, UNIT) - 1])
 
 

@@ -34,7 +34,7 @@ class State:
     w: list[Fraction]
 
     @classmethod
-    def told(cls, claim: Claim, turn: str = "turn", rate: str | None = "rate") -> State:
+    def read(cls, claim: Claim, turn: str = "turn", rate: str | None = "rate") -> State:
         """Read a state of a claim; at rest where there is no name for a rate."""
         t, w = ([claim.numbers.coordinate(f"{name}.{k}") if name else Fraction(0) for k in AXES] for name in (turn, rate))
         demand(sum(x * x for x in t) <= 1, "a quaternion is fed back with q0 < 0")
@@ -60,7 +60,7 @@ class State:
 
 def torque(loop: AttitudeLoop, state: State) -> list[Fraction]:
     """Return what the law asks for at a state."""
-    here = {name: p.at(state.values) for name, p in loop.told.items()}
+    here = {name: p.at(state.values) for name, p in loop.inputs.items()}
     return [p.number for p in loop.single("law", 3, here)]
 
 
@@ -71,7 +71,7 @@ def slope(loop: AttitudeLoop, u: Sequence[Poly]) -> Poly:
 
 def rises(claim: Claim) -> Proof:
     """V' > 0 at a state, with |w| <= `fastest` if that is told."""
-    loop, state = AttitudeLoop(claim), State.told(claim)
+    loop, state = AttitudeLoop(claim), State.read(claim)
     yield from loop.sound()
     fastest = claim.numbers.get("fastest")
     demand(fastest is None or sum(x * x for x in state.w) <= fastest * fastest, "the state turns faster than is claimed")
@@ -82,7 +82,7 @@ def rises(claim: Claim) -> Proof:
 def rises_near_target(claim: Claim) -> Proof:
     """V' > 0 at a state, and at such states as near the target as one likes: no set {V <= level} is kept for it."""
     yield from rises(claim)
-    loop, state = AttitudeLoop(claim), State.told(claim)
+    loop, state = AttitudeLoop(claim), State.read(claim)
     u = [around(cases, loop.on_target | loop.still).value for cases in loop.law]
     yield "V is non-increasing near the target", Exceeds(state.leading(slope(loop, u)))
     return Statement("V rises at states as near the target as one likes", (*MOTION, *CALM), "convergence", True)
@@ -90,7 +90,7 @@ def rises_near_target(claim: Claim) -> Proof:
 
 def is_negative(claim: Claim) -> Proof:
     """V < 0 at a state, and at such states as near the target as one likes, where it is zero."""
-    loop, state = AttitudeLoop(claim), State.told(claim)
+    loop, state = AttitudeLoop(claim), State.read(claim)
     yield from loop.sound()
     yield "V is least on target", Exceeds(-loop.lyapunov.at(state.values).number)
     yield "V is least on target near it", Exceeds(-state.leading(loop.lyapunov))
@@ -100,7 +100,7 @@ def is_negative(claim: Claim) -> Proof:
 def exceeds_limit(claim: Claim) -> Proof:
     """The torque exceeds its limit at a state where V is no larger than at a rest turned by at most `angle`: every set
     {V <= level} that holds those rests holds the state."""
-    loop, state, rest = AttitudeLoop(claim), State.told(claim), State.told(claim, "rest", None)
+    loop, state, rest = AttitudeLoop(claim), State.read(claim), State.read(claim, "rest", None)
     yield from loop.sound()
     numbers = claim.numbers
     limit, norm, angle = numbers.get("limit"), numbers.get("limit.norm"), numbers["angle"]
@@ -125,7 +125,7 @@ def does_not_settle(claim: Claim) -> Proof:
 def is_pushed_off(claim: Claim) -> Proof:
     """A torque from outside of `outside.i` exceeds what the law switches about axis i: it pushes s_i away from zero, as at a
     state where s_i > 0."""
-    loop, state = AttitudeLoop(claim), State.told(claim)
+    loop, state = AttitudeLoop(claim), State.read(claim)
     s, _, moved = yield from declared(loop)
     i = next((i for i in AXES if f"outside.{i}" in claim.numbers), 0)
     push = claim.numbers[f"outside.{i}"]
@@ -137,7 +137,7 @@ def is_pushed_off(claim: Claim) -> Proof:
 
 def leads_away(claim: Claim) -> Proof:
     """On the surface w = -Kq, where q0' = q.Kq/2, q0 falls at a state, and at all on its way to the target."""
-    loop, state = AttitudeLoop(claim), State.told(claim, "turn", None)
+    loop, state = AttitudeLoop(claim), State.read(claim, "turn", None)
     _, K, _ = yield from declared(loop)
     q = [Poly({(): state.values[f"q{k}"]}) for k in (1, 2, 3)]
     yield "q0 grows on the surface", Exceeds(-dot(q, apply(K, q)).number)

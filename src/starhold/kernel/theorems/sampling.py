@@ -23,8 +23,8 @@ def linear_loop(claim: Claim) -> Part[tuple[AttitudeLoop, tuple[Rows, Rows], Cal
     loop.autonomous(u)
     yield from vanish("rest on target", [p.at(rest) for p in u])
     C, K = (slopes([-p for p in u], names, rest) for names in (RATES, TURNS))
-    held = times(inverse(loop.given), beside(C, K))
-    return loop, (C, K), lambda h: over_period(held, h)
+    feedback = times(inverse(loop.given), beside(C, K))
+    return loop, (C, K), lambda h: over_period(feedback, h)
 
 
 def sampled(claim: Claim) -> Proof:

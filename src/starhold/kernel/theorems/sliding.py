@@ -26,9 +26,9 @@ def reaches_surface(claim: Claim) -> Proof:
     """The motion reaches s = w + Kq = 0 in a finite time, against any torque from outside that is at most as told, and
     slides to rest on target; with a boundary layer it ends within |s| <= surface, and so near the target."""
     loop, numbers = AttitudeLoop(claim), claim.numbers
-    own, J = loop.q[1:], loop.given
+    vector, J = loop.q[1:], loop.given
     s, K, moved = yield from declared(loop)
-    yield "q0 grows on the surface", Squares(dot(own, apply(K, own)), own, 3)
+    yield "q0 grows on the surface", Squares(dot(vector, apply(K, vector)), vector, 3)
     outside = [numbers[f"outside.{i}"] if loop.outside else Fraction(0) for i in AXES]
     axes = [taken_apart(loop, i, moved[i], s[i]) for i in AXES]
     for i, (reach, _) in enumerate(axes):
@@ -47,8 +47,8 @@ def reaches_surface(claim: Claim) -> Proof:
     if signed:
         low, k, level = numbers["inertia.low"], numbers["surface.low"], numbers["level"]
         yield "the sign never changes", Exceeds(low * k * k, max(2 * level, most))
-        held = yield from contents(loop, dot(s, apply(loop.J, s)) * Fraction(1, 2))
-        begun = " ".join([f"{{s.Js/2 <= {below(level)}}}", *(f"({part})" for part in held)])
+        contained = yield from contents(loop, dot(s, apply(loop.J, s)) * Fraction(1, 2))
+        begun = " ".join([f"{{s.Js/2 <= {below(level)}}}", *(f"({part})" for part in contained)])
     assumed = ["bounded-outside-torque" if name == "known-outside-torque" else name for name in loop.assumed]
     demand(not loop.wheels, "no law of this kind is taken with wheels")
     assumed += ["continuous-torque", "unlimited-torque", "sign-at-once" if signed else "quaternion-as-fed"]
@@ -71,13 +71,13 @@ def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
     number against the sign of s_i, or -slope s_i."""
     reaches, linear = list[Fraction](), list[Fraction]()
     for case in loop.law[i]:
-        found = case.value + moved
+        change = case.value + moved
         sides = [sign for sign in (1, -1) if on_side(case, sign * s)]
-        if len(sides) == 1 and not found.names:
-            reaches.append(-sides[0] * found.number)
+        if len(sides) == 1 and not change.names:
+            reaches.append(-sides[0] * change.number)
         elif not on_surface(case, s):
-            slope = -found.slope(f"w{i + 1}").number
-            demand(not (found + slope * s).terms and slope > 0, "the law is neither a switch nor a layer about its surface")
+            slope = -change.slope(f"w{i + 1}").number
+            demand(not (change + slope * s).terms and slope > 0, "the law is neither a switch nor a layer about its surface")
             linear.append(slope)
     demand(bool(reaches), "the law does not switch")
     return Axis(min(reaches), min(linear) if linear else None)
@@ -85,14 +85,14 @@ def taken_apart(loop: AttitudeLoop, i: int, moved: Poly, s: Poly) -> Axis:
 
 def on_side(case: Case, s: Poly) -> bool:
     """Tell whether a case says that s > c with a c that is not negative."""
-    found = (multiple(Poly(dict(p)), s) for p, truth in case.guards if truth)
-    return any(factor > 0 and offset <= 0 for factor, offset in found)
+    multiples = (multiple(Poly(dict(p)), s) for p, truth in case.guards if truth)
+    return any(factor > 0 and offset <= 0 for factor, offset in multiples)
 
 
 def on_surface(case: Case, s: Poly) -> bool:
     """Tell whether a case is about s = 0 alone."""
-    found = [multiple(Poly(dict(p)), s) for p, truth in case.guards if not truth]
-    return all(any(sign * factor > 0 and offset == 0 for factor, offset in found) for sign in (1, -1))
+    multiples = [multiple(Poly(dict(p)), s) for p, truth in case.guards if not truth]
+    return all(any(sign * factor > 0 and offset == 0 for factor, offset in multiples) for sign in (1, -1))
 
 
 def losses(loop: AttitudeLoop, axes: list[Axis], outside: list[Fraction]) -> Part[Fraction]:

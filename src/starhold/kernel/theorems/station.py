@@ -78,8 +78,8 @@ def declared(loop: PointLoop) -> Part[Circle]:
     errors, (V,) = loop.single("errors", 3), loop.single("lyapunov", 1)
     square, rate = -errors[0].at({"x2": 0, "x3": 0}).number, errors[1].slope("x3").number
     (_, y, z), (_, v, w) = loop.x, loop.v
-    own = [y * y + z * z - square, v + rate * z, w - rate * y]
-    yield from vanish("the errors are those of a circle", minus(errors, own), first=1)
+    expected = [y * y + z * z - square, v + rate * z, w - rate * y]
+    yield from vanish("the errors are those of a circle", minus(errors, expected), first=1)
     weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
     loop.sides  # noqa: B018 (asks for roots)
     circle = Circle(errors, square, rate, weights, *loop.relay(errors[1:]))
@@ -93,13 +93,13 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
     """V' <= -c (f2^2 + f3^2) on the one side of the law that holds the circle, V' <= -c on each other one, where the law is
     bounded; on the circle alone f2 = f3 = 0 for all time, and x returns."""
     wrong = circle.errors[1:]
-    near = [side for side in loop.sides if circle.inverse not in loop.asked(side)]
+    near = [side for side in loop.sides if circle.inverse not in loop.depends_on(side)]
     demand(len(near) == 1, "not one side of the law holds the circle")
     along_x = loop.acceleration(near[0])[0]
     a, b = along_x.slope("x1").number, along_x.slope("v1").number
     for k, side in enumerate(loop.sides):
         motion, z, known = loop.acceleration(side), wrong, list[Poly]()
-        demand(loop.asked(side) <= {*STATE, circle.inverse}, "the motion depends on more than the state")
+        demand(loop.depends_on(side) <= {*STATE, circle.inverse}, "the motion depends on more than the state")
         yield f"x is on its own {k}", Vanishes(motion[0] - a * loop.x[0] - b * loop.v[0])
         slope = -loop.slopes_along(circle.lyapunov, motion)
         if side is not near[0]:
@@ -141,7 +141,7 @@ def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Part[str]:
 
     for k, side in enumerate(loop.sides if norm is not None or axis is not None else ()):
         relations, unit = [f[0] - y * y - z * z + circle.square], list[Poly]()
-        if circle.inverse in loop.asked(side):
+        if circle.inverse in loop.depends_on(side):
             unit = [var(circle.inverse) * p for p in f[1:]]
             u, known = [flat(circle.met(p)) for p in side.value], [circle.met(p).at(put) for p in side.known]
             relations.append(dot(unit, unit) - 1)
@@ -170,7 +170,7 @@ def comes_to_rest(claim: Claim) -> Proof:
 def only_side(loop: PointLoop) -> list[Poly]:
     """Return the acceleration under a law that does not switch, in which roots and quotients cancel."""
     demand(len(loop.sides) == 1, "the law switches")
-    demand(loop.asked(loop.sides[0]) <= {*STATE}, "the motion depends on more than the state")
+    demand(loop.depends_on(loop.sides[0]) <= {*STATE}, "the motion depends on more than the state")
     return loop.acceleration(loop.sides[0])
 
 
@@ -186,13 +186,13 @@ def returns_with_limited_control(claim: Claim) -> Proof:
     limit, width, reach, boundary = (numbers[name] for name in ("limit", "width", "reach", "boundary"))
     low, high, x, v = numbers["root.low"], numbers["root.high"], loop.x[0], loop.v[0]
     only_side(loop)
-    held = {name: value for name, value in resting(loop).items() if name not in ("x1", "v1")}
-    pull, asks = loop.field[0].at(held), loop.sides[0].value[0].at(held)
+    resting_state = {name: value for name, value in resting(loop).items() if name not in ("x1", "v1")}
+    pull, asks = loop.field[0].at(resting_state), loop.sides[0].value[0].at(resting_state)
     p, k, c = pull.slope("x1").number, -asks.slope("x1").number, -asks.slope("v1").number
     yield "the field along X", Vanishes(pull - p * x)
     yield "the law along X", Vanishes(asks + k * x + c * v)
     for name, u in zip("YZ", loop.sides[0].value[1:], strict=True):
-        yield f"{name} can be held", Exceeds(limit, abs(u.at({**held, "x1": 0, "v1": 0}).number))
+        yield f"{name} can be held", Exceeds(limit, abs(u.at({**resting_state, "x1": 0, "v1": 0}).number))
     yield from clipped(loop, limit)
     off = max(abs(k - low * c), abs(k - high * c))
     yield "the point repels", Exceeds(min(p, low, c, width))
@@ -246,8 +246,8 @@ def does_not_return(claim: Claim) -> Proof:
         slopes = [motion[i].slope(name) for motion in motions for name in (f"x{i + 1}", f"v{i + 1}")]
         if any(p.names for p in slopes) or max(slopes[0].number, slopes[1].number) < 0:
             continue
-        own = slopes[0] * x + slopes[1] * v + motions[0][i].terms.get((), 0)
-        yield from vanish("an axis on its own", [motion[i] - own for motion in motions])
+        along_axis = slopes[0] * x + slopes[1] * v + motions[0][i].terms.get((), 0)
+        yield from vanish("an axis on its own", [motion[i] - along_axis for motion in motions])
         text = f"along {'XYZ'[i]} some motions do not return"
         return Statement(text, (*loop.assumed, "unlimited-control", *loop.bodies), label, True)
     raise RefusedError("every axis returns")
@@ -260,7 +260,7 @@ def holds_another_circle(claim: Claim) -> Proof:
     circle = yield from declared(loop)
     radius, needs, of = numbers["radius"], numbers["needs"], numbers["of"]
     demand(len(loop.ring.roots) == 1 and not loop.ring.divisors, "there are more roots than that of a relay")
-    away = [side for side in loop.sides if circle.inverse in loop.asked(side)]
+    away = [side for side in loop.sides if circle.inverse in loop.depends_on(side)]
     demand(len(away) == 1, "the law is no relay")
     demand(all(factor > 0 and least <= 0 for factor, least in circle.bounds(away[0])), "the relay has a layer")
     motion, s, f1 = loop.acceleration(away[0]), var(circle.inverse), circle.errors[0]

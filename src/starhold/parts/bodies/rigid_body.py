@@ -10,7 +10,7 @@ from starhold.algebra.quaternion import Quaternion, derivative, relative, renorm
 from starhold.algebra.scalar import Scalar, Truth, both, is_finite, less, side
 from starhold.algebra.structure import rows
 from starhold.algebra.vector import ZERO, Vector, add, apply, cross, dot, gyroscopic_torque, scale, subtract
-from starhold.parts.contract import CLOCK, Card
+from starhold.parts.contract import CLOCK, IS_VALID, Card
 from starhold.parts.craft import Craft
 from starhold.parts.quaternion_sign import SIGN_POLICIES as SIGN_POLICIES
 from starhold.parts.roles import Goal, Loads, Scene
@@ -55,6 +55,10 @@ class Measurement(NamedTuple):
     wheel_momentum: Annotated[Vector, Quantity("N m s", "angular momentum of the body's wheels")] = ZERO
     magnetic_field: Annotated[Vector, Quantity("T", "as a magnetometer tells it; zero without one")] = ZERO
     time: Annotated[float, Quantity("s", 'since the start, for laws with `READS = ("time",)`; others must not use it')] = 0.0
+    is_valid: Annotated[
+        float,
+        Quantity("1", '1 where the estimate that the law uses is valid, else 0, for laws with `READS = ("is_valid",)`'),
+    ] = 1.0
 
 
 class Sample(NamedTuple):
@@ -126,8 +130,8 @@ def observe(state: State, scene: Scene) -> Measurement:
     error = relative(goal.attitude, state.attitude)
     position = to_body(state.attitude, state.position)
     field: Vector = getattr(scene.readings, "magnetic_field", ZERO)
-    time: Any = getattr(scene.readings, CLOCK, ABSENT)
-    known = (scene.torque, position, scene.period, scene.momentum, field, time)
+    time, is_valid = (getattr(scene.readings, name, ABSENT) for name in (CLOCK, IS_VALID))
+    known: Any = (scene.torque, position, scene.period, scene.momentum, field, time, is_valid)
     if scene.still:
         # The arithmetic on the zeros of a target at rest is left out here, for a compiler must not drop it.
         return Measurement(error, state.rate, state.rate, ZERO, ZERO, *known)

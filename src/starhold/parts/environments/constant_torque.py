@@ -23,7 +23,7 @@ ROLE = "environment"
 class Params(NamedTuple):
     """The torque and its axes."""
 
-    torque: Annotated[Vector, Parameter("N m", shape=(3,), spread=False, text="on the body")]
+    torque: Annotated[Vector, Parameter("N m", shape=(3,), spread=False, plain=(100.0, "mN m"), text="on the body")]
     axes: Annotated[int, Parameter(choices=("body", "inertial"), text="in which it stays the same")] = 0
 
 

@@ -21,7 +21,9 @@ NUMBERS_FROM = 0
 class Params(NamedTuple):
     """The standard deviation of the torque."""
 
-    deviation: Annotated[float, Parameter("N m", at_least=0.0, text="standard deviation on each body axis")]
+    deviation: Annotated[
+        float, Parameter("N m", at_least=0.0, plain=(10.0, "mN m"), text="standard deviation on each body axis")
+    ]
 
 
 def remember(params: Params) -> Vector:

@@ -6,18 +6,19 @@ from __future__ import annotations
 import math
 from functools import reduce
 from itertools import combinations
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion, normalise, stretch
-from starhold.algebra.scalar import Scalar, Truth, absolute, both, divide, either, less, maximum, where
+from starhold.algebra.scalar import Scalar, Truth, absolute, both, either, less, maximum, where
 from starhold.algebra.structure import chosen
-from starhold.algebra.vector import Vector, cross, determinant, dot, norm, scale
-from starhold.parts import magnetic_field, sun
+from starhold.algebra.vector import Vector, cross, determinant, dot, scale
+from starhold.parts import magnetic_field, sun, vectors
 from starhold.parts.contract import Card, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.directions import APART, Estimate, Memory, attitude_at_start, measured_or_carried
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.vectors import TINY, Known, Pair, known_from, pairs_of
 
 CARD = Card(
     title="QUEST",
@@ -37,14 +38,11 @@ CARD = Card(
 ROLE = "estimator"
 ABOUT = "Earth"
 NEEDS = ("sun", "sun_is_seen", "magnetic_field", "position", "rate")
-SEVERAL = dict.fromkeys(("sun", "sun_is_seen", "magnetic_field"), "")
+SEVERAL = vectors.SEVERAL
 FIRST = {"attitude_age": 0.0, "is_valid": 0.0}
 STEPS = 8
 """Newton's steps from the sum of the weights down to the largest eigenvalue."""
-TINY = 1e-30
 remember = attitude_at_start
-Pair: TypeAlias = tuple[Vector, Vector, Scalar, Truth]
-"""A unit vector as measured (body axes) and as known (inertial axes), its weight, and whether it is there."""
 
 
 class Params(NamedTuple):
@@ -61,11 +59,9 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The Sun, the field, the weights (1/rad2) of the three kinds of direction, and the squared sine of the least angle."""
+    """The three kinds of direction, and the squared sine of the least angle."""
 
-    sun: sun.Numbers
-    field: magnetic_field.Numbers
-    weights: Vector
+    known: Known
     sine_squared: Scalar
 
 
@@ -73,41 +69,18 @@ def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known."""
     # Of one in all they would be as good; so the largest is 1.
     least = min(params.sun, params.field, params.nadir)
-    weights = ((least / params.sun) ** 2, (least / params.field) ** 2, (least / params.nadir) ** 2)
-    light, field = sun.prepared(params.epoch, params.ephemeris), magnetic_field.prepared(params.epoch)
-    return Numbers(light, field, weights, math.sin(params.apart) ** 2)
+    return Numbers(known_from(params, params.epoch, params.ephemeris, least), math.sin(params.apart) ** 2)
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
     """The best attitude by the directions that are there, else by the gyro."""
 
     def observe(time: Scalar) -> tuple[Quaternion, Truth]:
-        pairs = pairs_of(readings, time, params)
+        pairs = pairs_of(readings, time, params.known)
         clear = reduce(either, [_apart(*two, params.sine_squared) for two in combinations(pairs, 2)])
         return best(pairs, clear), clear
 
     return measured_or_carried(readings, memory, period, observe)
-
-
-def pairs_of(readings: Any, time: Scalar, params: Numbers) -> list[Pair]:
-    """All directions among the readings of all sensors."""
-    every = getattr(readings, "every", (readings,))
-    light, pull = sun.sun(time, params.sun).direction, magnetic_field.field(readings.position, time, params.field)
-    known = (
-        ("sun", "sun_is_seen", light),
-        ("magnetic_field", "magnetic_field_is_new", pull),
-        ("nadir", "nadir_is_seen", scale(-1.0, readings.position)),
-    )
-    return [
-        (_unit(getattr(one, name)), _unit(reference), weight, less(0.5, getattr(one, flag, 1.0)))
-        for (name, flag, reference), weight in zip(known, params.weights, strict=True)
-        for one in every
-        if hasattr(one, name)
-    ]
-
-
-def _unit(vector: Vector) -> Vector:
-    return scale(divide(1.0, maximum(norm(vector), TINY)), vector)
 
 
 def _apart(one: Pair, other: Pair, sine_squared: Scalar) -> Truth:

@@ -28,7 +28,7 @@ from starhold.parts import as_built, sun
 from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
 from starhold.parts.random import RANGE, Dice
 
 CARD = Card(
@@ -79,11 +79,12 @@ class Params(NamedTuple):
     ephemeris: Annotated[int, EPHEMERIS] = 0
     jitter: Annotated[float, as_built.JITTER] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
+    interval: Annotated[float, INTERVAL] = 0.0
 
 
 class Numbers(NamedTuple):
     """Unit normals, as flight software has them; the deviation, the albedo and the threshold; the Sun, the control period
-    (s), the outage (control steps); () or the axes of the mounting, and how late it is."""
+    (s), outage and interval (control steps); () or the axes of the mounting, and how late it is."""
 
     normals: tuple[Vector, ...]
     noise: Scalar
@@ -91,7 +92,7 @@ class Numbers(NamedTuple):
     threshold: Scalar
     sun: sun.Numbers
     period: Scalar
-    outage: Window
+    outage: Silence
     axes: as_built.Axes
     late: as_built.Late = ()
 
@@ -111,7 +112,7 @@ def prepare(params: Params, period: float) -> Numbers:
     if not all(math.hypot(*face) > 0.0 for face in params.faces):
         raise ValueError("each diode needs a normal with a direction")
     normals = tuple(scale(1.0 / math.hypot(*face), face) for face in params.faces)
-    outage, axes = in_steps(params.outage, period), as_built.axes_of(params.mounting_error, ZERO)
+    outage, axes = in_steps(params.outage, period, params.interval), as_built.axes_of(params.mounting_error, ZERO)
     shares = params.noise, params.albedo, params.threshold
     late = as_built.late_by(params.delay, period, params.jitter)
     return Numbers(normals, *shares, sun.prepared(params.epoch, params.ephemeris), period, outage, axes, late)

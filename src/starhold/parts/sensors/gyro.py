@@ -49,6 +49,7 @@ class Params(NamedTuple):
             "rad/s",
             also="rad/s/sqrt(h)",
             at_least=0.0,
+            plain=(0.1, "deg/h/sqrt(h)"),
             text="standard deviation of the bias's change within an hour: the rate random walk",
         ),
     ] = 0.0
@@ -58,7 +59,10 @@ class Params(NamedTuple):
     axis_errors: Annotated[Matrix | Vector, as_built.AXES] = ZERO
     resolution: Annotated[float, as_built.resolution("rad/s")] = 0.0
     bias_instability: Annotated[
-        float, Parameter("rad/s", at_least=0.0, text="deviation of the part of the bias that wanders about zero")
+        float,
+        Parameter(
+            "rad/s", at_least=0.0, plain=(0.1, "deg/h"), text="deviation of the part of the bias that wanders about zero"
+        ),
     ] = 0.0
     correlation_time: Annotated[
         float,

@@ -13,7 +13,7 @@ from starhold.parts import as_built
 from starhold.parts.boresight import BORESIGHT, THIRD, field_cosine, unit_boresight
 from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.orbit import BODIES
-from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -47,17 +47,18 @@ class Params(NamedTuple):
     mounting_error: Annotated[Vector, as_built.MOUNTING] = ZERO
     jitter: Annotated[float, as_built.JITTER] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
+    interval: Annotated[float, INTERVAL] = 0.0
 
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the limb's height
-    (m), the outage (control steps); () or the axes of the mounting, and how late it is."""
+    (m), outage and interval (control steps); () or the axes of the mounting, and how late it is."""
 
     noise: Scalar
     boresight: Vector
     cosine: Scalar
     height: Scalar
-    outage: Window
+    outage: Silence
     axes: as_built.Axes
     late: as_built.Late = ()
 
@@ -76,7 +77,7 @@ def prepare(params: Params, period: float) -> Numbers:
         unit_boresight(params.boresight),
         field_cosine(params.half_angle),
         params.limb_height,
-        in_steps(params.outage, period),
+        in_steps(params.outage, period, params.interval),
         as_built.axes_of(params.mounting_error, ZERO),
         as_built.late_by(params.delay, period, params.jitter),
     )

@@ -12,7 +12,7 @@ from starhold.algebra.vector import ZERO, Matrix, Vector, add, scale
 from starhold.parts import as_built, magnetic_field
 from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, Parameter
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -52,17 +52,18 @@ class Params(NamedTuple):
     limit: Annotated[float, as_built.limit("T")] = math.inf
     jitter: Annotated[float, as_built.JITTER] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
+    interval: Annotated[float, INTERVAL] = 0.0
 
 
 class Numbers(NamedTuple):
-    """Deviation and bias (T), the scale factor, the field, and the outage (control steps); () or its axes, its step (T),
-    its limit (T), and how late it is."""
+    """Deviation and bias (T), the scale factor, the field, and outage and interval (control steps); () or its axes, its step
+    (T), its limit (T), and how late it is."""
 
     noise: Scalar
     bias: Vector
     factor: Scalar
     field: magnetic_field.Numbers
-    outage: Window
+    outage: Silence
     axes: as_built.Axes = ()
     step: as_built.Step = ()
     limit: tuple[Scalar, ...] = ()
@@ -79,7 +80,7 @@ class Reading(NamedTuple):
 def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for an epoch at which the field is not known, for a bad outage and too long a
     delay."""
-    field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period)
+    field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period, params.interval)
     return Numbers(
         _deviation(params, period),
         params.bias,
@@ -112,8 +113,9 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """The largest error beside noise and without outages, wherever there is no ground."""
-    if params.outage != NEVER or params.limit < math.inf or as_built.is_given(params.jitter, params.delay):
+    """The largest error beside noise of a reading that is always new, wherever there is no ground."""
+    late = as_built.is_given(params.interval, params.jitter, params.delay)
+    if params.outage != NEVER or params.limit < math.inf or late:
         return UNBOUNDED
     skewed = as_built.stretch(as_built.axes_of(params.mounting_error, params.axis_errors))
     share = abs(params.scale_error) * (1.0 + skewed) + skewed

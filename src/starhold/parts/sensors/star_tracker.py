@@ -16,7 +16,7 @@ from starhold.parts.contract import NO_ERRORS, UNBOUNDED, Card, Errors, Noise, P
 from starhold.parts.craft import Craft
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out, steps_of
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -38,17 +38,27 @@ SEEN = ("attitude",)
 class Params(NamedTuple):
     """The errors of the star tracker."""
 
-    cross: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about each axis across the boresight")]
-    roll: Annotated[float, Parameter("rad", at_least=0.0, text="standard deviation about the boresight")]
+    cross: Annotated[
+        float,
+        Parameter(
+            "rad", at_least=0.0, plain=(0.1, "arcsec"), text="standard deviation about each axis across the boresight"
+        ),
+    ]
+    roll: Annotated[
+        float, Parameter("rad", at_least=0.0, plain=(0.1, "arcsec"), text="standard deviation about the boresight")
+    ]
     boresight: Annotated[Vector, BORESIGHT] = THIRD
-    interval: Annotated[float, Parameter("s", at_least=0.0, text="between updates; each control step if 0")] = 0.0
+    interval: Annotated[float, INTERVAL] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
     outage: Annotated[Window, OUTAGE] = NEVER
     sun_cone: Annotated[float, blinding.SUN] = 0.0
     moon_cone: Annotated[float, blinding.MOON] = 0.0
     limb_cones: Annotated[tuple[float, float], blinding.LIMB] = blinding.NONE
     rate_limit: Annotated[
-        float, Parameter("rad/s", above=0.0, text="above which stars smear and there is no reading; none if absent")
+        float,
+        Parameter(
+            "rad/s", above=0.0, plain=(0.5, "deg/s"), text="above which stars smear and there is no reading; none if absent"
+        ),
     ] = math.inf
     epoch: Annotated[Date, EPOCH] = START
     jitter: Annotated[float, as_built.JITTER] = 0.0
@@ -65,7 +75,7 @@ class Numbers(NamedTuple):
     boresight: Vector
     every: Scalar
     late: as_built.Late
-    outage: Window
+    outage: Silence
     cones: blinding.Cones | tuple[()] = ()
     square: tuple[Scalar, ...] = ()
     mounted: as_built.Turn = ()
@@ -96,7 +106,7 @@ def prepare(params: Params, period: float) -> Numbers:
         params.cross,
         params.roll,
         boresight,
-        float(max(1, round(params.interval / period))),
+        steps_of(params.interval, period),
         as_built.late_by(params.delay, period, params.jitter),
         in_steps(params.outage, period),
         blinding.prepared(

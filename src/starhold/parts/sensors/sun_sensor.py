@@ -15,7 +15,7 @@ from starhold.parts.boresight import BORESIGHT, THIRD, field_cosine, unit_boresi
 from starhold.parts.contract import Card, NoMemory, Parameter
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
-from starhold.parts.outage import NEVER, OUTAGE, Window, in_steps, is_out
+from starhold.parts.outage import INTERVAL, NEVER, OUTAGE, Silence, Window, in_steps, is_out
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -50,18 +50,19 @@ class Params(NamedTuple):
     jitter: Annotated[float, as_built.JITTER] = 0.0
     delay: Annotated[float, as_built.DELAY] = 0.0
     ephemeris: Annotated[int, EPHEMERIS] = 0
+    interval: Annotated[float, INTERVAL] = 0.0
 
 
 class Numbers(NamedTuple):
     """The deviation (rad), the unit vector of the boresight, the cosine of half the field of view, the Sun, the control
-    period (s), and the outage (control steps); () or its axes, and how late it is."""
+    period (s), and outage and interval (control steps); () or its axes, and how late it is."""
 
     noise: Scalar
     boresight: Vector
     cosine: Scalar
     sun: sun.Numbers
     period: Scalar
-    outage: Window
+    outage: Silence
     axes: as_built.Axes = ()
     late: as_built.Late = ()
 
@@ -77,7 +78,7 @@ def prepare(params: Params, period: float) -> Numbers:
     """The numbers of a flight. ValueError for a boresight without direction, a bad epoch, a bad outage and too long a
     delay."""
     cosine = field_cosine(params.half_angle)
-    outage = in_steps(params.outage, period)
+    outage = in_steps(params.outage, period, params.interval)
     axes = as_built.axes_of(params.mounting_error, ZERO)
     boresight = unit_boresight(params.boresight)
     return Numbers(

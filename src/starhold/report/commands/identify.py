@@ -83,6 +83,7 @@ def draw(result: Identified, title: str) -> Any:
     """A row for each sensor: what it read with the fit, and the residuals in deviations of its noise."""
     from starhold.report.figures import framed, plain
     from starhold.report.plots import COLOURS
+    from starhold.report.ticks import label_ticks
 
     count = len(result.residuals)
     figure, grid = framed(
@@ -100,7 +101,7 @@ def draw(result: Identified, title: str) -> Any:
             right.plot(times[::every], errors[::every, k], ".", color=COLOURS[k], markersize=2.0)
         for level in (-1.96, 1.96):
             right.axhline(level, color="0.35", linewidth=0.9, dashes=(5, 3))
-        left.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+        label_ticks(left.yaxis)
         left.set_ylabel(f"{name.replace('_', ' ')}, {result.units[name]}", fontsize=8)
     for axis, words in zip(grid[-1], ("readings and fit (lines)", "residuals in deviations, 95 % dashed"), strict=True):
         axis.set_xlabel(f"time, s; {words}", fontsize=8.5)

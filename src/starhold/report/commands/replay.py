@@ -81,6 +81,7 @@ def draw(result: Replay, title: str) -> Any:
 
     from starhold.report.figures import framed, plain
     from starhold.report.plots import colour
+    from starhold.report.ticks import label_ticks
 
     shown = sorted(result.comparisons, key=lambda one: np.inf if one.parted_at is None else one.parted_at)[:MOST_PANELS]
     height = 0.9 + 1.5 * len(shown)
@@ -91,7 +92,7 @@ def draw(result: Replay, title: str) -> Any:
         axis.plot(one.times, one.allowed, color="0.35", linewidth=0.9, dashes=(5, 3))
         if one.parted_at is not None:
             axis.axvline(one.parted_at, color=colour(1), linewidth=1.2)
-        axis.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+        label_ticks(axis.yaxis)
         axis.yaxis.get_offset_text().set_size(8.5)
         axis.set_ylabel(f"{one.name.replace('_', ' ')}\n{one.unit}", fontsize=8)
     axes.ravel()[-1].set_xlabel("time, s; differences, what is allowed dashed, the first parting upright", fontsize=8.5)

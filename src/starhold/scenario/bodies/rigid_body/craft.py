@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 LAYOUTS = {"orthogonal": three_orthogonal, "pyramid": pyramid, "nasa-standard": nasa_standard}
 NUMBERS = ("inertia", "torque_limit", "momentum_limit", "viscous", "coulomb")
+FASTEST = 1e4
+"""The speed (rad/s) that no rotor bears: rims of the strongest fibres break at less."""
 NONE: dict[str, Any] = {
     "static_friction": 0.0,
     "stribeck_speed": 0.0,
@@ -67,6 +69,12 @@ def effectors_in(table: RigidBodyTable) -> tuple[Fitted, ...]:
     axes, columns, momenta = rotors_in(table)
     shared = table.wheels or WheelsTable()
     rotors: list[Rotor] = [*table.wheel] or [shared] * len(axes)
+    for place, (most, inertia) in enumerate(zip(columns["momentum_limit"], columns["inertia"], strict=True), 1):
+        if FASTEST * inertia < most < math.inf:
+            speed = f"{most / inertia * 30.0 / math.pi:.3g} rpm"
+            raise ValueError(
+                f"wheel {place} turns at {speed} with its most momentum, {most:.3g} N m s: is another unit meant?"
+            )
     wheels = make_wheels(axes, **columns)._replace(allocation=ALLOCATIONS.index((table.wheels or WheelsTable()).allocation))
     wheels = mounted(wheels, [_given("mounting_error", rotor, shared) or (0.0, 0.0, 0.0) for rotor in rotors])
     more = {name: [_given(name, rotor, shared) for rotor in rotors] for name in NONE}

@@ -22,6 +22,7 @@ from starhold.parts.craft import Craft, check_moments, check_rest, compact, inve
 from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.interface import Body, Moved
 from starhold.scenario.bodies.rigid_body.craft import axial_inertia, effectors_of, sure_torque
+from starhold.scenario.bodies.rigid_body.orbits import impossible_orbits, orbits_over
 from starhold.scenario.bodies.rigid_body.rotors import Rotors, impossible, rotors_over, stacked
 from starhold.scenario.bodies.rigid_body.start import start_of, stated, target_of, unit_of
 
@@ -35,8 +36,8 @@ KNOWN, TRUE = "spacecraft.inertia", "fault[1].inertia"
 LIMIT, ATTITUDE, RATE = "spacecraft.torque_limit", "initial.attitude", "initial.rate"
 ANGLES = "initial.angles"
 """Not a key that may be moved, because there is no sine operation: `moved` takes the quaternion of the angles."""
-ROTORS = "wheels"
-"""Not a key either: `moved` takes the wheels that the keys of their tables give."""
+ROTORS, ORBIT = "wheels", "orbit"
+"""Not keys either: `moved` takes the wheels, and the position and velocity, that the keys of their tables give."""
 
 
 class Dials(Body):
@@ -73,7 +74,7 @@ class Dials(Body):
         nominal, flown = _crafts(scenario, values, loop.craft)
         saturation_limit = values.get(LIMIT, loop.saturation_limit())
         attitude = unit_of(values[ATTITUDE]) if ATTITUDE in values else values.get(ANGLES)
-        begun = start_of(scenario, target_of(scenario), attitude, values.get(RATE))
+        begun = start_of(scenario, target_of(scenario), attitude, values.get(RATE), values.get(ORBIT))
         # An inertia that changes as the motion begins keeps the angular momentum, as in `Phase.rate_from`.
         pairs = zip(leaves(flown.inertia), leaves(nominal.inertia), strict=True)
         same = reduce(both, (both(less_equal(a, b), less_equal(b, a)) for a, b in pairs))
@@ -115,11 +116,21 @@ class Dials(Body):
             moved[KNOWN] = _inertia(moments, isinstance(total_inertia(scenario.craft)[0], tuple))
         if LIMIT in columns:
             moved[LIMIT] = columns[LIMIT]
+        orbits = orbits_over(scenario, columns)
+        if orbits is not None:
+            starts = np.array([orbit.start for orbit in orbits])
+            moved[ORBIT] = tuple(map(tuple, np.moveaxis(starts, 0, -1)))
         if rotors is not None and rotors.sure is None:
             raise ValueError("lanes differ in the torque allocation of their wheels")
         return moved if rotors is None else moved | {ROTORS: rotors}
 
     def refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
+        """Return which lanes have an impossible inertia, wheels or orbit, (lanes,); None where none of them is drawn."""
+        every = (self._refused(scenario, columns), impossible_orbits(scenario, columns))
+        known = [lanes for lanes in every if lanes is not None]
+        return reduce(np.logical_or, known) if known else None
+
+    def _refused(self, scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
         """Return which lanes have an impossible inertia or impossible wheels, (lanes,); None where neither is drawn."""
         moments, rotors = _moments(scenario, columns), rotors_over(scenario, columns)
         if moments is None and rotors is None:

@@ -129,12 +129,12 @@ def _history(scenario: Scenario, table: TargetTable, key: str, use: Callable[...
         raise InputError(scenario.where, f"{key}.file", f"{path}: {error}", allowed) from None
 
 
-def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None) -> State:
+def start_of(scenario: Scenario, goal: Fitted, attitude: Any = None, rate: Any = None, placed: Any = None) -> State:
     """Return the initial state of a run with this target; an equation where a unit quaternion or a rate replaces those of
-    [initial]."""
+    [initial], or a position and a velocity those of [orbit]."""
     table = scenario.table
-    orbit = table.orbit
-    position, velocity = (ZERO, ZERO) if orbit is None else orbit.start
+    begun = (ZERO, ZERO) if table.orbit is None else table.orbit.start
+    position, velocity = begun if placed is None else placed
     turned = stated(table.initial) if attitude is None else attitude
     begun = State(turned, table.initial.rate if rate is None else rate, position, velocity, ZERO)
     if table.initial.relative_to == "target":

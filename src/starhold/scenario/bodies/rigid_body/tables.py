@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from starhold.laws.interface import Gain
 from starhold.parts.as_built import MOUNTING
-from starhold.parts.craft import check_inertia
+from starhold.parts.craft import check_inertia, heaviest
 from starhold.parts.epoch import START
 from starhold.parts.stated_attitude import check_attitude
 from starhold.scenario.bodies.rigid_body.transient import TransientTable
@@ -189,6 +189,10 @@ class Tolerances(Table):
 TURNED = "small turn of its axis about the body axes, which law and allocation do not know"
 
 
+VISCOUS = quantity(Gain("N m s", at_least=0.0, plain=(0.1, "uN m s"), text="friction per rad/s"))
+COULOMB = quantity(Gain("N m", at_least=0.0, plain=(0.5, "mN m"), text="friction at any speed"))
+
+
 class Rotor(Table):
     """A reaction wheel as a unit of the catalogue, or as its numbers; numbers given override the unit's."""
 
@@ -197,13 +201,13 @@ class Rotor(Table):
         float | None, *quantity(Gain("kg m^2", above=0.0, plain=(10.0, "g cm^2"), text="of the rotor about its axis"))
     ] = None
     torque_limit: Annotated[
-        float | None, *quantity(Gain("N m", above=0.0, plain=(10.0, "mN m"), text="largest motor torque"))
+        float | None, *quantity(Gain("N m", above=0.0, plain=(2.0, "mN m"), text="largest motor torque"))
     ] = None
     momentum_limit: Annotated[
         float | None, *quantity(Gain("N m s", above=0.0, plain=(1000.0, "mN m s"), text="largest angular momentum"))
     ] = None
-    viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
-    coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
+    viscous: Annotated[float | None, *VISCOUS] = None
+    coulomb: Annotated[float | None, *COULOMB] = None
     momentum: Annotated[float, *quantity(Gain("N m s", text="at the start"))] = 0.0
     top_speed: Annotated[
         float | None,
@@ -212,7 +216,9 @@ class Rotor(Table):
     speed: Annotated[
         float | None, *quantity(Gain("rad/s", plain=(2e3, "rpm"), text="at the start in place of momentum, body at rest"))
     ] = None
-    static_friction: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="largest, of a slow rotor"))] = None
+    static_friction: Annotated[
+        float | None, *quantity(Gain("N m", at_least=0.0, plain=(0.5, "mN m"), text="largest, of a slow rotor"))
+    ] = None
     stribeck_speed: Annotated[
         float | None,
         *quantity(Gain("rad/s", above=0.0, plain=(2e3, "rpm"), text="at which friction is largest, the static one")),
@@ -224,10 +230,16 @@ class Rotor(Table):
         float | None, *quantity(Gain("kg m", at_least=0.0, text="mass of the rotor times its distance from the axis"))
     ] = None
     dynamic_imbalance: Annotated[
-        float | None, *quantity(Gain("kg m^2", at_least=0.0, text="product of inertia of the rotor about its axis"))
+        float | None,
+        *quantity(
+            Gain("kg m^2", at_least=0.0, plain=(1e-2, "g mm^2"), text="product of inertia of the rotor about its axis")
+        ),
     ] = None
     position: Annotated[
-        Any, *quantity(Gain("m", shape=(3,), spread=False, text="from the centre of mass, for a static imbalance"))
+        Any,
+        *quantity(
+            Gain("m", shape=(3,), spread=False, plain=(100.0, "mm"), text="from the centre of mass, for a static imbalance")
+        ),
     ] = None
     mounting_error: Annotated[Any, *quantity(replace(MOUNTING, text=TURNED))] = None
 
@@ -267,8 +279,8 @@ class FaultTable(Table):
     lost: Annotated[Flag, Field(description="the motor gives no more torque")] = False
     torque_limit: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="what the motor still gives"))] = None
     momentum_limit: Annotated[float | None, *quantity(Gain("N m s", above=0.0, text="what the wheel still stores"))] = None
-    viscous: Annotated[float | None, *quantity(Gain("N m s", at_least=0.0, text="friction per rad/s"))] = None
-    coulomb: Annotated[float | None, *quantity(Gain("N m", at_least=0.0, text="friction at any speed"))] = None
+    viscous: Annotated[float | None, *VISCOUS] = None
+    coulomb: Annotated[float | None, *COULOMB] = None
     inertia: Annotated[Any, *INERTIA] = None
     delay: Annotated[float, *quantity(Gain("s", at_least=0.0, text="until it is diagnosed and acted on"))] = 0.0
     action: Annotated[
@@ -358,4 +370,12 @@ class RigidBodyTable(ScenarioTable):
             raise at_key("target.mode", '"orbital" only with an [orbit] table', "orbital")
         if self.orbit is not None:
             self.orbit.check_flight(self.simulation.duration)
+        return self
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> RigidBodyTable:
+        body = self.spacecraft
+        if body.mass is not None and body.mass > (most := heaviest(body.inertia)):
+            allowed = f"at most {most:.3g} kg: with this inertia more would be denser than any metal; is another unit meant?"
+            raise at_key("spacecraft.mass", allowed, body.mass)
         return self

@@ -1,0 +1,46 @@
+"""What a file of certificates says is checked: kinds and proofs of its claims, its outcome, digests of its programs."""
+
+import copy
+import json
+
+import pytest
+
+from starhold.kernel.check import check as prove
+from starhold.kernel.numbers import RefusedError
+from tests.certification.edits import claims_of, reasons, with_kinds
+from tests.kernel.certificates import contents
+
+
+@pytest.fixture
+def content(made):
+    return copy.deepcopy(made("pd-0"))
+
+
+def test_a_kind_stands_for_one_claim_and_one_proof(content):
+    claims = content["certificates"][0]["claims"]
+    claims.append(claims[0] | {"proof": len(content["claims"])})
+    content["claims"].append(content["claims"][claims[0]["proof"]])
+    assert reasons(with_kinds(content)) == ["two claims are of the same kind"]
+    claims[-1]["kind"] = "equilibrium"
+    assert f"the proof is of another kind of claim: {claims[0]['kind']}" in reasons(with_kinds(content))
+
+
+@pytest.mark.parametrize("pointing", [False, True])
+def test_beside_a_loop_that_points_as_it_flies_undecided_claims_do_not_count(content, pointing):
+    claims = claims_of(content)
+    claims["sampling"] |= {"outcome": "undecided"}
+    if pointing:
+        claims["inertia"]["kind"] = "pointing"
+    wrong = "the outcome does not follow from the claims"
+    assert content["certificates"][0]["outcome"] == "proved"
+    assert (wrong in reasons(with_kinds(content))) != pointing
+    content["certificates"][0]["outcome"] = "undecided"
+    assert (wrong in reasons(with_kinds(content))) == pointing
+
+
+def test_a_program_under_the_digest_of_another_one_is_refused():
+    content = contents("three-laws", "sliding")
+    one, other, *_ = content["programs"]
+    content["programs"][one] = content["programs"][other]
+    with pytest.raises(RefusedError, match="a program is another one than its digest says"):
+        prove(json.dumps(content))
