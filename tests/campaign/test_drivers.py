@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import optimize, special, stats
 
-from starhold.campaign.drivers import Column, find_drivers, independent_causes
+from starhold.campaign.drivers import Column, _misfit, find_drivers, independent_causes
 from tests.tiers import leading
 
 N = 2000
@@ -84,6 +84,15 @@ def test_independent_causes_are_fitted_to_the_most_likely(seed):
     found = -(special.xlogy(failures, fitted) + special.xlog1py(runs - failures, -fitted)).sum()
     best = min(optimize.minimize(loss, np.full(7, start), bounds=[(0.0, 1.0)] * 7).fun for start in (0.1, 0.3))
     assert found - best < 0.02
+
+
+def test_a_misfit_is_the_lesser_of_two_statistics_of_scipy(rng):
+    expected = rng.uniform(0.5, 20.0, (50, 6))
+    counts = rng.poisson(expected).astype(float)
+    expected *= counts.sum(1, keepdims=True) / expected.sum(1, keepdims=True)
+    kinds = [stats.power_divergence(counts, expected, axis=1, lambda_=name)[0] for name in ("log-likelihood", "pearson")]
+    assert _misfit(counts, expected, (1,)) == pytest.approx(np.minimum(*kinds))
+    assert 5 < (kinds[0] < kinds[1]).sum() < 45
 
 
 PLANTED = {

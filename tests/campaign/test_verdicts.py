@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from starhold.campaign import sequence
-from starhold.campaign.verdicts import acceptance, allowed_failures, failure_bounds, judge, quantile_bound, runs_needed
+from starhold.campaign.verdicts import (
+    acceptance,
+    allowed_failures,
+    failure_bounds,
+    judge,
+    percent,
+    quantile_bound,
+    runs_needed,
+)
 from tests.refusals import refused
 
 counts = st.integers(1, 2000).flatmap(lambda runs: st.tuples(st.integers(0, runs), st.just(runs)))
@@ -193,3 +201,11 @@ def test_bad_input_is_one_line():
     ):
         with refused():
             call()
+
+
+@pytest.mark.parametrize(
+    ("share", "shown"),
+    [(0.0, "0 %"), (1.0, "100 %"), (0.123456, "12.346 %"), (1.23456e-6, "0.00012 %"), (1.0 - 1e-6, "99.9999 %")],
+)
+def test_a_share_has_the_digits_that_tell_it_from_none_and_all(share, shown):
+    assert percent(share) == shown

@@ -5,7 +5,8 @@ import pytest
 from starhold.algebra.quaternion import vector_part
 from starhold.algebra.scalar import sign
 from starhold.algebra.vector import add, cross, scale, subtract
-from tests.kernel.certificates import failing
+from starhold.kernel.numbers import RefusedError
+from tests.kernel.certificates import contents, failing
 from tests.kernel.handmade import case
 
 
@@ -25,3 +26,11 @@ def test_the_sign_stays_below_half_of_what_the_surface_is_at_half_a_turn(level, 
     """s.Js is at least 0.99 * 0.099^2 = 2 * 0.00485 there, by the least moment and slope that are told."""
     told = {"taken": ["shortest sign"], "level": level, "inertia_low": 0.99, "surface_low": 0.099}
     assert failing(*case(reaching, theorem="reaches its surface", s=surface, **told)) == failed
+
+
+def test_a_motion_that_ends_far_from_its_target_is_no_claim():
+    content = contents("cubesat-slew", "sliding", 0)
+    (claim,) = content["claims"]
+    claim["numbers"]["end.angle"] = "3"
+    with pytest.raises(RefusedError, match="an angle is too large"):
+        failing(claim, content["programs"])
