@@ -117,7 +117,7 @@ def test_no_claim_is_made_of_wheels_that_are_askew_and_large_turns_are_refused()
     given = scenario([None] * 4).with_({"nominal": {"wheel": [{"axis": axis} for axis in AXES[::-1].tolist()]}})
     with refused("nominal", "no [nominal], for certification"):
         sh.certify(given, "wheel")
-    with refused("mounting_error", "at most 0.5"):
+    with refused("mounting_error", "at most 28.6479 deg"):
         scenario([[2.0, 0.0, 0.0], None, None, None])
 
 
