@@ -31,7 +31,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     _, V, held, _ = own.leans[0]
     oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.told))
     n, h, rng = oracle.numbers, loop.loop.period, np.random.default_rng(3)
-    region = held.region(held.s * round(share * 2**30) / 2**30)
+    region = held.region((held.s + held.G[3][3]) * round(share * 2**30) / 2**30)
     tube, inverse = held.tube(region), np.linalg.inv(oracle.J)
     x = np.linalg.cholesky(floats(region.X)) @ along(rng.normal(size=(6, LANES)))
     x *= rng.uniform(size=LANES) ** 0.2
