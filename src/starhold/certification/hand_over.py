@@ -2,15 +2,17 @@
 in the region from which this law brings the body to rest on target."""
 
 from collections.abc import Mapping
+from math import inf
 from typing import TypeAlias
 
 from starhold.certification.certificate import Certificate
 from starhold.certification.certify import between_samples, undecided
 from starhold.certification.proofs import taken_over
-from starhold.certification.subject import described, described_target, make_subject
-from starhold.certification.unmodelled import READ, named
+from starhold.certification.subject import above, described, make_subject
+from starhold.certification.unmodelled import is_read, named
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
+from starhold.parts.part import same_numbers
 
 Ends: TypeAlias = tuple[float | None, float | None]
 """Rate (rad/s) and angle (rad) up to which a switch hands over; None for no bound."""
@@ -39,13 +41,11 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
 def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> Ends:
     """Return the rate and angle, relative to the target of the next mode, up to which the tests of a switch hold, allowing
     for rounding; None for no bound."""
-    last, target = described_target(before), described_target(after)
-    # For other targets the description is incomplete.
-    same = last == target and target["target"] in READ["target"]
-    still = target["target"] == "inertial"
-    rates = [levels.get("rate_below")] if same or (still and last["target"] == "inertial") else []
-    rates += [levels.get("body_rate_below")] if still else []
-    rate = min((rate for rate in rates if rate is not None), default=None)
+    one, other = before.target, after.target
+    same = is_read(one) and one.part == other.part and same_numbers(one.params, other.params)
+    turns = [above(make_subject(loop).target_rate) if is_read(loop.target) else inf for loop in (before, after)]
+    tests = {"rate_below": 0.0 if same else sum(turns), "body_rate_below": turns[1]}
+    rate = min((levels[name] + turn for name, turn in tests.items() if name in levels and turn < inf), default=None)
     angle = levels.get("angle_below") if same else None
     return (
         None if rate is None else rate * (1.0 + ROUNDING),

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.structure import leaves
 from starhold.analysis.mode_notes import Span, span
 from starhold.laws.modes import Modes
 from starhold.loop.modes import loop_of_mode
@@ -164,12 +163,6 @@ def most_stored(loop: ClosedLoop, place: int) -> float:
     ends = [(one.places, one.levels[STORED]) for one in hand_overs(loop, "") if STORED in one.levels]
     ending, beginning = ([level for places, level in ends if places[side] == place] for side in (0, 1))
     return max(ending or beginning, default=math.inf)
-
-
-def same_numbers(one: Any, other: Any) -> bool:
-    """Whether two nested states hold the same numbers."""
-    pairs = [*leaves(one)], [*leaves(other)]
-    return len(pairs[0]) == len(pairs[1]) and all(map(np.array_equal, *pairs))
 
 
 def mode_departures(issued: Issued, run: Recording, fault: int | None) -> dict[str, tuple[Departure, ...]]:
