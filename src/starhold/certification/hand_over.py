@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import TypeAlias
 
-from starhold.certification.certificate import Certificate
+from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.certify import between_samples, undecided
 from starhold.certification.proofs import taken_over
 from starhold.certification.subject import above, described, make_subject
@@ -18,6 +18,8 @@ Ends: TypeAlias = tuple[float | None, float | None]
 """Rate (rad/s) and angle (rad) up to which a switch hands over; None for no bound."""
 ROUNDING = 2.0**-45
 """The largest relative error of a rate or an angle that a law computes, for angles up to `WIDEST`."""
+TESTS = {"rate_below": "rate_error", "body_rate_below": "rate_error", "angle_below": "attitude_error"}
+"""The tests of a switch that bound a rate or an angle, with the error in a claim of what they look at."""
 WIDEST = 3.0
 """The largest angle (rad) that its sine determines."""
 
@@ -36,6 +38,20 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     beyond = undecided("hand-over", {"rate": rate, "angle": angle}, subject, "it reaches beyond the region of convergence")
     claims = [proved.get("hand-over", beyond), *between_samples(subject, proved, failed)]
     return Certificate(name, described(subject), named(claims, loop))
+
+
+def flown_ends(
+    levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop, last: Claim | None, claim: Claim | None
+) -> tuple[float, float]:
+    """Return the rate and angle, relative to the target of the next mode, up to which a switch hands over as the loop flies;
+    inf for no bound. last: the claim of the mode before, if that has settled; claim: that of the next mode, which has the
+    errors of what the tests look at."""
+    errors = {name: 0.0 if claim is None else claim.numbers[error] for name, error in TESTS.items()}
+    tested = {name: x + errors[name] for name, x in levels.items() if name in TESTS}
+    settled = {} if last is None else {"rate_below": last.numbers["rate"], "angle_below": last.numbers["angle"]}
+    found = [[inf if x is None else x for x in ends(told, before, after)] for told in (tested, settled)]
+    rate, angle = map(min, zip(*found, strict=True))
+    return rate, angle
 
 
 def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> Ends:

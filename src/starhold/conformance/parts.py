@@ -252,8 +252,8 @@ def _moves_as_it_says(part: Part) -> None:
         numbers, module, seen = Fitted(part, params).prepared(loop.period), cast(Any, part.module), NO_TURN
         for step in np.linspace(0.0, 3e7 / loop.period, 20 * STEPS):
             seen, *motion = module.goal(numbers, loop.start, int(step), seen)
-            for name, found, most in zip(("rate", "acceleration"), motion, tell(params), strict=True):
-                require(norm(found) <= most * (1.0 + 1e-9), f"the {name} is {norm(found):g}, larger than {most:g}")
+            for name, moved, most in zip(("rate", "acceleration"), motion, tell(params), strict=True):
+                require(norm(moved) <= most * (1.0 + 1e-9), f"the {name} is {norm(moved):g}, larger than {most:g}")
 
 
 def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:

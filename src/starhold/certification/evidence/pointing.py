@@ -31,6 +31,7 @@ from starhold.kernel.numbers import RefusedError, Rows, demand, norm
 from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, widened
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import image, periods, points
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
@@ -198,15 +199,13 @@ class Chain:
         return 2.0 * half * MORE if half < 1.0 else inf, fastest
 
 
-def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
+def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float | None = None) -> bool:
     """Find the pointing bound of the loop under the disturbances of its parts and the requested ones, within its limits if
-    possible: from the largest rotations, at the rate of the loop's start or from rest. like: the numbers of a claim, for the
-    same start set and limits, and with noise if it includes noise."""
+    possible: from the largest rotations, at the rate `begun` (rad/s), by default that of the loop's start, or from rest.
+    like: the numbers of a claim, for the same start set and limits, and with noise if it includes noise."""
     if like is None:
-        begun = loop.loop.without("sensor", "estimator")
-        shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
-        rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
-        angles, beyond = list(map(radians, ANGLES)), list(map(radians, RATES))
+        rates = dict.fromkeys((start_rate(loop.loop) * MORE if begun is None else begun, 0.0))
+        angles, beyond = list(map(radians, ANGLES)), list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
         kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
@@ -225,6 +224,13 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
             # Floats may be too far apart in size, or too large.
             loop.failed[POINTS] = str(reason)
     return False
+
+
+def start_rate(loop: ClosedLoop) -> float:
+    """Return the rate (rad/s), relative to its target, at which a loop starts."""
+    loop = loop.without("sensor", "estimator")
+    shown = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
+    return float(np.linalg.norm(shown.rate))
 
 
 class Pushed:
