@@ -6,11 +6,13 @@ import pytest
 import starhold as sh
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import floats
+from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import pushes
-from starhold.kernel.numbers import Account
+from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
+from starhold.kernel.theorems.pointing import points
 from starhold.scenario.building import build
 from tests.kernel.flights import Around, Surroundings, along, cross
 from tests.kernel.oracle import Oracle, run
@@ -31,7 +33,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     _, V, held, _ = own.leans[0]
     oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.told))
     n, h, rng = oracle.numbers, loop.loop.period, np.random.default_rng(3)
-    region = held.region(held.s * round(share * 2**30) / 2**30)
+    region = held.region((held.s + held.G[3][3]) * round(share * 2**30) / 2**30)
     tube, inverse = held.tube(region), np.linalg.inv(oracle.J)
     x = np.linalg.cholesky(floats(region.X)) @ along(rng.normal(size=(6, LANES)))
     x *= rng.uniform(size=LANES) ** 0.2
@@ -126,3 +128,34 @@ def test_a_body_that_leans_on_its_momentum_is_where_it_is_said_to_be_and_stays()
         x = A @ x + floats(B) @ torque
     assert np.isclose(np.linalg.norm(x[3:]), float(held.leant[1]), rtol=1e-6)
     assert float(b) < np.linalg.norm(torque)
+
+
+def test_a_potential_that_is_even_holds_motions_on_one_side_of_a_half_turn():
+    """With V the same for both quaternions a set is that with q0 > 0, which no motion may leave within a period."""
+    Account.left = 10**12
+    given = sh.load("wheels-orbital")
+    loop = Loop(make_subject(build(given, given.pick("wheel"))))
+    own = Pushed(loop, pushes(loop.loop, loop.known.envelope(False)))
+    _, V, held, _ = own.leans[0]
+    assert held.even
+    assert held.s == 0
+    stiff = held.G[3][3]
+    for share in (0.02, 0.5):
+        region = held.region(stiff * round(share * 2**20) / 2**20)
+        # At rest V = stiff |q|^2; no less of the set is left out by its mixed term.
+        assert 0.0 < float(region.least) <= np.sqrt(1.0 - share)
+    with pytest.raises(RefusedError, match="the other quaternion"):
+        held.region(stiff)
+    low, high = stiff / 2, stiff
+    for _ in range(30):
+        middle = (low + high) / 2
+        try:
+            held.region(middle)
+            low = middle
+        except RefusedError:
+            high = middle
+    with pytest.raises(RefusedError, match="a half turn"):
+        held.tube(held.region(low))
+    claim = own.claim(V, own.told | {"level": 1e-6, "start.angle": 3.2, "start.rate": 0.0, "highest": 1.0})
+    with pytest.raises(RefusedError, match="the other quaternion"):
+        dict(points(read(claim, loop.by_digest)))

@@ -104,6 +104,14 @@ BROKEN = {
         },
         {"keeps_what_it_says"},
     ),
+    "a target that turns faster than it says": (
+        "target",
+        {
+            "Goal(params.attitude, ZERO, ZERO)": "Goal(params.attitude, (1e-3, 0.0, 0.0), ZERO)",
+            "def examples": "def motion(params):\n    return 1e-4, 0.0\n\n\ndef examples",
+        },
+        {"keeps_what_it_says"},
+    ),
     "a unit without the period": ("environment", {"def torque": PREPARED}, {"keeps_units"}),
 }  # fmt: skip
 

@@ -31,8 +31,8 @@ class Wanted:
     turn from rest up to this (rad); inertia_tolerance: the box; disturbance: norm of an unmodelled torque (N m); momentum:
     norm of the total angular momentum in claims about wheels (N m s), if absent that of the start; stored: what wheels store
     when a mode ends because of it (N m s); pointing: the pointing bound of the loop as it flies, which takes seconds, and is
-    always claimed with a disturbance; alone: only that; like: that claim, with the start set and the limits of another
-    loop's claim."""
+    always claimed with a disturbance; begun: the rate (rad/s) at which its motions begin, if that is not the start's; alone:
+    only that claim; like: that claim, with the start set and the limits of another loop's claim."""
 
     rate: float | None = None
     slew_angle: float | None = None
@@ -41,6 +41,7 @@ class Wanted:
     momentum: float | None = None
     stored: float = inf
     pointing: bool = False
+    begun: float | None = None
     alone: bool = False
     like: Claim | None = None
 
@@ -97,12 +98,12 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
         claims.append(undecided("convergence", EVERYWHERE, subject, REMEMBERS))
     unflown = REMEMBERS if loop.remembers else unsound
     if not unflown and wanted.alone:
-        claim, reason = pointed(subject, wanted.like)
+        claim, reason = pointed(subject, wanted.like, wanted.begun)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
     elif not unflown:
         pointing = wanted.pointing or wanted.disturbance > 0.0
         told = wanted.slew_angle, wanted.rate, wanted.inertia_tolerance
-        proved, failed = proved_claims(subject, *told, pointing)
+        proved, failed = proved_claims(subject, *told, pointing, wanted.begun)
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted, proved, failed))
         else:

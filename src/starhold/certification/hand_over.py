@@ -2,20 +2,24 @@
 in the region from which this law brings the body to rest on target."""
 
 from collections.abc import Mapping
+from math import inf
 from typing import TypeAlias
 
-from starhold.certification.certificate import Certificate
+from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.certify import between_samples, undecided
 from starhold.certification.proofs import taken_over
-from starhold.certification.subject import described, described_target, make_subject
-from starhold.certification.unmodelled import READ, named
+from starhold.certification.subject import above, described, make_subject
+from starhold.certification.unmodelled import is_read, named
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
+from starhold.parts.part import same_numbers
 
 Ends: TypeAlias = tuple[float | None, float | None]
 """Rate (rad/s) and angle (rad) up to which a switch hands over; None for no bound."""
 ROUNDING = 2.0**-45
 """The largest relative error of a rate or an angle that a law computes, for angles up to `WIDEST`."""
+TESTS = {"rate_below": "rate_error", "body_rate_below": "rate_error", "angle_below": "attitude_error"}
+"""The tests of a switch that bound a rate or an angle, with the error in a claim of what they look at."""
 WIDEST = 3.0
 """The largest angle (rad) that its sine determines."""
 
@@ -36,16 +40,28 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     return Certificate(name, described(subject), named(claims, loop))
 
 
+def flown_ends(
+    levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop, last: Claim | None, claim: Claim | None
+) -> tuple[float, float]:
+    """Return the rate and angle, relative to the target of the next mode, up to which a switch hands over as the loop flies;
+    inf for no bound. last: the claim of the mode before, if that has settled; claim: that of the next mode, which has the
+    errors of what the tests look at."""
+    errors = {name: 0.0 if claim is None else claim.numbers[error] for name, error in TESTS.items()}
+    tested = {name: x + errors[name] for name, x in levels.items() if name in TESTS}
+    settled = {} if last is None else {"rate_below": last.numbers["rate"], "angle_below": last.numbers["angle"]}
+    found = [[inf if x is None else x for x in ends(told, before, after)] for told in (tested, settled)]
+    rate, angle = map(min, zip(*found, strict=True))
+    return rate, angle
+
+
 def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> Ends:
     """Return the rate and angle, relative to the target of the next mode, up to which the tests of a switch hold, allowing
     for rounding; None for no bound."""
-    last, target = described_target(before), described_target(after)
-    # For other targets the description is incomplete.
-    same = last == target and target["target"] in READ["target"]
-    still = target["target"] == "inertial"
-    rates = [levels.get("rate_below")] if same or (still and last["target"] == "inertial") else []
-    rates += [levels.get("body_rate_below")] if still else []
-    rate = min((rate for rate in rates if rate is not None), default=None)
+    one, other = before.target, after.target
+    same = is_read(one) and one.part == other.part and same_numbers(one.params, other.params)
+    turns = [above(make_subject(loop).target_rate) if is_read(loop.target) else inf for loop in (before, after)]
+    tests = {"rate_below": 0.0 if same else sum(turns), "body_rate_below": turns[1]}
+    rate = min((levels[name] + turn for name, turn in tests.items() if name in levels and turn < inf), default=None)
     angle = levels.get("angle_below") if same else None
     return (
         None if rate is None else rate * (1.0 + ROUNDING),

@@ -53,15 +53,17 @@ def proved_claims(
     rate: float | None = None,
     tolerance: float | None = None,
     pointing: bool = False,
+    begun: float | None = None,
 ) -> tuple[dict[str, Claim], dict[str, str]]:
     """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: proved ones,
     and refuted ones among the others; and why no evidence was found for other theorems. turn: the rotation that the set
     within limits must contain (rad); rate: up to which motions should converge from every attitude (rad/s, inf for any);
-    tolerance: of the inertia, by default the largest; pointing: whether to find the pointing bound of the loop as it flies.
+    tolerance: of the inertia, by default the largest; pointing: whether to find the pointing bound of the loop as it flies,
+    of motions that begin at the rate `begun` (rad/s).
     """
     loop = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
-        find_pointed(loop)
+        find_pointed(loop, begun=begun)
     find_refuted(loop, turn, rate)
     claims = met(checked(loop))
     # The refuted claim is the requested one; a weaker one may be proved.
@@ -69,11 +71,11 @@ def proved_claims(
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, loop.failed
 
 
-def pointed(subject: Subject, like: Claim | None = None) -> tuple[Claim | None, str]:
+def pointed(subject: Subject, like: Claim | None = None, begun: float | None = None) -> tuple[Claim | None, str]:
     """Return the pointing claim of a loop as it flies, or why no evidence was found. like: the claim of another loop, for
-    the same start set and limits."""
+    the same start set and limits; begun: the rate (rad/s) at which motions begin."""
     loop = Loop(subject)
-    find_pointed(loop, None if like is None or like.proof is None else like.proof.claim["numbers"])
+    find_pointed(loop, None if like is None or like.proof is None else like.proof.claim["numbers"], begun)
     return next(iter(checked(loop)), None), loop.failed.get(POINTS, "no proof was found")
 
 

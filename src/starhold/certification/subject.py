@@ -12,7 +12,7 @@ from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
-from starhold.certification.unmodelled import READ, assumed_away, envelope_of
+from starhold.certification.unmodelled import assumed_away, envelope_of, is_read
 from starhold.errors import InputError
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
@@ -96,7 +96,7 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
     }
     target = described_target(loop)
     # Claims leave other targets out by name, and are about one at rest.
-    name = target["target"] if target["target"] in READ["target"] else "inertial"
+    name = target["target"] if is_read(loop.target) else "inertial"
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
@@ -125,7 +125,7 @@ def described_target(loop: ClosedLoop) -> dict[str, Any]:
     """The target by its name, with its attitude if it rests and the knots that it follows if it has any; one that claims
     leave out as they name it."""
     part, knots = loop.target.part, followed(loop)
-    name = part.name if part.name in READ["target"] and part.file is None else f"{part.role} {loop.target.called}"
+    name = part.name if is_read(loop.target) else f"{part.role} {loop.target.called}"
     history = None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()}
     attitude = list(loop.target.params.attitude) if name == "inertial" else None
     return {"target": name, "attitude": attitude, "history": history}
@@ -268,7 +268,8 @@ def _target_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
         except ArithmeticError as reason:
             raise InputError("target", "history", str(reason), "attitudes closer together") from None
     if loop.target.part.name != "orbital":
-        return fmpq(0), fmpq(0)
+        tell = loop.target.part.hook("motion") if is_read(loop.target) else None
+        return (fmpq(0), fmpq(0)) if tell is None else tuple(map(exact, tell(loop.target.params)))  # pyright: ignore
     nearest, momentum, eccentricity, gravity = perigee(loop)
     # The orbital frame turns by h/r2, and this changes by -2 h r'/r3 with |r'| at most mu e/h.
     share, change, rate, acceleration = map(exact, band_of(loop))

@@ -136,7 +136,7 @@ def samples_of(loop: ClosedLoop) -> int:
 
 def assumed_away(loop: ClosedLoop) -> list[str]:
     """Return the parts of a loop that only claims of the kinds `BOUNDED` include, as role and name."""
-    return [_called(f) for f in _acting(loop) if not _is_read(f)]
+    return [_called(f) for f in _acting(loop) if not is_read(f)]
 
 
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
@@ -149,7 +149,7 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
             return tuple(f"{WITHOUT}{name}" for name in away)
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
-        absent = [f for f in _acting(loop) if not (_is_read(f) or f in noisy or _says(loop, f, envelope, f in estimated))]
+        absent = [f for f in _acting(loop) if not (is_read(f) or f in noisy or _says(loop, f, envelope, f in estimated))]
         share = band_of(loop).share
         return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []))
 
@@ -170,8 +170,12 @@ def _called(fitted: Fitted) -> str:
     return f"{fitted.part.role} {fitted.called}"
 
 
-def _is_read(fitted: Fitted) -> bool:
-    return fitted.part.name in READ.get(fitted.part.role, ()) and fitted.part.file is None
+def is_read(fitted: Fitted) -> bool:
+    """Whether theorems model a part: by its name, or a target by bounds of its motion."""
+    part = fitted.part
+    if part.role == "target" and (tell := part.hook("motion")) is not None:
+        return all(map(isfinite, tell(fitted.params)))
+    return part.name in READ.get(part.role, ()) and part.file is None
 
 
 def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool) -> bool:
@@ -200,7 +204,7 @@ def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | Non
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
     found = [None if tell is None else tell(fitted.params, envelope) for tell in tells]
-    torque, error = (push if push is None or _is_read(fitted) or all(map(isfinite, push)) else None for push in found)
+    torque, error = (push if push is None or is_read(fitted) or all(map(isfinite, push)) else None for push in found)
     return torque, error
 
 

@@ -33,10 +33,11 @@ def certify(
     Exit code 0: every claim is proved; 3: one is refuted, with the state that refutes it; 4: one is undecided."""
     from starhold.certification.wording import recheck
     from starhold.cli.console import console
-    from starhold.cli.show_certificates import print_certificate
+    from starhold.cli.show_certificates import print_certificate, print_chain
     from starhold.report.results import open_folder, write_lemmas, write_proofs
     from starhold.scenario.reading import load
     from starhold.studies.certificates import certify_scenario
+    from starhold.studies.chain import chains
 
     scenario = load(file, allow_unstable)
     folder = open_folder(output or Path("results") / f"{scenario.name}-certificate", force)
@@ -44,6 +45,8 @@ def certify(
     for one in tried:
         print_certificate(one, why)
     certificates = [one.certificate for one in tried]
+    for name, links in chains(scenario, certificates, law).items():
+        print_chain(name, links)
     path = write_proofs(certificates, scenario.name, folder)
     console.print(f"Certificate: {path}. Re-check it: {recheck(certificates, path)}", soft_wrap=True)
     for file_of_lemmas in write_lemmas(folder) if rocq else ():

@@ -28,11 +28,13 @@ from starhold.cli.show import print_rows, printable
 from starhold.report.commands import Column, coloured
 from starhold.report.commands import Table as Rows
 from starhold.report.text import unflown_text
+from starhold.studies.chain import summary
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
     from starhold.checker import Finding
     from starhold.studies.certificates import Tried
+    from starhold.studies.chain import Link
     from starhold.studies.flight import Flight
 
 LONGEST = 1_000
@@ -69,6 +71,17 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
         console.print(f"  this scenario starts outside the regions of these claims: {', '.join(outside)}")
     if trial is not None:
         console.print(f"  [dim]flown: {trial.flights} states of the certified set, none against the claim[/dim]")
+    console.print()
+
+
+def print_chain(name: str, links: Sequence[Link]) -> None:
+    """Print of each switch between the modes of a law whether what is proved of the next one as it flies begins there."""
+    console.print(f"[bold]{_safe(name)}[/bold]: {summary(links)}:")
+    table = _grid()
+    for link in links:
+        word = "undecided" if link.lacks else "proved"
+        table.add_row(f"  {coloured(word)}", _safe(f"{link.before} to {link.after}"), _safe(link.text))
+    console.print(table)
     console.print()
 
 

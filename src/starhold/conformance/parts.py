@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from starhold.algebra.quaternion import conjugate, multiply, to_reference, vector_part
+from starhold.algebra.quaternion import NO_TURN, conjugate, multiply, to_reference, vector_part
 from starhold.algebra.structure import flatten, leaves
 from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtract
 from starhold.certification.unmodelled import COMMANDED, envelope_of
@@ -213,10 +213,14 @@ def draws_in_its_range(part: Part) -> None:
 
 
 def keeps_what_it_says(part: Part) -> None:
-    """No torque is larger than its `bound`, and no error than its `error`, beside its `noise`."""
-    tell_torque, tell_errors = part.hook("bound"), part.hook("error")
-    if tell_torque is None and tell_errors is None:
-        raise NotApplicableError("it says no bound of its torque or of its errors")
+    """No torque is larger than its `bound`, no error than its `error`, beside its `noise`, and no motion of a target than
+    its `motion`."""
+    tell_torque, tell_errors, tell_motion = part.hook("bound"), part.hook("error"), part.hook("motion")
+    if tell_torque is None and tell_errors is None and tell_motion is None:
+        raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
+    if tell_motion is not None:
+        _moves_as_it_says(part)
+        return
     for params in part.examples():
         loop = loop_with(part, params)
         # In a few steps torques from outside bring in little.
@@ -232,6 +236,17 @@ def keeps_what_it_says(part: Part) -> None:
         require(min(limits) >= 0.0, f"the bounds {limits} are not all positive or 0")
         for name, size, bound in _pushes(part, loop, errors, torque, command):
             require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
+
+
+def _moves_as_it_says(part: Part) -> None:
+    """A target's rate and acceleration are within its `motion` at some instants of a year."""
+    for params in part.examples():
+        loop, tell = loop_with(part, params), cast(Any, part.hook("motion"))
+        numbers, module, seen = Fitted(part, params).prepared(loop.period), cast(Any, part.module), NO_TURN
+        for step in np.linspace(0.0, 3e7 / loop.period, 20 * STEPS):
+            seen, *motion = module.goal(numbers, loop.start, int(step), seen)
+            for name, moved, most in zip(("rate", "acceleration"), motion, tell(params), strict=True):
+                require(norm(moved) <= most * (1.0 + 1e-9), f"the {name} is {norm(moved):g}, larger than {most:g}")
 
 
 def _pushes(part: Part, loop: ClosedLoop, errors: Errors, torque: Push, command: Push) -> Iterator[tuple[str, float, float]]:

@@ -8,14 +8,15 @@ Docs/kernel.md, 10.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
 from .loops import AXES, NONE, AttitudeLoop, slopes
 from .numbers import Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
-from .polynomials import Poly, apply, dot, minus, most, var, variables
+from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
 from .regions import (
     ANGLE,
     RATE,
@@ -25,6 +26,7 @@ from .regions import (
     Radii,
     Region,
     Sizes,
+    Tube,
     felt,
     first,
     growing,
@@ -36,7 +38,8 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT = Fraction(8)
+WEIGHT, ORDER, LONG = Fraction(8), 4, 1000
+MOMENTA = ("h1", "h2", "h3")
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
 AROUND = [
@@ -44,30 +47,6 @@ AROUND = [
     *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
 ]
 """The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
-
-
-@dataclass(frozen=True)
-class Tube:
-    """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
-    drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
-    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time.
-    Of what is held, `uneven` has not what errors that noise drives add linearly. `bent` bounds the slopes of the
-    gyroscopic acceleration in the rates."""
-
-    region: Region
-    sizes: Sizes
-    drift: list[Fraction]
-    turned: Fraction
-    held: Fraction
-    pushed: Fraction
-    stale: Fraction
-    uneven: Fraction
-    bent: Rows
-
-    @property
-    def push(self) -> Fraction:
-        """Return the bound of all together, in the mean."""
-        return self.held + self.pushed + self.stale
 
 
 class Near(NamedTuple):
@@ -124,14 +103,8 @@ class Held:
         self.gyroscopic = [-p - q for p, q in zip(free, turning, strict=True)]
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
         self.bend = apply(self.N, self.gyroscopic)
-        # V' to V'''' while the acceleration u is held.
-        acceleration = [u - g for u, g in zip(variables("u"), self.bend, strict=True)]
-        self.rates = [loop.slopes_along(V, acceleration)]
-        for _ in range(3):
-            self.rates.append(loop.slopes_along(self.rates[-1], acceleration))
-        mean = self.rates[0] + self.h / 2 * self.rates[1] + self.h * self.h / 6 * self.rates[2]
+        self.rate = loop.slopes_along(V, self.accelerated)
         held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
-        self.mean = mean.at(held)
         # What the law's torque has beside that near its target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
         self.unlike = [p.at(on) for p in minus(loop.u, linear)]
@@ -143,33 +116,63 @@ class Held:
         self.speeding = [(p - g - own).at(on) for p, g, own in zip(self.pull, self.bend, rates, strict=True)]
         parts = zip(self.u, self.more, linear, self.gyroscopic, self.turning, strict=True)
         self.left = [(p + more - own - g - turning).at(on) for p, more, own, g, turning in parts]
-        steep = [self.rates[0].slope(name).at(held).at(on) for name in STATE[RATE]]
-        self.curvature = {name: [self.rates[0].slope(name).slope(other) for other in ("q0", *STATE)] for name in STATE[RATE]}
+        steep = [self.rate.slope(name).at(held).at(on) for name in STATE[RATE]]
+        bent = ("q0", *STATE, *MOMENTA)
+        self.curvature = {name: [self.rate.slope(name).slope(other) for other in bent] for name in STATE[RATE]}
         at = dict.fromkeys((*STATE, "v", *self.others), 0)
         self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in steep]
         self.steep = minus(steep, apply(self.steepness, x))
+        # Without the first V is even in q, and motions stay where q0 > 0.
         self.s = -V.terms.get(("q0",), Fraction(0))
+        self.even = self.s == 0
         self.G = [[V.slope(i).slope(k).at(dict.fromkeys(STATE, 0)).number / 2 for k in STATE] for i in STATE]
         demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
         # What a torque does to V: felt x.
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
-        self.worked = dot(apply(self.felt, x), self.beside)
+        self.apart = minus(self.beside, turning), turning
+        self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.apart]
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
         demand(definite(self.under), "V is not least on target")
+
+    @property
+    def accelerated(self) -> list[Poly]:
+        """Return the acceleration while that at the sample is held."""
+        return [u - g for u, g in zip(variables("u"), self.bend, strict=True)]
+
+    @cached_property
+    def motion(self) -> tuple[Poly, Poly, Fraction]:
+        """Return V' in the mean of a period without pushes, up to a derivative of V', and that, with its share in the mean:
+        the law's torque is held, and wheels' momentum turns against the body."""
+        loop, rates, share = self.loop, [self.rate], Fraction(1)
+        carried = dict(zip(MOMENTA, cross(loop.H, loop.w), strict=True)) if loop.wheels else {}
+        mean = self.rate
+        while len(rates) < ORDER and len(rates[-1].terms) < LONG:
+            p = rates[-1]
+            more = total(p.slope(name) * x for name, x in carried.items())
+            rates.append(loop.slopes_along(p, self.accelerated) + more)
+            share *= self.h / (len(rates))
+            mean += share * rates[-1]
+        held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
+        return mean.at(held), rates[-1], share * self.h / (len(rates) + 1)
 
     def form(self, c: Fraction) -> Rows:
         """Return the matrix of x.Gx + c |q|^2."""
         return [[entry + c * (i == k > 2) for k, entry in enumerate(row)] for i, row in enumerate(self.G)]
 
     def region(self, c: Fraction) -> Region:
-        """Return what holds {V <= c}. Over w V is least s (1 - q0) + q.Sq, with S >= -lean, and |q|^2 <= 2 (1 - q0)."""
+        """Return what holds {V <= c}. Over w V is least s (1 - q0) + q.Sq, with S >= -lean, and |q|^2 <= 2 (1 - q0); without
+        s, where q0 > 0, with S >= stiff."""
         (ww, wq), (_, qq) = ([[row[b] for row in self.G[a]] for b in (RATE, TURN)] for a in (RATE, TURN))
         S = plus(qq, times(transpose(wq), times(inverse(ww), wq)), -1)
-        lean = max(Fraction(0), *(sum((abs(x) for x in S[i]), -S[i][i] - abs(S[i][i])) for i in AXES))
-        demand(self.s > 2 * lean and c >= 0, "V is not least on target")
-        least = 1 - up(c / (self.s - 2 * lean))
-        demand(least > -1, "a level holds the other quaternion of the target")
+        stiff = min(S[i][i] + abs(S[i][i]) - sum(map(abs, S[i])) for i in AXES)
+        lean = max(Fraction(0), -stiff)
+        demand((self.s > 2 * lean or (self.even and stiff > 0)) and c >= 0, "V is not least on target")
+        least = 1 - up(c / stiff if self.even else c / (self.s - 2 * lean))
+        demand(least > -(not self.even), "a level holds the other quaternion of the target")
+        if self.even:
+            # No root of a number below 1 is below it.
+            least = max(least, least / root(least))
         turn = root(1 - least * least) if least > 0 else Fraction(1)
         X = [[c * x for x in row] for row in inverse(self.under)]
         sizes = {name: root(X[i][i]) for i, name in enumerate(STATE)}
@@ -207,13 +210,28 @@ class Held:
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside, "both": outside + error}
 
-    def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
+    def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1) -> Fraction:
         """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
-        nothing on; the torque is at no time nearer than this to what the law is told."""
+        nothing on; the torque is at no time nearer than this to what the law is told. turning: 0 without what the body's own
+        rate does to momentum."""
         e, r, a, H = (self.size(letter) for letter in "erah")
         w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
-        change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
+        turned = (turning * w + r) * H + e + outside
+        change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": 2 * e}
         return sum((felt(parts, letter, sizes) * x for letter, x in change.items()), Fraction(0))
+
+    def unlike_body(self, sizes: Sizes, parts: Sequence[list[Poly]]) -> tuple[Fraction, Fraction]:
+        """Return `stale` of two parts, of which the second follows momentum that turns with the body as without pushes; and
+        what is more for each rate that pushes add until the end of a period."""
+        steady, turning = parts
+        calm = self.stale(sizes, steady) + self.stale(sizes, turning, 0)
+        return calm, felt(turning, "h", sizes) * self.h / 4 * self.size("h")
+
+    def speeds(self, sizes: Sizes) -> Sizes:
+        """Return how fast the variables of a motion without pushes change at most."""
+        w = sizes[SPEED]
+        found = dict.fromkeys(("q0", *STATE[TURN]), w / 2) | dict.fromkeys(MOMENTA, w * self.size("h"))
+        return found | {x: sizes[f"u{k + 1}"] + most(self.bend[k], sizes) for k, x in enumerate(STATE[RATE])}
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
@@ -223,6 +241,7 @@ class Held:
         even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
         odd = [most(p, near) for p in self.odd]
         held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
+        begun = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
         steady, uneven = self.misread(region)
         rigid = sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
         steady, uneven = steady + rigid + self.lasting, uneven + rigid + self.lasting
@@ -235,13 +254,16 @@ class Held:
         def reached(wide: list[Fraction]) -> list[Fraction]:
             own = within(wide)
             push = steady + self.pushed(own)["both"] + self.stale(own, self.beside)
-            columns = zip(STATE[RATE], held.values(), widths, self.bend, strict=True)
-            return [sizes[x] + self.h * (u + push * n + most(g, own)) for x, u, n, g in columns]
+            slopes = [[most(p.slope(name), own) for name in STATE[RATE]] for p in self.bend]
+            further = reach(slopes, [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)])
+            columns = zip(STATE[RATE], begun, further, widths, strict=True)
+            return [sizes[x] + self.h * (u + more + push * n) for x, u, more, n in columns]
 
         wide = settled(reached, [sizes[name] for name in STATE[RATE]])
         far = within(wide)
         turned = self.h / 2 * far[SPEED]
         far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | held
+        demand(not self.even or region.least > turned, "motions pass a half turn")
         drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
         bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
@@ -249,17 +271,22 @@ class Held:
 
     def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
-        h, region, L = self.h, tube.region, self.rates[0]
+        h, region, L, (mean, last, share) = self.h, tube.region, self.rate, self.motion
         near = region.sizes | {"v": 1 - region.least}
         push = tube.held + tube.pushed
         demand(push > 0, "nothing pushes")
-        # How far pushes take the rates from where they go without.
-        pushed = [tube.push * norm(row) for row in self.N]
-        away = settled(lambda d: [h * (x + y) for x, y in zip(pushed, reach(tube.bent, d), strict=True)])
+        # How far pushes take the rates from where they go without: momentum turns with the body, less what they do to that.
+        widths, (calm, slower) = [norm(row) for row in self.N], self.unlike_body(tube.sizes, self.apart)
+        away = settled(
+            lambda d: [
+                h * ((push + calm + slower * norm(d)) * n + y) for n, y in zip(widths, reach(tube.bent, d), strict=True)
+            ]
+        )
         slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
-        moved = [*tube.drift, *[tube.turned] * 3]
+        moved = [*tube.drift, *[tube.turned] * 3, *[h * tube.sizes[SPEED] * self.size("h")] * 3]
         # What changes of momentum do to V, which is less than what their torques do to the body.
-        rest = h**3 / 24 * most(self.rates[3], tube.sizes) + self.stale(tube.sizes, [self.worked])
+        calm, slower = self.unlike_body(tube.sizes, self.worked)
+        rest = calm + slower * norm(away) + share * fastest(last, tube.sizes, self.speeds(tube.sizes))
         # What pushes do to V grows with what the state does in the period: linearly, and what is left.
         drift = self.astray(tube)
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
@@ -276,14 +303,12 @@ class Held:
         F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        return least_form(-self.mean, region), over, F, push * root(1 + 2 / WEIGHT), rest
+        return least_form(-mean, region), over, F, push * root(1 + 2 / WEIGHT), rest
 
     def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""
         sizes = tube.sizes
-        return most(self.rates[0], sizes) + (tube.push + tube.stale) * norm(
-            reach(self.felt, [sizes[name] for name in STATE])
-        )
+        return most(self.rate, sizes) + (tube.push + tube.stale) * norm(reach(self.felt, [sizes[name] for name in STATE]))
 
     def astray(self, tube: Tube, lasting: Fraction = Fraction(0)) -> list[Fraction]:
         """Return how far the rates are in a period from where the acceleration that is linear in the sample, and that of a

@@ -164,6 +164,16 @@ def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     return up(Fraction(bound, 1 << places))
 
 
+def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fraction]) -> Fraction:
+    """Return a number that |p'| does not exceed where variables besides change no faster than at their speeds, and others do
+    not change."""
+    moving = [name for name in speeds if name in p.names]
+    shares = {name: up(speeds[name] / sizes[name]) for name in moving if sizes[name]}
+    along = Poly({m: c * sum((shares.get(name, 0) for name in m), Fraction(0)) for m, c in p.terms.items()})
+    still = (most(p.slope(name), sizes) * speeds[name] for name in moving if not sizes[name])
+    return sum(still, most(along, sizes))
+
+
 def multiple(p: Poly, s: Poly) -> tuple[Fraction, Fraction]:
     """Return f and c with p = f s + c; f is 0 where there are none."""
     first = max(s.terms, key=len)

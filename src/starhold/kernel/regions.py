@@ -37,6 +37,30 @@ class Region:
         return Region(widened(X, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
 
 
+@dataclass(frozen=True)
+class Tube:
+    """Motions from a region stay in a tube for a period: its sizes (u of the acceleration that is held), how far the rates
+    drift, how far q turns, and the torques beside those that vanish with the state: what is held, what comes at any time,
+    and by how much target, momentum and a torque that is told change all that: in the mean, and twice that at any time.
+    Of what is held, `uneven` has not what errors that noise drives add linearly. `bent` bounds the slopes of the
+    gyroscopic acceleration in the rates."""
+
+    region: Region
+    sizes: Sizes
+    drift: list[Fraction]
+    turned: Fraction
+    held: Fraction
+    pushed: Fraction
+    stale: Fraction
+    uneven: Fraction
+    bent: Rows
+
+    @property
+    def push(self) -> Fraction:
+        """Return the bound of all together, in the mean."""
+        return self.held + self.pushed + self.stale
+
+
 def least_form(p: Poly, region: Region) -> Rows:
     """Return the matrix of a form that p is not below: two factors of x are taken out of every monomial, what is left lies
     in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""

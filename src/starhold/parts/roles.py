@@ -236,6 +236,10 @@ class Target(Protocol):
         """The goal at a control step; before: its attitude at the step before where it follows that, else nothing."""
         ...
 
+    def motion(self, params: Any, /) -> tuple[float, float]:
+        """The largest rate (rad/s) and acceleration (rad/s2) of its attitude over the whole flight."""
+        ...
+
 
 class Actuator(Protocol):
     """An actuator turns the command of a law into the one that acts. One without `rates` changes the command at control

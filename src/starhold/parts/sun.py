@@ -25,6 +25,11 @@ UNIT = 1.495978707e11
 """The astronomical unit, m."""
 PRESSURE = 1361.0 / 299792458.0
 """The pressure of sunlight on an absorbing surface, at one astronomical unit, N/m2 (Kopp and Lean 2011)."""
+FASTEST, QUICKENING = 2.07e-7, 2e-15
+"""Bounds of the rate of the Sun's direction (rad/s), 1.0193 deg a day at the perihelion, and of that rate's derivative
+(rad/s2), by the almanac and by the series."""
+STEEPEST = radians(23.45)
+"""No smaller than the angle of the ecliptic to the equator."""
 STRONGEST = PRESSURE / 0.983**2
 """This pressure at the perihelion, rounded up."""
 RADIUS, EARTH = BODIES["Sun"].radius, BODIES["Earth"].radius

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from starhold.algebra.structure import leaves
 from starhold.analysis.mode_notes import Span, span
 from starhold.laws.conditions import Facts, Sight, Watch, needs_sky, sky_at, station_at
 from starhold.laws.modes import Modes, Switch
 from starhold.loop.modes import loop_of_mode
+from starhold.parts.craft import tensor
 from starhold.parts.epoch import Date, date_after
 from starhold.parts.outage import NEVER
 from starhold.scenario.requirement import BEGINS, column_of, is_of_a_part
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 NEXT = "another mode begins"
 SEEN = 2_000
 """The number of samples of a run at which conditions that never held are looked at again."""
+SPARE, SLOW = 1.05, math.radians(0.2)
+"""The margin of a rate that a mode hands over, and the least rate (rad/s) from which the next mode is to be proved."""
 STORED = "wheel_momentum_above"
 """The test of a switch for the wheels' momentum."""
 
@@ -167,13 +169,16 @@ def named_modes(loop: ClosedLoop, name: str) -> dict[str, ClosedLoop]:
 
 
 class HandOver(NamedTuple):
-    """A switch from a mode to another, counted from 0, with the loops of both and the levels of its tests (rad/s, rad)."""
+    """A switch from a mode to another, counted from 0, with the loops of both, the levels of its tests (rad/s, rad), and the
+    least time in the mode before (s); `key`: "until" or "back"."""
 
     name: str
     places: tuple[int, int]
     before: ClosedLoop
     after: ClosedLoop
     levels: dict[str, float]
+    least: float
+    key: str
 
 
 def hand_overs(loop: ClosedLoop, name: str) -> list[HandOver]:
@@ -186,22 +191,34 @@ def hand_overs(loop: ClosedLoop, name: str) -> list[HandOver]:
             loop_of_mode(loop, place),
             loop_of_mode(loop, switch.to),
             dict(zip(switch.keys, levels, strict=True)),
+            least,
+            switch.key,
         )
         for place, (mode, _, switches) in enumerate(module.parts(loop.gains))
-        for switch, (_, _, *levels) in switches
+        for switch, (least, _, *levels) in switches
     ]
 
 
 def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     """The certificates of the law of each mode, and of each switch whose next mode is known to converge."""
     from starhold.certification.certify import certify
-    from starhold.certification.hand_over import hand_over
+    from starhold.certification.hand_over import flown_ends, hand_over
 
-    issued: list[Issued] = []
+    issued, switches, flown = list[Issued](), hand_overs(loop, name), list[Any]()
     for place, (title, mode_loop) in enumerate(named_modes(loop, name).items()):
-        kept = replace(wanted, stored=most_stored(loop, place))
-        issued.append(Issued(certify(mode_loop, title, kept), mode_loop, mode=place + 1))
-    for one in hand_overs(loop, name):
+        # What modes before hand over, as far as they come before it, and a little more for errors.
+        rates = [
+            flown_ends(one.levels, one.before, one.after, flown[one.places[0]], None)[0] * SPARE
+            for one in switches
+            if one.places[1] == place and one.key == "until" and one.places[0] < place
+        ]
+        begun = max([SLOW, *(rate for rate in rates if rate < math.inf)]) if place else None
+        kept = replace(wanted, stored=most_stored(loop, place, begun or 0.0), begun=begun)
+        certificate = certify(mode_loop, title, kept)
+        issued.append(Issued(certificate, mode_loop, mode=place + 1))
+        claim = certificate.claim("pointing")
+        flown.append(claim if claim is not None and claim.outcome == "proved" else None)
+    for one in switches:
         certificate = hand_over(one.after, one.before, one.name, one.levels)
         if certificate is not None:
             before, after = one.places
@@ -209,18 +226,27 @@ def certify_modes(loop: ClosedLoop, name: str, wanted: Wanted) -> list[Issued]:
     return issued
 
 
-def most_stored(loop: ClosedLoop, place: int) -> float:
+def most_stored(loop: ClosedLoop, place: int, rate: float = 0.0) -> float:
     """Return the largest momentum of the wheels (N m s) at which a mode ends because of it; for a mode that does not, at
-    which another one ends to begin it; inf where none does. Claims about the mode assume no more."""
-    ends = [(one.places, one.levels[STORED]) for one in hand_overs(loop, "") if STORED in one.levels]
+    which another one ends to begin it; where none does, what the rotors and a body at this rate (rad/s) have, if the mode
+    follows one in which wheels are inactive; otherwise inf. Claims about the mode assume no more."""
+    switches = hand_overs(loop, "")
+    ends = [(one.places, one.levels[STORED]) for one in switches if STORED in one.levels]
     ending, beginning = ([level for places, level in ends if places[side] == place] for side in (0, 1))
-    return max(ending or beginning, default=math.inf)
+    idle = [fresh_momentum(one, rate) for one in switches if one.places[1] == place and one.key == "until"]
+    return max(ending or beginning or idle, default=math.inf)
 
 
-def same_numbers(one: Any, other: Any) -> bool:
-    """Whether two nested states hold the same numbers."""
-    pairs = [*leaves(one)], [*leaves(other)]
-    return len(pairs[0]) == len(pairs[1]) and all(map(np.array_equal, *pairs))
+def fresh_momentum(one: HandOver, rate: float) -> float:
+    """Return the largest momentum (N m s) with which a mode begins at this rate (rad/s) after one in which wheels are
+    inactive, so that their rotors keep what they have; inf after another one, and 0 without wheels."""
+    craft, wheels = one.after.craft, one.after.wheels
+    if wheels is None:
+        return 0.0
+    if one.before.wheels is not None:
+        return math.inf
+    rotors = np.array(one.after.rotors) @ np.array(wheels.axes)
+    return float(np.linalg.norm(rotors)) + float(np.linalg.eigvalsh(tensor(craft.inertia))[-1]) * rate
 
 
 def mode_departures(issued: Issued, run: Recording, fault: int | None) -> dict[str, tuple[Departure, ...]]:

@@ -25,12 +25,13 @@ from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import Pushes, driven_errors, pushes
-from starhold.kernel.held import Held, Tube, near_target
+from starhold.kernel.held import Held, near_target
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
-from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, widened
+from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, widened
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import image, periods, points
+from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
@@ -38,16 +39,19 @@ linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
 
 POINTS = "points"
-ANGLES = (175, 150, 120, 90, 60, 45, 30, 20, 15, 10)
+ANGLES = (175, 150, 120, 90, 75, 60, 45, 35, 30, 25, 20, 15, 10)
 """The initial rotations (deg) from which convergence is attempted."""
 RATES = (5, 3, 2, 1, 0.5)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
+NEARLY = 10.0
+"""A chain of levels is taken that ends below so many times its `aim`, and no other one is looked for."""
 LEAST = 1e-6
 """The deflection (rad) of a spring as stiff as the law under the least external torque that is considered."""
 NEARER = 0.25
 """A claim is made only if the ultimate bound is below this share of the largest rotation in the set."""
-LEANS = (0.1, 0.15, 0.2, 0.28)
-"""How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment)."""
+LEANS = (0.1, 0.18, 0.3, 0.45)
+"""How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment); the law's
+own V, if it is a form of q, takes the place of the first two terms."""
 FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.03, 7, 8.0, 20, 24, 2000
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
 the largest ratio of successive levels; the most levels and ellipsoids; the number of states of a set at which the torque is
@@ -73,7 +77,7 @@ class Chain:
 
     def aim(self) -> float:
         """Return the level that disturbances allow where all motions are nearly linear."""
-        found = self.lower(self.held.s / 2**20)
+        found = self.lower((self.held.s + self.held.G[3][3]) / 2**20)
         return inf if found is None else float(found[2])
 
     def decreases(self) -> bool:
@@ -195,15 +199,13 @@ class Chain:
         return 2.0 * half * MORE if half < 1.0 else inf, fastest
 
 
-def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
+def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float | None = None) -> bool:
     """Find the pointing bound of the loop under the disturbances of its parts and the requested ones, within its limits if
-    possible: from the largest rotations, at the rate of the loop's start or from rest. like: the numbers of a claim, for the
-    same start set and limits, and with noise if it includes noise."""
+    possible: from the largest rotations, at the rate `begun` (rad/s), by default that of the loop's start, or from rest.
+    like: the numbers of a claim, for the same start set and limits, and with noise if it includes noise."""
     if like is None:
-        begun = loop.loop.without("sensor", "estimator")
-        shown = make_step(begun.composition()).measure(begun.carry(), 0, 0, begun.craft, begun.setup())
-        rates = dict.fromkeys((float(np.linalg.norm(shown.rate)) * MORE, 0.0))
-        angles, beyond = list(map(radians, ANGLES)), list(map(radians, RATES))
+        rates = dict.fromkeys((start_rate(loop.loop) * MORE if begun is None else begun, 0.0))
+        angles, beyond = list(map(radians, ANGLES)), list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
         kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
@@ -224,6 +226,13 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None) -> bool:
     return False
 
 
+def start_rate(loop: ClosedLoop) -> float:
+    """Return the rate (rad/s), relative to its target, at which a loop starts."""
+    loop = loop.without("sensor", "estimator")
+    shown = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
+    return float(np.linalg.norm(shown.rate))
+
+
 class Pushed:
     """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
@@ -237,6 +246,9 @@ class Pushed:
         wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None), loop.by_digest))
         self.stiffness = feedback(wired)
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
+        law = loop.loop.law
+        # The law's own potential has no force beside the law's, however far from the target.
+        self.even = law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
         self.told: dict[str, Any] = {"period": loop.loop.period}
@@ -257,7 +269,7 @@ class Pushed:
 
     def held(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
-        V = self.loop.crossed(self.stiffness, epsilon)
+        V = self.loop.crossed(None if self.even else self.stiffness, epsilon)
         return V, Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
 
     def claim(self, V: str, told: dict[str, Any], **evidence: Any) -> dict[str, Any]:
@@ -279,12 +291,13 @@ class Pushed:
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
         """Return the claim's numbers of the start set, and a chain from there for each lean of V; None, and the reason in
         `failed`, where V does not decrease on the set or the torque exceeds its limits."""
-        loop, J, begun = self.loop, self.J, list[Chain]()
+        loop, J, begun, half = self.loop, self.J, list[Chain](), min(angle, pi) / 2.0
         told = self.told | limits
         told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
         for epsilon, V, held, found in self.leans:
-            lean = epsilon * sin(min(angle, pi) / 2.0)
-            level = 4.0 * self.stiffness * sin(angle / 4.0) ** 2 + J * rate * (rate / 2.0 + lean)
+            rest = 2.0 * float(held.s) * sin(angle / 4.0) ** 2
+            rest += float(np.linalg.eigvalsh(floats(held.G)[TURN, TURN])[-1]) * sin(half) ** 2
+            level = rest + J * rate * (rate / 2.0 + epsilon * sin(half))
             begun.append(Chain(held, V, level * (1.0 + 1e-6), found))
         if begun[0].asks_more(limits):
             loop.failed[POINTS] = "the torque exceeds its limit"
@@ -304,7 +317,7 @@ class Pushed:
             return False
         told, begun = start_of
         for chain in begun:
-            if chain.descend() < 4.0 * chain.aim():
+            if chain.descend() < NEARLY * chain.aim() and chain.levels:
                 break
         else:
             chain = min(begun, key=lambda one: float(Fraction(one.levels[-1]["end"])) if one.levels else inf)

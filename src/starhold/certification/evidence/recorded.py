@@ -107,35 +107,28 @@ class RecordedLoop:
         self.written_by[digest_of] = WRITTEN | {"stiffness": stiffness}
         return digest_of
 
-    def crossed(self, s: float, epsilon: float) -> str:
-        """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw."""
+    def crossed(self, s: float | None, epsilon: float) -> str:
+        """Record V = w.Jw/2 + 2 s (1 - q0) + epsilon q.Jw, or without s the law's own V and epsilon q.Jw."""
+        loop = self.loop
 
-        def energy(measurement: Measurement, craft: Any) -> Any:
+        def energy(measurement: Measurement, craft: Any, gains: Any = None) -> Any:
             lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
-            return (
-                rigid_body.kinetic_energy(measurement.rate, craft)
-                + 2.0 * s * (1.0 - measurement.attitude[0])
-                + epsilon * lean
-            )
+            if s is None:
+                return loop.law.lyapunov(measurement, gains, craft) + epsilon * lean  # pyright: ignore
+            potential = 2.0 * s * (1.0 - measurement.attitude[0])
+            return rigid_body.kinetic_energy(measurement.rate, craft) + potential + epsilon * lean
 
-        digest_of = self.add(energy, measurement=ASKED, craft=self.plant)
-        self.written_by[digest_of] = WRITTEN | {"stiffness": s, "epsilon": epsilon}
+        more: dict[str, Any] = {"gains": loop.gains} if s is None else {}
+        digest_of = self.add(energy, measurement=ASKED, craft=self.plant, **more)
+        self.written_by[digest_of] = WRITTEN | ({} if s is None else {"stiffness": s}) | {"epsilon": epsilon}
         return digest_of
 
     def leaning(self, share: float) -> str:
         """Record the law's own V and epsilon q.Jw, at most this share of it."""
-        loop, form = self.loop, self.form(self.lyapunov())
-        scaled: Any = np.linalg.solve(np.linalg.cholesky(curvature(form, "w")), tensor(loop.craft.inertia))
+        form = self.form(self.lyapunov())
+        scaled: Any = np.linalg.solve(np.linalg.cholesky(curvature(form, "w")), tensor(self.loop.craft.inertia))
         most = float(np.linalg.norm(scaled, 2))
-        epsilon = float(f"{share * sqrt(-float(form.terms.get(('q0',), 0)) / 2.0) / most:.3g}")
-
-        def energy(measurement: Measurement, gains: Any, craft: Any) -> Any:
-            lean = dot(vector_part(measurement.attitude), apply(craft.inertia, measurement.rate))
-            return loop.law.lyapunov(measurement, gains, craft) + epsilon * lean  # pyright: ignore
-
-        digest_of = self.add(energy, measurement=ASKED, gains=loop.gains, craft=self.plant)
-        self.written_by[digest_of] = WRITTEN | {"epsilon": epsilon}
-        return digest_of
+        return self.crossed(None, float(f"{share * sqrt(-float(form.terms.get(('q0',), 0)) / 2.0) / most:.3g}"))
 
     @cached_property
     def subject(self) -> dict[str, str]:

@@ -17,6 +17,9 @@ from .attitude import contents
 from .limits import within_limits
 from .noise import SHARE, within_radii
 
+HALF_TURN = Fraction(314, 100)
+"""At most a half turn (rad)."""
+
 
 def points(claim: Claim) -> Proof:
     """Every motion from {V <= level} has V <= highest at all times, and after the time `settling` it is at all times turned
@@ -30,6 +33,8 @@ def points(claim: Claim) -> Proof:
     yield from loop.sound()
     held, numbers, samples = Held(loop), claim.numbers, 0
     c, h = numbers["level"], held.h
+    starts = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
+    demand(not held.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     start = yield from contents(loop, loop.lyapunov)
     region = held.region(c)
     limited = yield from within_limits(loop, held.misread(region)[0])
@@ -88,8 +93,9 @@ def points(claim: Claim) -> Proof:
     kinds = [("attitude that it is told", held.turned, "rad"), ("rate", held.rated, "rad/s")]
     kinds += [("target's rate", held.led, "rad/s"), ("target's acceleration", held.hurried, "rad/s2")]
     told += [f"of the {name} of up to {below(x)} {unit}" for name, x, unit in kinds if x]
+    begun = below(numbers["level"]) + ", q0 > 0" * held.even
     text = (
-        f"every motion from {{V <= {below(numbers['level'])}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
+        f"every motion from {{V <= {begun}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
         f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside"
         f" {most('outside')} and {enumerated(told)}"

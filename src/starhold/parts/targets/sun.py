@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import atan2, inf, sin
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion
@@ -60,6 +61,18 @@ def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
     """The attitude at this control step."""
     seen = towards_sun(number_of(step) * params.period, params.sun)
     return aligned(seen, Moving(params.reference, ZERO, ZERO), params.axes, before)
+
+
+def motion(params: Params) -> tuple[float, float]:
+    """Bounds of the rate (rad/s) and the acceleration (rad/s2) of the attitude; infinite for a reference that the Sun may
+    come to. At an angle x between them, a motion of the Sun by its rate turns the attitude by no more than it over sin x."""
+    across, up = norm((params.reference[0], params.reference[1], 0.0)), params.reference[2]
+    # The Sun is nowhere farther from the equator than the ecliptic.
+    off = atan2(abs(up), across) - sun.STEEPEST
+    if off <= 0.0:
+        return inf, inf
+    sine = sin(off)
+    return sun.FASTEST / sine, 2.0 * sun.QUICKENING / sine + 3.0 * (sun.FASTEST / sine) ** 2
 
 
 def examples() -> list[Params]:

@@ -12,6 +12,7 @@ from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_mete
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
 from starhold.parts.epoch import OF_DATE, iso_text
+from starhold.parts.part import same_numbers
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
@@ -23,7 +24,6 @@ from starhold.studies.modes import (
     mode_departures,
     named_modes,
     parts_asked,
-    same_numbers,
 )
 
 if TYPE_CHECKING:

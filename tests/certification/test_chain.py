@@ -1,0 +1,105 @@
+"""The chain of modes: whether what is proved of a mode as it flies begins where the mode before ends."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from starhold.scenario.building import build
+from starhold.scenario.reading import load, parse
+from starhold.studies.bodies.rigid_body import STUDY
+from starhold.studies.chain import chains, links_of, summary
+from starhold.studies.modes import fresh_momentum, hand_overs
+from tests.certification.handed import POINT, bounded
+from tests.certification.pointing_hunt import Attack
+from tests.missions import BASE, DETUMBLE
+
+NEXT = POINT.replace('"point"', '"hold"')
+
+
+def certified(scenario):
+    entry = scenario.laws[0]
+    loop = build(scenario, entry)
+    return loop, {one.certificate.name: one.certificate for one in STUDY.certify(scenario, entry, loop, pointing=True)}
+
+
+def chained(modes):
+    """The loop of a mission, its certificates, and the links of its modes."""
+    loop, found = certified(parse(BASE + modes, "mission.toml"))
+    return loop, found, links_of(loop, "mission", found)
+
+
+@pytest.fixture(scope="module")
+def missioned():
+    """Detumble, then point until it has settled, then hold the same target."""
+    point = POINT + 'until = { after = "30 min", angle_below = "1 deg" }\n'
+    return chained(bounded("0.5 deg/s", "20 deg") + point + NEXT)
+
+
+def test_a_mode_takes_over_where_its_claim_begins(missioned):
+    _, found, (first, second) = missioned
+    assert first.claim.numbers["rate_start"] >= first.rate >= math.radians(0.5)
+    assert first.claim.numbers["slew_angle"] >= first.angle >= math.radians(20.0)
+    # Nothing is proved of how detumbling ends.
+    assert (first.lacks, first.assumed) == ((), ("detumble ends",))
+    # What is proved of pointing is stronger than the test of its switch.
+    ended = found["mission: point"].claim("pointing").numbers
+    assert second.rate == pytest.approx(ended["rate"], rel=1e-9)
+    assert second.angle == pytest.approx(ended["angle"], rel=1e-9)
+    assert second.angle < math.radians(1.0)
+    assert (second.lacks, second.assumed) == ((), ())
+    assert summary([first, second]).startswith("as it flies, 2 of 2")
+
+
+def test_a_claim_that_begins_a_little_nearer_does_not_take_over(missioned):
+    loop, found, _ = missioned
+    for name, less in (("rate_start", math.radians(0.4999)), ("slew_angle", math.radians(19.999))):
+        claims = [
+            replace(one, numbers=one.numbers | {name: less}) if one.kind == "pointing" else one
+            for one in found["mission: point"].claims
+        ]
+        less_said = replace(found["mission: point"], claims=tuple(claims))
+        first, _ = links_of(loop, "mission", found | {"mission: point": less_said})
+        assert len(first.lacks) == 1
+        assert first.text.startswith("not taken over: detumble may end")
+
+
+def test_what_nothing_bounds_is_assumed_or_lacks(missioned):
+    loop, found, _ = missioned
+    first, second = links_of(loop, "mission", {name: one for name, one in found.items() if name != "mission: point"})
+    assert first.lacks == ("nothing is proved of point as it flies",)
+    assert second.lacks == ("nothing bounds the rate at which point ends",)
+    _, _, (first, second) = chained(DETUMBLE + POINT + 'until = { after = "1 s", angle_below = "1 deg" }\n' + NEXT)
+    assert first.assumed[0] == "detumble ends"
+    assert first.assumed[1].startswith("point begins within ")
+    assert second.assumed == (f"point lasts {first.claim.numbers['settling']:.4g} s",)
+
+
+def test_wheels_that_rest_in_a_mode_keep_what_they_have():
+    scenario = load("cubesat-mission")
+    loop = build(scenario, scenario.laws[0])
+    first, second = (one for one in hand_overs(loop, "") if one.key == "until" and one.places[0] < 2 and one.places[1] > 0)
+    # Of four rotors the parts along the axis of the pyramid add up.
+    assert fresh_momentum(first, 0.0) == pytest.approx(4 * 0.0025 / math.sqrt(3.0), rel=1e-6)
+    assert fresh_momentum(first, 0.1) - fresh_momentum(first, 0.0) == pytest.approx(0.065 * 0.1, rel=1e-3)
+    assert fresh_momentum(second, 0.0) == math.inf
+
+
+@pytest.mark.slow
+def test_the_mission_turns_to_the_sun_from_what_detumbling_leaves_and_no_flight_contradicts_it():
+    scenario = load("cubesat-mission")
+    _, found = certified(scenario)
+    (links,) = chains(scenario, list(found.values())).values()
+    assert [bool(link.lacks) for link in links] == [False, True, False, False]
+    assert "momentum" in links[1].text
+    assert links[0].rate > math.radians(0.5)
+    assert links[0].angle == math.inf
+    sun = found["mission: sun"].claim("pointing")
+    assert (sun.outcome, sun.left_out) == ("proved", [])
+    assert math.degrees(sun.numbers["angle"]) < 0.2
+    assert math.degrees(sun.numbers["slew_angle"]) > 24.0
+    for mode in ("sun", "nadir", "unload"):
+        claim = found[f"mission: {mode}"].claim("pointing")
+        broken, reached = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 1).worst()
+        assert not broken
+        assert min(reached[1:]) > 0.1
