@@ -115,7 +115,11 @@ class Held:
         self.slow = [with_momentum(p, "r") for p in left]
         self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
-        self.N = inverse(loop.given)
+        self.N, h = inverse(loop.given), self.h
+        # What torques at the beginning and at the end of a period do; one that is held does half of each all the while.
+        self.first, self.last = (
+            [[h / 2 * x for x in row] for row in self.N] + [[c * x for x in row] for row in self.N] for c in (h * h / 4, 0)
+        )
         # How large the slow torque is, how far a torque that lasts turns the body, and how far this one.
         self.lasting = felt(self.slow, "h", self.others) * self.size("h")
         stiff = [[-x for x in row[TURN]] for row in self.near.torque]
@@ -314,7 +318,7 @@ class Held:
         """Return pairs B, b such that samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with
         A between those of `corners`: less what noise adds linearly, at most `swayed`, and less where the slow torque alone
         would hold the body, at most `leant`."""
-        h, N, region = self.h, self.N, tube.region
+        h, region = self.h, tube.region
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
@@ -325,15 +329,20 @@ class Held:
         parts = zip((RATE, TURN), swayed, strict=True)
         swaying = h * sum((stretch([row[k] for row in self.near.rates]) * x for k, x in parts), Fraction(0))
         drift = norm(self.astray(tube, self.lasting)) + swaying
-        mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * drift / 2
-        uneven = 2 * mean - tube.pushed - odd
+        steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale
+        grown = felt(self.gyroscopic, "w", tube.sizes) * drift / 6
         # In a whole period momentum and target change by twice what they do in the mean.
         moved = 2 * self.soft * self.stale(tube.sizes, self.slow)
         return [
-            (self.near.B, tube.uneven - self.lasting + mean),
-            (scalar(0) + N, h * h / 8 * uneven),
+            (self.first, steady + 2 * grown),
+            (self.last, steady + 4 * grown + tube.stale / 3),
             (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2)) + moved),
         ]
+
+    def bend_between(self, tube: Tube) -> Fraction:
+        """Return how far q is at most, between two samples, from the straight line between them."""
+        fastest, sizes = norm(tube.drift) / self.h + tube.stale * stretch(self.N), tube.sizes
+        return self.h * self.h / 16 * (fastest + sizes[SPEED] ** 2 / 2 * sizes[ANGLE])
 
 
 def near_target(loop: AttitudeLoop, h: Fraction) -> Near:

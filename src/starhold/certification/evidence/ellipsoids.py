@@ -54,7 +54,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
         return shape(x)[0]
 
     sizes = [float(np.linalg.norm(B, 2)) for B in pushes]
-    weight = np.log(np.array([x / sizes[0] + 1e-12 for x in sizes] + [NEARLY]))
+    weight = np.log(np.array([x / sum(sizes) + 1e-12 for x in sizes] + [NEARLY]))
     begun = weight + np.vstack([np.zeros(len(weight)), np.eye(len(weight))])
     options = {"maxfev": 400, "initial_simplex": begun}
     optimize: Any = import_module("scipy.optimize")

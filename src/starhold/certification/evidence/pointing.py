@@ -188,7 +188,7 @@ class Chain:
             sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
         )
         fastest = (wide + drift / 2.0) * MORE
-        sine = (turned + float(self.held.h) / 4.0 * fastest) * MORE
+        sine = (turned + float(self.held.bend_between(tube))) * MORE
         half = sine
         for _ in range(60):
             half = sine + half**3 / 6.0

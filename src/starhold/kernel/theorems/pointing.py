@@ -72,8 +72,9 @@ def points(claim: Claim) -> Proof:
         tube, last, beside = held.tube(tube.region.within(X, away)), X, away
         within.append((h * samples, tube.sizes[ANGLE]))
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
-    # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.
-    near, slow = angle / 2 - angle**3 / 48 - h / 4 * fastest - beside[1], fastest - norm(tube.drift) / 2 - beside[0]
+    # Both samples next to a time lie in the region, and sin x >= x - x^3/6.
+    near = angle / 2 - angle**3 / 48 - held.bend_between(tube) - beside[1]
+    slow = fastest - norm(tube.drift) / 2 - beside[0]
     for name, most_of, part in (("angle", near, TURN), ("rate", slow, RATE)):
         demand(most_of > 0, f"the {name} is too small")
         yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in last[part]], -1))
