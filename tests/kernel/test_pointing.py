@@ -94,7 +94,7 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     assert (np.abs(x).max(axis=1) <= sizes).all()
     assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
     Q, H, F, pushed, rest = held.fall(tube)
-    Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(tube, AT_REST)
+    Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(tube, *AT_REST)
     # What F has beside the push is of its growth in a period.
     grown, A = float(pushed / (tube.held + tube.pushed)), held.near.A
     V = oracle.lyapunov(q, w)
@@ -165,6 +165,7 @@ def test_periods_are_enough_and_not_many(fall, floor, start, end):
 def one_level(numbers, told, **link):
     """A single level, from which no ellipsoid follows, and motions end where it says."""
     told["levels"], told["ellipsoids"] = [told["levels"][0] | link], []
+    del told["response"]
     numbers |= {"end.angle": 0.2, "end.rate": 0.2, "settling": 5.0}
 
 
@@ -177,26 +178,43 @@ def fast_fall(numbers, told):
     told["levels"] = [told["levels"][0] | {"end": str(Fraction(numbers["level"]) / 2**k)} for k in (1, 2, 3, 4, 5)]
 
 
+def enclosed(name, numbers, told):
+    """Ellipsoids follow the last level, in place of the response."""
+    held = held_loop(name)
+    chain, tube = Chain(held, "", 0.0), held.tube(held.region(Fraction(told["levels"][-1]["end"])))
+    del told["response"]
+    numbers["end.angle"], numbers["end.rate"] = chain.tighten(tube, AT_REST)
+    told["ellipsoids"] = chain.ellipsoids
+
+
 def small_ellipsoid(numbers, told):
+    enclosed("cubesat", numbers, told)
     last = told["ellipsoids"][-1]
     shrunk = {
         "shape": [[str(Fraction(x) / 4) for x in row] for row in last["shape"]],
         "reach": str(4 * Fraction(last["reach"])),
     }
     told["ellipsoids"].append(last | shrunk)
-    numbers |= {"end.angle": numbers["end.angle"] * 0.6, "settling": numbers["settling"] * 1.5}
+    numbers |= {"end.angle": numbers["end.angle"] * 0.6, "settling": 600.0}
 
 
 def wide_entry(numbers, told):
     """Ellipsoids follow one level down, and are said to hold it at once."""
-    held = held_loop("calm")
-    chain = Chain(held, "", 0.0)
     told["levels"] = [told["levels"][0] | {"end": str(Fraction(numbers["level"]) / 2)}]
-    numbers["end.angle"], numbers["end.rate"] = chain.tighten(
-        held.tube(held.region(Fraction(told["levels"][0]["end"]))), AT_REST
-    )
-    told["ellipsoids"] = [one | {"reach": "1000001/1000000"} for one in chain.ellipsoids]
+    enclosed("calm", numbers, told)
+    told["ellipsoids"] = [one | {"reach": "1000001/1000000"} for one in told["ellipsoids"]]
     numbers["settling"] = 15.0
+
+
+def small_response(part, end, gain, share):
+    """The loop is said to move less under pushes."""
+
+    def change(numbers, told):
+        gains = told["response"]["gains"]
+        gains[part] = [str(Fraction(number(x) * gain)) for x in gains[part]]
+        numbers[end] *= share
+
+    return change
 
 
 FALSE = {
@@ -206,6 +224,8 @@ FALSE = {
     "level": low_level,
     "ellipsoid": small_ellipsoid,
     "entry": wide_entry,
+    "response of the rate": small_response(0, "end.rate", 0.3, 0.5),
+    "response of the turn": small_response(1, "end.angle", 0.6, 0.65),
     "end of the angle": lambda numbers, told: numbers.update({"end.angle": 0.6 * numbers["end.angle"]}),
     "end of the rate": lambda numbers, told: numbers.update({"end.rate": 0.4 * numbers["end.rate"]}),
     "settling": lambda numbers, told: numbers.update(settling=numbers["settling"] / 50),

@@ -14,10 +14,11 @@ from itertools import product
 from typing import NamedTuple
 
 from .loops import AXES, NONE, AttitudeLoop, slopes
-from .numbers import Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
+from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, dot, minus, most, var, variables
 from .regions import (
     ANGLE,
+    PULL,
     RATE,
     SPEED,
     STATE,
@@ -116,10 +117,11 @@ class Held:
         self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
         self.N, h = inverse(loop.given), self.h
-        # What torques at the beginning and at the end of a period do; one that is held does half of each all the while.
-        self.first, self.last = (
+        # What torques at the beginning and at the end of a period do, half of each if they are held, and what turns do.
+        ends = (
             [[h / 2 * x for x in row] for row in self.N] + [[c * x for x in row] for row in self.N] for c in (h * h / 4, 0)
         )
+        self.ways: list[Rows] = [*ends, scalar(0) + scalar(1)]
         # How large the slow torque is, how far a torque that lasts turns the body, and how far this one.
         self.lasting = felt(self.slow, "h", self.others) * self.size("h")
         stiff = [[-x for x in row[TURN]] for row in self.near.torque]
@@ -139,6 +141,8 @@ class Held:
         # What the law's torque has beside that near its target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
         self.unlike = [p.at(on) for p in minus(loop.u, linear)]
+        self.spun = [with_momentum(p) for p in self.gyroscopic]
+        self.tumbled = minus(self.gyroscopic, self.spun)
         # What wheels' momentum makes of the rates, beside what the law's torque does about it.
         self.turning = [with_momentum(p - g) for p, g in zip(self.more, self.gyroscopic, strict=True)]
         # The acceleration at samples, what V' has of the rates, and that linearly.
@@ -225,6 +229,7 @@ class Held:
         near = sizes | {"v": 1 - region.least}
         # In an ellipsoid c.x is no more than the root of c.Xc.
         even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
+        even = [min(x, sizes.get(PULL, x)) for x in even]
         odd = [most(p, near) for p in self.odd]
         held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
         steady, uneven = self.misread(region)
@@ -308,36 +313,41 @@ class Held:
             at = {f"h{k + 1}": x * self.size("h") for k, x in enumerate(corner)}
             asked, turning = (
                 [[c * p.slope(name).at(at).number for name in STATE[RATE]] for p in parts]
-                for c, parts in ((1, self.turning), (-1, [with_momentum(p) for p in self.gyroscopic]))
+                for c, parts in ((1, self.turning), (-1, self.spun))
             )
             more = plus(times(B, beside(asked, scalar(0))), times(grown, times(turning, self.near.rates)))
             found.append(plus(A, more))
         return found
 
-    def linear(self, tube: Tube, swayed: Radii) -> list[tuple[Rows, Fraction]]:
+    def away(self, swayed: Radii) -> Radii:
+        """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
+        return swayed[0] + self.leant[0], swayed[1] + self.leant[1]
+
+    def pulled(self, radii: Radii) -> Fraction:
+        """Return a bound of the acceleration that is linear in a motion with these |w| and |q|."""
+        rows = self.near.rates
+        return added([stretch([row[k] for row in rows]) * x for k, x in zip((RATE, TURN), radii, strict=True)])
+
+    def linear(self, tube: Tube, fast: Fraction, pulled: Fraction) -> list[tuple[Rows, Fraction]]:
         """Return pairs B, b such that samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with
-        A between those of `corners`: less what noise adds linearly, at most `swayed`, and less where the slow torque alone
-        would hold the body, at most `leant`."""
+        A between those of `corners`: less what noise adds linearly, and less where the slow torque alone would hold the
+        body. fast, pulled: |w| of the motions to which momentum adds nothing in A, and what `pulled` returns of them."""
         h, region = self.h, tube.region
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
         odd = norm(most(p, near) for p in self.left)
-        odd += felt(self.turning, "w", near) * swayed[0]
-        # Rates drift from nothing on, too; what noise adds is not in A.
-        parts = zip((RATE, TURN), swayed, strict=True)
-        swaying = h * sum((stretch([row[k] for row in self.near.rates]) * x for k, x in parts), Fraction(0))
-        drift = norm(self.astray(tube, self.lasting)) + swaying
+        odd += felt(self.turning, "w", near) * fast
+        drift = norm(self.astray(tube, self.lasting)) + h * pulled
         steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale
-        grown = felt(self.gyroscopic, "w", tube.sizes) * drift / 6
+        # Of what momentum makes of the rates A has the rest of the drift.
+        grown = (felt(self.spun, "w", tube.sizes) * drift + felt(self.tumbled, "w", tube.sizes) * norm(tube.drift)) / 6
         # In a whole period momentum and target change by twice what they do in the mean.
         moved = 2 * self.soft * self.stale(tube.sizes, self.slow)
-        return [
-            (self.first, steady + 2 * grown),
-            (self.last, steady + 4 * grown + tube.stale / 3),
-            (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2)) + moved),
-        ]
+        rolled = h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))
+        sizes = steady + 2 * grown, steady + 4 * grown + tube.stale / 3, rolled + moved
+        return list(zip(self.ways, sizes, strict=True))
 
     def bend_between(self, tube: Tube) -> Fraction:
         """Return how far q is at most, between two samples, from the straight line between them."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
 from itertools import takewhile
 from math import inf, isfinite, pi, radians, sin, sqrt
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio
 from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
+from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import above
@@ -28,9 +29,11 @@ from starhold.certification.unmodelled import Pushes, driven_errors, pushes
 from starhold.kernel.held import Held, Tube, near_target
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
-from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, widened
+from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, balls, widened
+from starhold.kernel.rules import Part
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import image, periods, points
+from starhold.kernel.theorems.pointing import ROUNDS, image, periods, points
+from starhold.kernel.theorems.response import responds
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
@@ -55,6 +58,7 @@ examined.
 """
 
 
+T = TypeVar("T")
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 
 
@@ -69,6 +73,7 @@ class Chain:
     """The results of `lower`, for all chains of one V."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    response: dict[str, Any] = field(default_factory=dict[str, Any])
     samples: int = 0
 
     def aim(self) -> float:
@@ -130,9 +135,9 @@ class Chain:
         noise."""
         angle, fastest = self.ends(tube, tube.region.X)
         heed, corners = HEED, self.held.corners()
-        away = swayed[0] + self.held.leant[0], swayed[1] + self.held.leant[1]
+        away = self.held.away(swayed)
         for _ in range(ELLIPSOIDS):
-            pushes = self.held.linear(tube, swayed)
+            pushes = self.held.linear(tube, swayed[0], self.held.pulled(swayed))
             own = [floats(B) * float(b) for B, b in pushes]
             found = smallest(floats(self.held.near.A), np.array(list(map(floats, corners))), own, heed)
             if found is None:
@@ -160,6 +165,35 @@ class Chain:
             fall = 1 - Fraction(rate) * room
             self.samples += periods(fall, Fraction(rate) * (1 - room) / fall, Fraction(reach), Fraction(1))
             tube, (angle, fastest) = inner, end
+        return angle, fastest
+
+    def nearest(self, swayed: Radii) -> tuple[Chain, tuple[float, float]]:
+        """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
+        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
+        tube = self.held.tube(self.held.region(Fraction(self.levels[-1]["end"])))
+        one = replace(self)
+        found = [(one, one.respond(tube, swayed))]
+        if not one.response or self.held.loop.wheels:
+            found.append((self, self.tighten(tube, swayed)))
+        return min(found, key=lambda pair: pair[1][0])
+
+    def respond(self, tube: Tube, swayed: Radii) -> tuple[float, float]:
+        """Find how often the response brings motions nearer, and return the ultimate bounds."""
+        held, told = self.held, find_response(self.held)
+        away, rounds, pulled = held.away(swayed), 0, None
+        angle, fastest = self.ends(tube, tube.region.X)
+        response = None if told is None else concluded(responds(held, told["weights"], told["gains"]))
+        while told is not None and response is not None and rounds < ROUNDS:
+            try:
+                radii, pulled, inner = response.after(held, tube, swayed, pulled)
+            except RefusedError:
+                break
+            end = self.ends(inner, balls(radii), away)
+            if not end[0] < angle * 0.999:
+                break
+            tube, (angle, fastest), rounds = inner, end, rounds + 1
+            self.samples += response.count
+            self.response = {"response": told | {"rounds": rounds}}
         return angle, fastest
 
     def asks_more(self, limits: dict[str, float]) -> bool:
@@ -312,15 +346,24 @@ class Pushed:
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return False
         held, start = chain.held, Fraction(chain.level)
-        angle, fastest = chain.tighten(held.tube(held.region(Fraction(chain.levels[-1]["end"]))), self.swayed)
+        chain, (angle, fastest) = chain.nearest(self.swayed)
         told["level"] = chain.level
         told["highest"] = float(start + held.h / 2 * held.swing(held.tube(held.region(start)))) * MORE
         told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
         if not isfinite(angle) or angle > NEARER * told.get("angle", told.get("start.angle", 0.0)):
             loop.failed[POINTS] = "motions do not come near the target"
             return False
-        claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids)
+        claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
         return loop.try_to_show(claim, self.scales)
+
+
+def concluded(part: Part[T]) -> T:
+    """Return what follows from obligations that are taken to be met."""
+    while True:
+        try:
+            next(part)
+        except StopIteration as end:
+            return end.value
 
 
 def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:

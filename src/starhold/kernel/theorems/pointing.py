@@ -10,12 +10,16 @@ from ..held import Held
 from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
-from ..regions import ANGLE, AT_REST, RATE, TURN, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, balls, widened
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
 from .limits import within_limits
 from .noise import SHARE, within_radii
+from .response import responds
+
+ROUNDS = 64
+"""How often responses may be taken, each in the set that was found before."""
 
 
 def points(claim: Claim) -> Proof:
@@ -56,13 +60,13 @@ def points(claim: Claim) -> Proof:
         c, tube = end, held.tube(held.region(end))
         within.append((h * samples, tube.sizes[ANGLE]))
     last, beside, corners = tube.region.X, AT_REST, held.corners()
-    away = swayed[0] + held.leant[0], swayed[1] + held.leant[1]
+    away, pulled = held.away(swayed), None
     for k, told in enumerate(ellipsoids):
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        pushed = held.linear(tube, swayed)
+        pushed = held.linear(tube, swayed[0], held.pulled(swayed))
         for corner, A in enumerate(corners):
             after = image(X, shares, A, pushed)
             yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
@@ -71,6 +75,15 @@ def points(claim: Claim) -> Proof:
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
         tube, last, beside = held.tube(tube.region.within(X, away)), X, away
         within.append((h * samples, tube.sizes[ANGLE]))
+    if (told := claim.evidence.get("response")) is not None:
+        rounds, weights, gains = read_table(told, "rounds", "weights", "gains")
+        demand(type(rounds) is int and 0 < rounds <= ROUNDS, "a response is taken too often")
+        response = yield from responds(held, weights, gains)
+        for _ in range(rounds):
+            radii, pulled, tube = response.after(held, tube, swayed, pulled)
+            samples += response.count
+            within.append((h * samples, tube.sizes[ANGLE]))
+            last, beside = balls(radii), away
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
     # Both samples next to a time lie in the region, and sin x >= x - x^3/6.
     near = angle / 2 - angle**3 / 48 - held.bend_between(tube) - beside[1]
