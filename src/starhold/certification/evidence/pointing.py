@@ -171,7 +171,7 @@ class Chain:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
         tube = self.held.tube(self.held.region(Fraction(self.levels[-1]["end"])))
-        one = replace(self)
+        one = replace(self, ellipsoids=list[Any]())
         found = [(one, one.respond(tube, swayed))]
         if not one.response or self.held.loop.wheels:
             found.append((self, self.tighten(tube, swayed)))
