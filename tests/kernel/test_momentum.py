@@ -120,7 +120,7 @@ def test_a_body_that_leans_on_its_momentum_is_where_it_is_said_to_be_and_stays()
     own = Pushed(loop, pushes(loop.loop, loop.known.envelope(True))._replace(attitude=0.0, rate=0.0))
     held = own.leans[0][2]
     n, A, B = own.told, floats(held.near.A), floats(held.near.B)
-    b = sum(b for _, b in held.linear(held.tube(held.region(held.s / 2**26)), *AT_REST)[:2]) / 2
+    b = sum(b for _, b in held.linear(held.tube(held.region(held.s / 2**26)))[:2]) / 2
     torque = np.cross(np.eye(3)[0] * n["target.rate"], np.eye(3)[2] * n["momentum"])
     assert np.isclose(np.linalg.norm(torque), float(held.lasting), rtol=1e-9)
     x = np.zeros(6)

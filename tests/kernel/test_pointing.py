@@ -18,7 +18,7 @@ from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, root, up
 from starhold.kernel.polynomials import Poly, most, total
-from starhold.kernel.regions import AT_REST, STATE, Region, least_form
+from starhold.kernel.regions import STATE, Region, least_form
 from starhold.kernel.theorems.pointing import periods
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
 from tests.kernel.flights import Fleet, along, feedback, moved, turn
@@ -94,7 +94,7 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     assert (np.abs(x).max(axis=1) <= sizes).all()
     assert (np.abs(x).max(axis=1) > 0.5 * sizes).all()
     Q, H, F, pushed, rest = held.fall(tube)
-    Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(tube, *AT_REST)
+    Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(tube)
     # What F has beside the push is of its growth in a period.
     grown, A = float(pushed / (tube.held + tube.pushed)), held.near.A
     V = oracle.lyapunov(q, w)
@@ -183,7 +183,7 @@ def enclosed(name, numbers, told):
     held = held_loop(name)
     chain, tube = Chain(held, "", 0.0), held.tube(held.region(Fraction(told["levels"][-1]["end"])))
     del told["response"]
-    numbers["end.angle"], numbers["end.rate"] = chain.tighten(tube, AT_REST)
+    numbers["end.angle"], numbers["end.rate"] = chain.tighten(tube)
     told["ellipsoids"] = chain.ellipsoids
 
 

@@ -13,11 +13,12 @@ from fractions import Fraction
 from itertools import product
 from typing import NamedTuple
 
-from .loops import AXES, NONE, AttitudeLoop, slopes
+from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, dot, minus, most, var, variables
 from .regions import (
     ANGLE,
+    AT_REST,
     PULL,
     RATE,
     SPEED,
@@ -37,7 +38,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT = Fraction(8)
+WEIGHT, ZERO = Fraction(8), Fraction(0)
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
 AROUND = [
@@ -73,12 +74,19 @@ class Tube:
 
 class Near(NamedTuple):
     """A loop near its target: the law's torque and the acceleration as matrices on (w, q), and A and B such that samples are
-    followed by Ax + Bu, with a torque u that is held beside the law's."""
+    followed by Ax + Bu, with a torque u that is held beside the law's; what one does that grows to uh; J^-1."""
 
     torque: Rows
     rates: Rows
     A: Rows
     B: Rows
+    grown: Rows
+    inverse: Rows
+
+    def spun(self, told: Rows, body: Rows) -> Rows:
+        """Return what the law's torque and the body's add to A that are these matrices times the rates."""
+        own = times(self.B, beside(plus(told, body), scalar(0)))
+        return plus(own, times(self.grown, times(body, self.rates)))
 
 
 class Held:
@@ -87,6 +95,8 @@ class Held:
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
+        # What noise adds near the target, and what momentum makes of that.
+        self.swayed = self.apart = AT_REST
         self.constant = {name: numbers[name] for name in ("outside", "error")}
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.noise, errors = (
@@ -140,7 +150,8 @@ class Held:
         self.mean = mean.at(held)
         # What the law's torque has beside that near its target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
-        self.unlike = [p.at(on) for p in minus(loop.u, linear)]
+        self.heeded = [with_momentum(p) for p in loop.u]
+        self.unlike = [p.at(on) for p in minus(minus(loop.u, linear), self.heeded)]
         self.spun = [with_momentum(p) for p in self.gyroscopic]
         self.tumbled = minus(self.gyroscopic, self.spun)
         # What wheels' momentum makes of the rates, beside what the law's torque does about it.
@@ -215,13 +226,16 @@ class Held:
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside, "both": outside + error}
 
-    def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
-        """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
-        nothing on; the torque is at no time nearer than this to what the law is told."""
+    def changes(self, sizes: Sizes) -> dict[str, Fraction]:
+        """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
+        the torque is at no time nearer than this to what the law is told."""
         e, r, a, H = (self.size(letter) for letter in "erah")
         w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
-        change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
-        return sum((felt(parts, letter, sizes) * x for letter, x in change.items()), Fraction(0))
+        return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
+
+    def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
+        """Return by how much parts change by that."""
+        return sum((felt(parts, letter, sizes) * x for letter, x in self.changes(sizes).items()), Fraction(0))
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
@@ -306,46 +320,46 @@ class Held:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
         if not self.loop.wheels:
             return [self.near.A]
-        h, (A, B), found = self.h, self.near[2:], list[Rows]()
-        # A torque that grows from nothing on.
-        grown = [[h * h / 2 * x for x in row] for row in self.N] + [[h**3 / 12 * x for x in row] for row in self.N]
-        for corner in AROUND:
-            at = {f"h{k + 1}": x * self.size("h") for k, x in enumerate(corner)}
-            asked, turning = (
-                [[c * p.slope(name).at(at).number for name in STATE[RATE]] for p in parts]
-                for c, parts in ((1, self.turning), (-1, self.spun))
-            )
-            more = plus(times(B, beside(asked, scalar(0))), times(grown, times(turning, self.near.rates)))
-            found.append(plus(A, more))
-        return found
+        every = ([x * self.size("h") for x in corner] for corner in AROUND)
+        return [plus(self.near.A, self.near.spun(*spinning(self.loop, at))) for at in every]
 
-    def away(self, swayed: Radii) -> Radii:
+    @property
+    def away(self) -> Radii:
         """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
-        return swayed[0] + self.leant[0], swayed[1] + self.leant[1]
+        return self.swayed[0] + self.leant[0], self.swayed[1] + self.leant[1]
 
     def pulled(self, radii: Radii) -> Fraction:
         """Return a bound of the acceleration that is linear in a motion with these |w| and |q|."""
         rows = self.near.rates
         return added([stretch([row[k] for row in rows]) * x for k, x in zip((RATE, TURN), radii, strict=True)])
 
-    def linear(self, tube: Tube, fast: Fraction, pulled: Fraction) -> list[tuple[Rows, Fraction]]:
+    def linear(
+        self, tube: Tube, fast: Fraction = Fraction(0), pulled: Fraction = Fraction(0)
+    ) -> list[tuple[Rows, Fraction]]:
         """Return pairs B, b such that samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with
-        A between those of `corners`: less what noise adds linearly, and less where the slow torque alone would hold the
-        body. fast, pulled: |w| of the motions to which momentum adds nothing in A, and what `pulled` returns of them."""
+        A between those of `corners`: less what noise adds, and less where the slow torque alone would hold the body. fast,
+        pulled: |w|, and what `pulled` returns, of motions to which momentum is to add nothing in A."""
         h, region = self.h, tube.region
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
-        odd = norm(most(p, near) for p in self.left)
-        odd += felt(self.turning, "w", near) * fast
-        drift = norm(self.astray(tube, self.lasting)) + h * pulled
+        odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
+        # What noise adds has in it what momentum makes of it, but not what it makes of that.
+        noisy = felt(self.heeded, "w", self.others) * self.noise[1] * stretch(self.N)
+        drift = norm(self.astray(tube, self.lasting + tube.held - tube.uneven))
+        drift += h * (pulled + self.pulled(self.apart) + noisy)
         steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale
         # Of what momentum makes of the rates A has the rest of the drift.
         grown = (felt(self.spun, "w", tube.sizes) * drift + felt(self.tumbled, "w", tube.sizes) * norm(tube.drift)) / 6
         # In a whole period momentum and target change by twice what they do in the mean.
         moved = 2 * self.soft * self.stale(tube.sizes, self.slow)
         rolled = h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))
+        # As momentum changes, so does what it makes of noise.
+        if any(self.apart):
+            change = 2 * self.changes(tube.sizes)["h"] / self.size("h")
+            steady += change * self.apart[0] * stretch(self.loop.given) / h
+            moved += change * (self.apart[1] + h / 4 * self.apart[0])
         sizes = steady + 2 * grown, steady + 4 * grown + tube.stale / 3, rolled + moved
         return list(zip(self.ways, sizes, strict=True))
 
@@ -361,7 +375,15 @@ def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
     torque, N = slopes(loop.u, STATE, at), inverse(loop.given)
     rates = times(N, torque)
     A = over_period([[-x for x in row] for row in rates], h)
-    return Near(torque, rates, A, [[h * x for x in row] for row in N] + [[h * h / 4 * x for x in row] for row in N])
+    B, grown = ([[c * x for x in row] for c in both for row in N] for both in ((h, h * h / 4), (h * h / 2, h**3 / 12)))
+    return Near(torque, rates, A, B, grown, N)
+
+
+def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
+    """Return what wheels' momentum makes of the rates, as matrices: in the law's torque, and in that on the body."""
+    names = {f"h{k + 1}": x for k, x in enumerate(at)}
+    told, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
+    return told, body
 
 
 def over_period(held: Rows, h: Fraction) -> Rows:

@@ -33,7 +33,7 @@ from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, balls, wi
 from starhold.kernel.rules import Part
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import ROUNDS, image, periods, points
-from starhold.kernel.theorems.response import responds
+from starhold.kernel.theorems.response import first_of, responds
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
@@ -130,14 +130,13 @@ class Chain:
         t, b = Fraction(tau), Fraction(beta)
         return t, b, (push * push / (4 * t) + rest) / b
 
-    def tighten(self, tube: Tube, swayed: Radii) -> tuple[float, float]:
-        """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s). swayed: the contribution of
-        noise."""
+    def tighten(self, tube: Tube) -> tuple[float, float]:
+        """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = self.ends(tube, tube.region.X)
         heed, corners = HEED, self.held.corners()
-        away = self.held.away(swayed)
+        away = self.held.away
         for _ in range(ELLIPSOIDS):
-            pushes = self.held.linear(tube, swayed[0], self.held.pulled(swayed))
+            pushes = self.held.linear(tube)
             own = [floats(B) * float(b) for B, b in pushes]
             found = smallest(floats(self.held.near.A), np.array(list(map(floats, corners))), own, heed)
             if found is None:
@@ -167,28 +166,28 @@ class Chain:
             tube, (angle, fastest) = inner, end
         return angle, fastest
 
-    def nearest(self, swayed: Radii) -> tuple[Chain, tuple[float, float]]:
+    def nearest(self) -> tuple[Chain, tuple[float, float]]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
         tube = self.held.tube(self.held.region(Fraction(self.levels[-1]["end"])))
         one = replace(self, ellipsoids=list[Any]())
-        found = [(one, one.respond(tube, swayed))]
+        found = [(one, one.respond(tube))]
         if not one.response or self.held.loop.wheels:
-            found.append((self, self.tighten(tube, swayed)))
+            found.append((self, self.tighten(tube)))
         return min(found, key=lambda pair: pair[1][0])
 
-    def respond(self, tube: Tube, swayed: Radii) -> tuple[float, float]:
+    def respond(self, tube: Tube) -> tuple[float, float]:
         """Find how often the response brings motions nearer, and return the ultimate bounds."""
         held, told = self.held, find_response(self.held)
-        away, rounds, pulled = held.away(swayed), 0, None
+        (begun, pulled), rounds = first_of(held, tube), 0
         angle, fastest = self.ends(tube, tube.region.X)
         response = None if told is None else concluded(responds(held, told["weights"], told["gains"]))
         while told is not None and response is not None and rounds < ROUNDS:
             try:
-                radii, pulled, inner = response.after(held, tube, swayed, pulled)
+                begun, pulled, inner = response.after(held, tube, begun, pulled)
             except RefusedError:
                 break
-            end = self.ends(inner, balls(radii), away)
+            end = self.ends(inner, balls(begun), held.away)
             if not end[0] < angle * 0.999:
                 break
             tube, (angle, fastest), rounds = inner, end, rounds + 1
@@ -268,7 +267,8 @@ class Pushed:
         else:
             outside = above(exact(outside) + loop.known.modelled_norm)
         self.loop, self.words = loop, words + sign_words(loop.loop)
-        wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None), loop.by_digest))
+        bounds = loop.bounds(words)
+        wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None, **bounds), loop.by_digest))
         self.stiffness = feedback(wired)
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
@@ -276,9 +276,9 @@ class Pushed:
         self.told: dict[str, Any] = {"period": loop.loop.period}
         self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
-        wide, turned = self.evidence.get("swayed", ("0", "0"))
-        self.swayed = Fraction(wide), Fraction(turned)
-        self.told |= loop.bounds(words) | more
+        wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
+        self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
+        self.told |= bounds | more
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
@@ -292,7 +292,9 @@ class Pushed:
     def held(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
         V = self.loop.crossed(self.stiffness, epsilon)
-        return V, Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
+        found = Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
+        found.swayed, found.apart = self.swayed, self.apart
+        return V, found
 
     def claim(self, V: str, told: dict[str, Any], **evidence: Any) -> dict[str, Any]:
         """Return the claim with its numbers, and its evidence except that about noise."""
@@ -346,7 +348,7 @@ class Pushed:
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return False
         held, start = chain.held, Fraction(chain.level)
-        chain, (angle, fastest) = chain.nearest(self.swayed)
+        chain, (angle, fastest) = chain.nearest()
         told["level"] = chain.level
         told["highest"] = float(start + held.h / 2 * held.swing(held.tube(held.region(start)))) * MORE
         told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}

@@ -15,7 +15,7 @@ from starhold.kernel.theorems.response import MOST, PARTS
 
 Array = NDArray[np.float64]
 
-LEFT = 8.0
+LEFT = 7.0
 """Minus the logarithm of the share of a state that is left after the samples of a response."""
 FINEST, LONGEST, LEAST, MORE = 1e3, 1e9 - 1.0, 1e-4, 1.0 + 1e-7
 """The least and the largest weight, the least share of a sample beside the mean, and the margin for rounding."""

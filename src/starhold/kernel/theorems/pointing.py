@@ -16,7 +16,7 @@ from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
 from .limits import within_limits
 from .noise import SHARE, within_radii
-from .response import responds
+from .response import first_of, responds
 
 ROUNDS = 64
 """How often responses may be taken, each in the set that was found before."""
@@ -42,9 +42,9 @@ def points(claim: Claim) -> Proof:
         yield "the sign never changes", Exceeds(region.least, held.turned / 2)
     tube = held.tube(region)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(tube))
-    noise, swayed = Statement("", ()), AT_REST
+    noise = Statement("", ())
     if SHARE in numbers:
-        noise, swayed = yield from within_radii(claim, held.near)
+        noise, (held.swayed, held.apart) = yield from within_radii(claim, held)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
     within = [(Fraction(0), tube.sizes[ANGLE])]
@@ -60,13 +60,13 @@ def points(claim: Claim) -> Proof:
         c, tube = end, held.tube(held.region(end))
         within.append((h * samples, tube.sizes[ANGLE]))
     last, beside, corners = tube.region.X, AT_REST, held.corners()
-    away, pulled = held.away(swayed), None
+    away = held.away
     for k, told in enumerate(ellipsoids):
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        pushed = held.linear(tube, swayed[0], held.pulled(swayed))
+        pushed = held.linear(tube)
         for corner, A in enumerate(corners):
             after = image(X, shares, A, pushed)
             yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
@@ -79,8 +79,9 @@ def points(claim: Claim) -> Proof:
         rounds, weights, gains = read_table(told, "rounds", "weights", "gains")
         demand(type(rounds) is int and 0 < rounds <= ROUNDS, "a response is taken too often")
         response = yield from responds(held, weights, gains)
+        radii, pulled = first_of(held, tube)
         for _ in range(rounds):
-            radii, pulled, tube = response.after(held, tube, swayed, pulled)
+            radii, pulled, tube = response.after(held, tube, radii, pulled)
             samples += response.count
             within.append((h * samples, tube.sizes[ANGLE]))
             last, beside = balls(radii), away

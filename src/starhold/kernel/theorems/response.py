@@ -43,20 +43,25 @@ class Response:
     gains: list[list[Fraction]]
     left: Rows
 
-    def after(self, held: Held, tube: Tube, swayed: Radii, pulled: Fraction | None) -> tuple[Radii, Fraction, Tube]:
-        """Return |w| and |q| of z after these samples in the tube's region, its acceleration, and the tube from there on.
-        What momentum makes of the motion is a push here. pulled: the acceleration of z before, if it is known."""
-        own, away = tube.region.sizes, held.away(swayed)
-        pull = held.pulled((own[SPEED], own[ANGLE] + held.leant[1])) if pulled is None else pulled + held.pulled(swayed)
-        first, last, turn = (b for _, b in held.linear(tube, own[SPEED], pull))
+    def after(self, held: Held, tube: Tube, begun: Radii, pulled: Fraction) -> tuple[Radii, Fraction, Tube]:
+        """Return |w| and |q| of z after these samples in the tube's region, its acceleration, and the tube from there on:
+        from what they were before. What momentum makes of z is a push here."""
+        away, swayed, own = held.away, held.swayed, tube.region.sizes
+        first, last, turn = (b for _, b in held.linear(tube, begun[0], pulled))
         pushes = first, last - first, turn
-        begun = [own[name] + away[i // 3] for i, name in enumerate(STATE)]
+        sizes = [min(own[name] + away[i // 3], begun[i // 3]) for i, name in enumerate(STATE)]
         wide, turned, pulled = (
-            up(sum((gain * b for gain, b in zip(gains, pushes, strict=True)), norm(reach(self.left[part], begun))))
+            up(sum((gain * b for gain, b in zip(gains, pushes, strict=True)), norm(reach(self.left[part], sizes))))
             for gains, part in zip(self.gains, PARTS.values(), strict=True)
         )
         pull = pulled + held.pulled(swayed) + held.lasting * stretch(held.N)
         return (wide, turned), pulled, held.tube(tube.region.around((wide + away[0], turned + away[1]), pull))
+
+
+def first_of(held: Held, tube: Tube) -> tuple[Radii, Fraction]:
+    """Return |w| and |q| of z in the tube's region, and its acceleration."""
+    wide, turned = (tube.region.sizes[name] + x for name, x in zip((SPEED, ANGLE), held.away, strict=True))
+    return (wide, turned), held.pulled((wide, turned))
 
 
 def responds(held: Held, weights: Any, gains: Any) -> Part[Response]:
