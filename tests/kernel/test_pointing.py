@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from starhold.certification.evidence import responses
 from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Chain
@@ -20,6 +21,7 @@ from starhold.kernel.numbers import Account, root, up
 from starhold.kernel.polynomials import Poly, most, total
 from starhold.kernel.regions import STATE, Region, least_form
 from starhold.kernel.theorems.pointing import periods
+from starhold.kernel.theorems.response import Response
 from tests.kernel.certificates import POINTING, contents, failing, flying, text
 from tests.kernel.flights import Fleet, along, feedback, moved, turn
 from tests.kernel.oracle import Oracle, number
@@ -260,6 +262,41 @@ def test_the_claim_is_false(hypothesis):
 def test_the_claims_that_were_changed_hold(name):
     content = contents("flying", name)
     assert Oracle(content, content["claims"][0]).holds()
+
+
+@pytest.mark.parametrize("name", ["cubesat", "skew"])
+def test_a_torque_that_turns_over_with_the_response_comes_as_far_as_is_said(name):
+    held = held_loop(name)
+    told, A, B = responses.find_response(held), floats(held.near.A), floats(held.near.B)
+    count, rng = len(told["weights"][0]), np.random.default_rng(4)
+    outputs = np.vstack([np.eye(6), floats(held.near.rates)])
+    for place, gains in enumerate(told["gains"]):
+        ways = [along(rng.normal(size=(3, 300))).T @ outputs[3 * place : 3 * place + 3]]
+        for _ in range(count - 1):
+            ways.append(ways[-1] @ A)
+        x = np.zeros((6, 300))
+        for way in reversed(ways):
+            x = A @ x + B @ along(B.T @ way.T)
+        far = float(np.einsum("ni,in->n", ways[0], x).max())
+        assert 0.97 * number(gains[0]) < far <= number(gains[0])
+
+
+def test_what_is_left_of_the_motion_before_a_response_counts(monkeypatch):
+    """Else a response of few samples would end the motion where it does not end."""
+    monkeypatch.setattr(responses, "LEFT", 0.5)
+    content = contents("flying", "cubesat")
+    (claim,) = content["claims"]
+    claim["evidence"]["response"] = responses.find_response(held_loop("cubesat")) | {"rounds": 12}
+    claim["numbers"]["end.angle"] = str(Fraction(number(claim["numbers"]["end.angle"]) * 0.6))
+    assert failing(claim, content["programs"]) == {"end of the angle", "end of the rate"}
+    begin = Response.__init__
+
+    def dropped(self, count, gains, left):
+        begin(self, count, gains, [[0 * x for x in row] for row in left])
+
+    monkeypatch.setattr(Response, "__init__", dropped)
+    assert failing(claim, content["programs"]) == set()
+    assert not Oracle(content, claim).holds()
 
 
 @pytest.mark.parametrize(("name", "reached"), leading([("cubesat", 0.8), ("body", 0.8), ("skew", 0.8)]))

@@ -4,12 +4,12 @@ bound."""
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
 from itertools import takewhile
-from math import inf, isfinite, pi, radians, sin, sqrt
+from math import degrees, inf, isfinite, pi, radians, sin, sqrt
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -273,6 +273,7 @@ class Pushed:
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
+        self.largest = (0.0, 0.0, "")
         self.told: dict[str, Any] = {"period": loop.loop.period}
         self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
@@ -304,12 +305,22 @@ class Pushed:
         """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
         a start that moves; both are in decreasing order."""
         # A start within a smaller set is also within the larger one.
-        first = bisect_left(angles, True, key=lambda angle: self.begun(angle, rate, limits) is not None)
+        first = bisect_left(angles, True, key=lambda angle: self.kept(self.begun, angle, rate, limits))
         faster = [one for one in beyond if one > rate > 0.0]
         for angle in angles[first:]:
-            place = bisect_left(faster, True, key=lambda one: self.begun(angle, one, limits) is not None)
-            if any(self.find(angle, one, limits) for one in (*faster[place : place + 1], rate)):
+            place = bisect_left(faster, True, key=lambda one: self.kept(self.begun, angle, one, limits))
+            if any(self.kept(self.find, angle, one, limits) for one in (*faster[place : place + 1], rate)):
+                self.loop.failed |= {POINTS: self.largest[-1]} if self.largest[-1] else {}
                 return True
+        return False
+
+    def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
+        """Return whether a start is taken, and keep in `failed` why the largest is not."""
+        if tried(angle, rate, limits):
+            return True
+        start = f"from {degrees(angle):.3g} deg at {degrees(rate):.3g} deg/s: "
+        self.largest = max(self.largest, (angle, rate, start + self.loop.failed[POINTS]))
+        self.loop.failed[POINTS] = self.largest[-1]
         return False
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
