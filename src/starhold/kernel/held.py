@@ -233,9 +233,9 @@ class Held:
         w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
         return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * ((w + r) * H + e + outside), "e": 2 * e}
 
-    def stale(self, sizes: Sizes, parts: list[Poly]) -> Fraction:
-        """Return by how much parts change by that."""
-        return sum((felt(parts, letter, sizes) * x for letter, x in self.changes(sizes).items()), Fraction(0))
+    def stale(self, sizes: Sizes, parts: list[Poly], letters: str = "raeh") -> Fraction:
+        """Return by how much parts change by that, or by some of it."""
+        return sum((felt(parts, letter, sizes) * x for letter, x in self.changes(sizes).items() if letter in letters), ZERO)
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
@@ -349,9 +349,12 @@ class Held:
         noisy = felt(self.heeded, "w", self.others) * self.noise[1] * stretch(self.N)
         drift = norm(self.astray(tube, self.lasting + tube.held - tube.uneven))
         drift += h * (pulled + self.pulled(self.apart) + noisy)
-        steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale
+        late = self.stale(tube.sizes, self.beside, "rh")
+        steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale - late
         # Of what momentum makes of the rates A has the rest of the drift.
-        grown = (felt(self.spun, "w", tube.sizes) * drift + felt(self.tumbled, "w", tube.sizes) * norm(tube.drift)) / 6
+        grown = (
+            felt(self.spun, "w", tube.sizes) * drift + felt(self.tumbled, "w", tube.sizes) * norm(tube.drift)
+        ) / 6 + late / 3
         # In a whole period momentum and target change by twice what they do in the mean.
         moved = 2 * self.soft * self.stale(tube.sizes, self.slow)
         rolled = h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))
@@ -360,7 +363,7 @@ class Held:
             change = 2 * self.changes(tube.sizes)["h"] / self.size("h")
             steady += change * self.apart[0] * stretch(self.loop.given) / h
             moved += change * (self.apart[1] + h / 4 * self.apart[0])
-        sizes = steady + 2 * grown, steady + 4 * grown + tube.stale / 3, rolled + moved
+        sizes = steady + 2 * grown, steady + 4 * grown, rolled + moved
         return list(zip(self.ways, sizes, strict=True))
 
     def bend_between(self, tube: Tube) -> Fraction:
