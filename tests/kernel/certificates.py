@@ -68,7 +68,7 @@ NOISY = {
 def radii_of(loop):
     """The numbers that a claim tells of noise, and the evidence for them."""
     words = [word for word in loop.words if word != OUTSIDE] + sign_words(loop.loop)
-    wired = read(loop.claim("points", words, None), loop.by_digest)
+    wired = read(loop.claim("points", words, None, **loop.bounds(words)), loop.by_digest)
     return find_radii(loop, AttitudeLoop(wired))
 
 

@@ -29,21 +29,23 @@ class Driven:
         return np.array([n["noise.attitude"], n["noise.rate"], *map(number, self.claim["evidence"]["swayed"])])[:, None]
 
     def held(self):
-        """The motion of (w, q) near rest over a period, and by how much torques that are held drive it."""
+        """The motion of (w, q) near rest over a period, and what errors of attitude and rate that the law is told make of
+        it."""
         (C, K), zero = self.linear(), np.zeros((3, 3))
         N = np.linalg.inv(self.J)
         drift = np.block([[zero, zero, N], [np.eye(3) / 2, zero, zero], [np.zeros((3, 9))]])
         Phi = expm(drift * self.numbers["period"])[:6]
-        return Phi[:, :6] - Phi[:, 6:] @ np.hstack([C, K]), Phi[:, 6:], C, K
+        return Phi[:, :6] - Phi[:, 6:] @ np.hstack([C, K]), -Phi[:, 6:] @ np.hstack([K / 2, C])
 
-    def largest_errors(self, lanes, samples, begun=2500):
+    def largest_errors(self, samples, maps, begun=2500):
         """The largest errors of attitude and rate in spans of so many samples, once they have settled, and the largest rates
-        and turns that they cause in the linear motion."""
-        noise, (A, B, C, K) = self.noise(lanes, np.random.default_rng(2)), self.held()
+        and turns that they cause in the linear motion, in lanes with maps of their own of (w, q) and of these errors."""
+        lanes, (A, B) = len(maps), map(np.array, zip(*maps, strict=True))
+        noise = self.noise(lanes, np.random.default_rng(2))
         x, most = np.zeros((6, lanes)), np.zeros((4, lanes))
         for k in range(-begun, samples):
             told, rate = noise.told()
             sizes = [np.linalg.norm(part, axis=0) for part in (told, rate, x[:3], x[3:])]
-            x = A @ x - B @ (C @ rate + K @ told / 2)
+            x = np.einsum("nij,jn->in", A, x) + np.einsum("nij,jn->in", B, np.concatenate([told, rate]))
             most = np.maximum(most, sizes) if k >= 0 else most
         return most

@@ -281,7 +281,7 @@ class Oracle(Driven):
         n, zero = self.numbers, np.zeros(3)
         V0, level = self.lyapunov(np.eye(4)[0], zero), n["level"]
         if "share" in n:
-            most, radii = self.largest_errors(500, int(min(n["samples"], 2500))), self.radii()
+            most, radii = self.largest_errors(int(min(n["samples"], 2500)), [self.held()] * 500), self.radii()[:4]
             if (most > radii).any(axis=0).mean() > n["share"] + 4 * math.sqrt(n["share"] / 500):
                 return False
 

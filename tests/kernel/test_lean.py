@@ -58,7 +58,7 @@ def claimed(rate, damping, dropped):
     claim, programs, held = begun(rate, damping)
     chain = Chain(held, "", float(LEVEL))
     tube = held.tube(held.region(Fraction(chain.descend())))
-    angle, fastest = chain.tighten(tube, AT_REST)
+    angle, fastest = chain.tighten(tube)
     exact = {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * 1.001}
     claim["numbers"] |= {name: x.hex() for name, x in exact.items()}
     claim["evidence"] = {"levels": chain.levels, "ellipsoids": chain.ellipsoids}
@@ -144,6 +144,6 @@ def test_the_place_to_lean_to_moves_in_a_period_as_far_as_is_said():
     """On target the momentum turns over at the target's rate, and the torque with it: no less would be enough."""
     rate, damping = SWINGING
     held = begun(rate, damping)[2]
-    *_, (_, moved) = held.linear(held.tube(held.region(held.s / 2**40)), AT_REST)
+    *_, (_, moved) = held.linear(held.tube(held.region(held.s / 2**40)))
     true = 2.0 * LEAN * np.sin(rate * float(held.h) / 2.0)
     assert 0.98 * float(moved) < true <= float(moved)

@@ -134,6 +134,11 @@ class Certificate:
         return str(self.subject.get("no_pointing", ""))
 
     @property
+    def no_larger_start(self) -> str:
+        """Why the claim about the loop as it flies is about no larger start; empty where the largest tried is in it."""
+        return str(self.subject.get("no_larger_start", ""))
+
+    @property
     def proofs(self) -> list[Proof]:
         """Return the proofs in the order of the file."""
         return [claim.proof for claim in self.claims if claim.proof is not None]

@@ -83,7 +83,9 @@ def certify(loop: ClosedLoop, name: str = "", wanted: Wanted = BEST) -> Certific
         unflown = f"{APART}: {reason}"
         claims = [undecided("convergence", EVERYWHERE, subject, unflown)]
     kinds = [claim.kind for claim in claims]
-    about = described(subject, kinds) | ({} if "pointing" in kinds else {"no_pointing": unflown})
+    flown = any(claim.kind == "pointing" and claim.outcome == "proved" for claim in claims)
+    key = "no_larger_start" if flown else "no_pointing"
+    about = described(subject, kinds) | ({key: unflown} if flown or "pointing" not in kinds else {})
     return Certificate(name or loop.law.name, about, named(claims, loop, above(subject.total_momentum)))
 
 
@@ -115,7 +117,9 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
             claims.extend(_unshown(subject, wanted, proved, "the law declares no V to show it with"))
         claims.extend(between_samples(subject, proved, failed))
         unflown = failed.get(POINTS, "no proof was found") if pointing else NOT_SOUGHT
-        if pointing and loop.wheels is not None:
+        if "pointing" in proved:
+            unflown = failed.get(POINTS, "")
+        elif pointing and loop.wheels is not None:
             whose = "that of the start; certify.momentum states another" if wanted.momentum is None else "as stated"
             unflown += f", with a total momentum of up to {above(subject.total_momentum):.4g} N m s ({whose})"
         if "pointing" in proved or wanted.disturbance:

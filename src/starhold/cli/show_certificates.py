@@ -66,6 +66,8 @@ def print_certificate(tried: Tried, why: bool = False) -> None:
         console.print(table)
     if why and certificate.claims:
         console.print(f"  [dim]assuming: {assumptions(certificate)}[/dim]")
+    if why and certificate.no_larger_start:
+        console.print(f"  [dim]not proved of a larger start: {_safe(certificate.no_larger_start)}[/dim]")
     outside = [HEADINGS[kind] for kind, is_inside in inside.items() if not is_inside]
     if outside:
         console.print(f"  this scenario starts outside the regions of these claims: {', '.join(outside)}")

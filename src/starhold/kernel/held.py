@@ -12,13 +12,15 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple
 
-from .loops import AXES, NONE, AttitudeLoop, slopes
-from .numbers import Rows, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
+from .loops import AXES, NONE, AttitudeLoop
+from .near import near_target, spinning
+from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
 from .regions import (
     ANGLE,
+    AT_REST,
+    PULL,
     RATE,
     SPEED,
     STATE,
@@ -38,7 +40,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT, ORDER, LONG = Fraction(8), 4, 1000
+WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 1000
 MOMENTA = ("h1", "h2", "h3")
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
@@ -49,22 +51,14 @@ AROUND = [
 """The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
-class Near(NamedTuple):
-    """A loop near its target: the law's torque and the acceleration as matrices on (w, q), and A and B such that samples are
-    followed by Ax + Bu, with a torque u that is held beside the law's."""
-
-    torque: Rows
-    rates: Rows
-    A: Rows
-    B: Rows
-
-
 class Held:
     """A loop with its torque held for a period, and V = s (1 - q0) + x.Gx."""
 
     def __init__(self, loop: AttitudeLoop) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
+        # What noise adds near the target, and what momentum makes of that.
+        self.swayed = self.apart = AT_REST
         self.constant = {name: numbers[name] for name in ("outside", "error")}
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.noise, errors = (
@@ -94,7 +88,12 @@ class Held:
         self.slow = [with_momentum(p, "r") for p in left]
         self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
-        self.N = inverse(loop.given)
+        self.N, h = inverse(loop.given), self.h
+        # What torques at the beginning and at the end of a period do, half of each if they are held, and what turns do.
+        ends = (
+            [[h / 2 * x for x in row] for row in self.N] + [[c * x for x in row] for row in self.N] for c in (h * h / 4, 0)
+        )
+        self.ways: list[Rows] = [*ends, scalar(0) + scalar(1)]
         # How large the slow torque is, how far a torque that lasts turns the body, and how far this one.
         self.lasting = felt(self.slow, "h", self.others) * self.size("h")
         stiff = [[-x for x in row[TURN]] for row in self.near.torque]
@@ -107,7 +106,10 @@ class Held:
         held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         # What the law's torque has beside that near its target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
-        self.unlike = [p.at(on) for p in minus(loop.u, linear)]
+        self.heeded = [with_momentum(p) for p in loop.u]
+        self.unlike = [p.at(on) for p in minus(minus(loop.u, linear), self.heeded)]
+        self.spun = [with_momentum(p) for p in self.gyroscopic]
+        self.tumbled = minus(self.gyroscopic, self.spun)
         # What wheels' momentum makes of the rates, beside what the law's torque does about it.
         self.turning = [with_momentum(p - g) for p, g in zip(self.more, self.gyroscopic, strict=True)]
         # The acceleration at samples, what V' has of the rates, and that linearly.
@@ -129,8 +131,8 @@ class Held:
         demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
         # What a torque does to V: felt x.
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
-        self.apart = minus(self.beside, turning), turning
-        self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.apart]
+        self.parted = minus(self.beside, turning), turning
+        self.worked = [[dot(apply(self.felt, x), parts)] for parts in self.parted]
         # 2 (1 - q0) >= |q|^2.
         self.under = self.form(self.s / 2)
         demand(definite(self.under), "V is not least on target")
@@ -210,15 +212,19 @@ class Held:
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside, "both": outside + error}
 
-    def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1) -> Fraction:
-        """Return by how much parts change in the mean of a period as target, momentum and torque from outside do: those from
-        nothing on; the torque is at no time nearer than this to what the law is told. turning: 0 without what the body's own
-        rate does to momentum."""
+    def changes(self, sizes: Sizes, turning: int = 1) -> dict[str, Fraction]:
+        """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
+        the torque is at no time nearer than this to what the law is told. turning: 0 without what the body's own rate does
+        to momentum."""
         e, r, a, H = (self.size(letter) for letter in "erah")
         w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
         turned = (turning * w + r) * H + e + outside
-        change = {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": 2 * e}
-        return sum((felt(parts, letter, sizes) * x for letter, x in change.items()), Fraction(0))
+        return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": 2 * e}
+
+    def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1, letters: str = "raeh") -> Fraction:
+        """Return by how much parts change by that, or by some of it."""
+        changes = self.changes(sizes, turning)
+        return sum((felt(parts, letter, sizes) * changes[letter] for letter in letters), ZERO)
 
     def unlike_body(self, sizes: Sizes, parts: Sequence[list[Poly]]) -> tuple[Fraction, Fraction]:
         """Return `stale` of two parts, of which the second follows momentum that turns with the body as without pushes; and
@@ -239,6 +245,7 @@ class Held:
         near = sizes | {"v": 1 - region.least}
         # In an ellipsoid c.x is no more than the root of c.Xc.
         even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
+        even = [min(x, sizes.get(PULL, x)) for x in even]
         odd = [most(p, near) for p in self.odd]
         held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
         begun = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
@@ -276,7 +283,7 @@ class Held:
         push = tube.held + tube.pushed
         demand(push > 0, "nothing pushes")
         # How far pushes take the rates from where they go without: momentum turns with the body, less what they do to that.
-        widths, (calm, slower) = [norm(row) for row in self.N], self.unlike_body(tube.sizes, self.apart)
+        widths, (calm, slower) = [norm(row) for row in self.N], self.unlike_body(tube.sizes, self.parted)
         away = settled(
             lambda d: [
                 h * ((push + calm + slower * norm(d)) * n + y) for n, y in zip(widths, reach(tube.bent, d), strict=True)
@@ -322,54 +329,53 @@ class Held:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
         if not self.loop.wheels:
             return [self.near.A]
-        h, (A, B), found = self.h, self.near[2:], list[Rows]()
-        # A torque that grows from nothing on.
-        grown = [[h * h / 2 * x for x in row] for row in self.N] + [[h**3 / 12 * x for x in row] for row in self.N]
-        for corner in AROUND:
-            at = {f"h{k + 1}": x * self.size("h") for k, x in enumerate(corner)}
-            asked, turning = (
-                [[c * p.slope(name).at(at).number for name in STATE[RATE]] for p in parts]
-                for c, parts in ((1, self.turning), (-1, [with_momentum(p) for p in self.gyroscopic]))
-            )
-            more = plus(times(B, beside(asked, scalar(0))), times(grown, times(turning, self.near.rates)))
-            found.append(plus(A, more))
-        return found
+        every = ([x * self.size("h") for x in corner] for corner in AROUND)
+        return [plus(self.near.A, self.near.spun(*spinning(self.loop, at))) for at in every]
 
-    def linear(self, tube: Tube, swayed: Radii) -> list[tuple[Rows, Fraction]]:
+    @property
+    def away(self) -> Radii:
+        """Return how far motions are from those without what noise adds and where the slow torque holds the body."""
+        return self.swayed[0] + self.leant[0], self.swayed[1] + self.leant[1]
+
+    def pulled(self, radii: Radii) -> Fraction:
+        """Return a bound of the acceleration that is linear in a motion with these |w| and |q|."""
+        rows = self.near.rates
+        return added([stretch([row[k] for row in rows]) * x for k, x in zip((RATE, TURN), radii, strict=True)])
+
+    def linear(
+        self, tube: Tube, fast: Fraction = Fraction(0), pulled: Fraction = Fraction(0)
+    ) -> list[tuple[Rows, Fraction]]:
         """Return pairs B, b such that samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with
-        A between those of `corners`: less what noise adds linearly, at most `swayed`, and less where the slow torque alone
-        would hold the body, at most `leant`."""
-        h, N, region = self.h, self.N, tube.region
+        A between those of `corners`: less what noise adds, and less where the slow torque alone would hold the body. fast,
+        pulled: |w|, and what `pulled` returns, of motions to which momentum is to add nothing in A."""
+        h, region = self.h, tube.region
         wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
-        odd = norm(most(p, near) for p in self.left)
-        odd += felt(self.turning, "w", near) * swayed[0]
-        # Rates drift from nothing on, too; what noise adds is not in A.
-        parts = zip((RATE, TURN), swayed, strict=True)
-        swaying = h * sum((stretch([row[k] for row in self.near.rates]) * x for k, x in parts), Fraction(0))
-        drift = norm(self.astray(tube, self.lasting)) + swaying
-        mean = tube.pushed + tube.stale + odd + felt(self.gyroscopic, "w", tube.sizes) * drift / 2
-        uneven = 2 * mean - tube.pushed - odd
+        odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
+        # What noise adds has in it what momentum makes of it, but not what it makes of that.
+        noisy = felt(self.heeded, "w", self.others) * self.noise[1] * stretch(self.N)
+        drift = norm(self.astray(tube, self.lasting + tube.held - tube.uneven))
+        drift += h * (pulled + self.pulled(self.apart) + noisy)
+        late = self.stale(tube.sizes, self.beside, letters="rh")
+        steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale - late
+        # Of what momentum makes of the rates A has the rest of the drift.
+        grown = (
+            felt(self.spun, "w", tube.sizes) * drift + felt(self.tumbled, "w", tube.sizes) * norm(tube.drift)
+        ) / 6 + late / 3
         # In a whole period momentum and target change by twice what they do in the mean.
         moved = 2 * self.soft * self.stale(tube.sizes, self.slow)
-        return [
-            (self.near.B, tube.uneven - self.lasting + mean),
-            (scalar(0) + N, h * h / 8 * uneven),
-            (scalar(0) + scalar(1), h / 2 * wide * turn * root(1 / (1 - turn * turn / 2)) + moved),
-        ]
+        rolled = h / 2 * wide * turn * root(1 / (1 - turn * turn / 2))
+        # As momentum changes, so does what it makes of noise.
+        if any(self.apart):
+            change = 2 * self.changes(tube.sizes)["h"] / self.size("h")
+            steady += change * self.apart[0] * stretch(self.loop.given) / h
+            moved += change * (self.apart[1] + h / 4 * self.apart[0])
+        sizes = steady + 2 * grown, steady + 4 * grown, rolled + moved
+        return list(zip(self.ways, sizes, strict=True))
 
-
-def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
-    """Return the linear loop with its torque held for h, where nothing comes from outside."""
-    at = loop.on_target | loop.still | {f"{letter}{k + 1}": 0 for letter in "erah" for k in AXES}
-    torque, N = slopes(loop.u, STATE, at), inverse(loop.given)
-    rates = times(N, torque)
-    A = over_period([[-x for x in row] for row in rates], h)
-    return Near(torque, rates, A, [[h * x for x in row] for row in N] + [[h * h / 4 * x for x in row] for row in N])
-
-
-def over_period(held: Rows, h: Fraction) -> Rows:
-    """Return the linear motion of (w, q) over a period in which the acceleration -held (w, q) does not change."""
-    return plus(beside(scalar(1), scalar(0)), held, -h) + plus(beside(scalar(h / 2), scalar(1)), held, -h * h / 4)
+    def bend_between(self, tube: Tube) -> Fraction:
+        """Return how far q is at most, between two samples, from the straight line between them."""
+        fastest, sizes = norm(tube.drift) / self.h + tube.stale * stretch(self.N), tube.sizes
+        return self.h * self.h / 16 * (fastest + sizes[SPEED] ** 2 / 2 * sizes[ANGLE])

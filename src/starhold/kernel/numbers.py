@@ -126,6 +126,11 @@ def definite(a: Rows, strictly: bool = True) -> bool:
     return True
 
 
+def shortened(a: Rows, places: int) -> Rows:
+    """Return a matrix with so many binary places, each entry rounded down."""
+    return [[Fraction((x.numerator << places) // x.denominator, 1 << places) for x in row] for row in a]
+
+
 def inverse(a: Rows) -> Rows:
     """Invert a positive definite matrix exactly, by elimination without exchanges."""
     count = len(a)
@@ -141,9 +146,12 @@ def inverse(a: Rows) -> Rows:
 def times(a: Rows, b: Rows) -> Rows:
     """Return the product of two matrices."""
     columns = transpose(b)
-    Account.spend(len(a) * len(b) * len(columns), max(map(longest, a)) + max(map(longest, b)))
-    left, right = list(map(whole, a)), list(map(whole, columns))
-    return [[Fraction(sum(x * y for x, y in zip(s, t, strict=True)), c * d) for t, d in right] for s, c in left]
+    # Nothing is multiplied by zeros of the first.
+    left = [([(k, x) for k, x in enumerate(row) if x], below) for row, below in map(whole, a)]
+    count = sum(len(row) for row, _ in left)
+    Account.spend((count + len(a)) * len(columns), max(map(longest, a)) + max(map(longest, b)))
+    right = list(map(whole, columns))
+    return [[Fraction(sum([x * t[k] for k, x in s]), c * d) for t, d in right] for s, c in left]
 
 
 def plus(a: Rows, b: Rows, c: Fraction | int = 1) -> Rows:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from .loops import AXES, RATES, TURNS
-from .numbers import RefusedError, Rows, added, demand, norm, reach, root, scalar, transpose, up
+from .numbers import RefusedError, Rows, added, demand, norm, plus, reach, root, scalar, transpose, up
 from .polynomials import Poly, most
 
 STATE = (*RATES, *TURNS)
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
-SPEED, ANGLE = "|w", "|q"
-"""Under which the sizes have those of |w| and |q|."""
+SPEED, ANGLE, PULL = "|w", "|q", "|u"
+"""Under which the sizes have those of |w| and |q|, and of the acceleration that is linear in the state where it is known."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
 """The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
@@ -35,6 +35,12 @@ class Region:
         sizes = {name: root(X[i][i]) + swayed[i // 3] for i, name in enumerate(STATE)}
         sizes |= {name: x + more for (name, x), more in zip(lengths(X).items(), swayed, strict=True)}
         return Region(widened(X, swayed), self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()}, self.least)
+
+    def around(self, radii: Radii, pull: Fraction) -> Region:
+        """Return the part where |w| and |q| are no more than told, nor the acceleration that is linear in the state."""
+        X = plus(scalar(0, 6), balls(radii), 2)
+        sizes = {name: radii[i // 3] for i, name in enumerate(STATE)} | named((SPEED, ANGLE), [*radii])
+        return Region(X, self.sizes | {k: min(self.sizes[k], x) for k, x in sizes.items()} | {PULL: pull}, self.least)
 
 
 @dataclass(frozen=True)
@@ -125,8 +131,12 @@ def lengths(X: Rows) -> Sizes:
 
 def widened(X: Rows, swayed: Radii) -> Rows:
     """Return the matrix of an ellipsoid that holds all that is no further than `swayed` from another one."""
-    near = [4 * swayed[i // 3] ** 2 for i in range(6)]
-    return [[2 * x + near[i] * (i == k) for k, x in enumerate(row)] for i, row in enumerate(X)] if any(near) else X
+    return plus([[2 * x for x in row] for row in X], balls(swayed), 4) if any(swayed) else X
+
+
+def balls(radii: Radii) -> Rows:
+    """Return the matrix of which the parts are those of balls of w and q, with these radii."""
+    return [[radii[i // 3] ** 2 * (i == k) for k in range(6)] for i in range(6)]
 
 
 def first(p: Poly, letter: str) -> Poly:

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import floats
-from starhold.certification.evidence.squares import rounded
 from starhold.certification.unmodelled import driven_errors, measures_noisy_field, samples_of
-from starhold.kernel.held import near_target
 from starhold.kernel.loops import AttitudeLoop
-from starhold.kernel.regions import RATE, TURN
-from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, driven, linear
+from starhold.kernel.near import near_target
+from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, driven, linear, parts_of, spins_of
 from starhold.parts.contract import DEVIATIONS
 
 linalg: Any = import_module("scipy.linalg")
@@ -32,7 +30,7 @@ covariances, because long numbers take long."""
 
 SHARES = (0.05, 0.05, 0.05, 0.85)
 """The shares of the probability for the radii of attitude and rate errors of the measurement, and of the rate and the
-rotation that they cause."""
+rotation that they cause; with wheels a tenth of each is for what momentum makes of the last two."""
 
 
 def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[str, Any]] | None:
@@ -41,22 +39,26 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     noise = driven_errors(loop.loop)
     if noise is None:
         return None
-    near, every = near_target(wired, Fraction(loop.loop.period)), noise.recursion.every
-    carried, corrected = (tuple(map(floats, driven(near, *linear(wired.claim, role)))) for role in (CARRIED, CORRECTED))
-    steps = [carried] * (every - 1) + [corrected]
-    size = len(carried[0][0])
-    (whole, spread), shapes, widths = period(steps, size, 0.0 * np.eye(size)), list[Array](), [0.0] * 4
-    if float(np.abs(np.linalg.eigvals(whole)).max()) >= 1.0 - 1e-9:
-        return None
-    more = np.diag(WIDER * np.diag(linalg.solve_discrete_lyapunov(whole, spread)) + LEAST)
-    shape = linalg.solve_discrete_lyapunov(*period(steps, size, more))
-    for A, B in steps:
-        full = A @ shape @ A.T + B @ B.T
-        told = [full[k, k] for k in (slice(size, size + 3), slice(size + 3, size + 6), RATE, TURN)]
-        widths = [max(width, float(np.linalg.eigvalsh(own)[-1])) for width, own in zip(widths, told, strict=True)]
-        shape = full[:size, :size] + more
-        shapes.append((shape + shape.T) / 2.0)
-    deviations = [(width + LEAST) ** 0.5 * MORE for width in widths]
+    near, every, spins = near_target(wired, Fraction(loop.loop.period)), noise.recursion.every, spins_of(wired)
+    errors = [linear(wired.claim, role) for role in (CARRIED, CORRECTED)]
+    parts, shapes = parts_of(len(errors[0][0][0]), spins), list[Array]()
+    widths = dict.fromkeys(parts, 0.0)
+    for spin in spins:
+        carried, corrected = (tuple(map(floats, driven(near, *own, spin))) for own in errors)
+        steps = [carried] * (every - 1) + [corrected]
+        size = len(carried[0][0])
+        whole, spread = period(steps, size, 0.0 * np.eye(size))
+        if float(np.abs(np.linalg.eigvals(whole)).max()) >= 1.0 - 1e-9:
+            return None
+        more = np.diag(WIDER * np.diag(linalg.solve_discrete_lyapunov(whole, spread)) + LEAST)
+        shape = linalg.solve_discrete_lyapunov(*period(steps, size, more))
+        for A, B in steps:
+            full = A @ shape @ A.T + B @ B.T
+            for name, places in parts.items():
+                widths[name] = max(widths[name], *(float(np.linalg.eigvalsh(full[k, k])[-1]) for k in places))
+            shape = full[:size, :size] + more
+            shapes.append((shape + shape.T) / 2.0)
+    deviations = [(width + LEAST) ** 0.5 * MORE for width in widths.values()]
     samples = samples_of(loop.loop)
 
     optimize: Any = import_module("scipy.optimize")
@@ -70,11 +72,13 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
 
         return width * float(optimize.brentq(missed, 1.0, 12.0)) * MORE
 
-    radii = [radius(width, share) for width, share in zip(deviations, SHARES, strict=True)]
+    shares = SHARES if len(parts) == len(SHARES) else (*(0.9 * x for x in SHARES), *(0.1 * SHARES[0],) * 2)
+    often = [len(spins) * len(own) if k > 1 else 1 for k, own in enumerate(parts.values())]
+    radii = [radius(width, share / n) for width, share, n in zip(deviations, shares, often, strict=True)]
     numbers = {SHARE: RARELY, "samples": samples, "every": every, "noise.attitude": radii[0], "noise.rate": radii[1]}
     numbers |= {BESIDE: DEVIATIONS} if measures_noisy_field(loop.loop) else {}
     evidence = {
-        "covariances": [[[str(rounded(x, DIGITS)) for x in row] for row in own.tolist()] for own in shapes],
+        "covariances": [[[float.hex(x) for x in row] for row in own.tolist()] for own in shapes],
         "deviations": [str(Fraction(x)) for x in deviations],
         "swayed": [str(Fraction(x)) for x in radii[2:]],
     }

@@ -4,13 +4,13 @@ bound."""
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
 from itertools import takewhile
-from math import inf, isfinite, pi, radians, sin, sqrt
-from typing import Any, TypeAlias
+from math import degrees, inf, isfinite, pi, radians, sin, sqrt
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +21,20 @@ from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio
 from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
+from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import Pushes, driven_errors, pushes
-from starhold.kernel.held import Held, near_target
+from starhold.kernel.held import Held
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
+from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
-from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, widened
+from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, balls, widened
+from starhold.kernel.rules import Part
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import image, periods, points
+from starhold.kernel.theorems.pointing import ROUNDS, image, periods, points
+from starhold.kernel.theorems.response import first_of, responds
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
@@ -59,6 +63,7 @@ examined.
 """
 
 
+T = TypeVar("T")
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 
 
@@ -73,6 +78,7 @@ class Chain:
     """The results of `lower`, for all chains of one V."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    response: dict[str, Any] = field(default_factory=dict[str, Any])
     samples: int = 0
 
     def aim(self) -> float:
@@ -129,14 +135,13 @@ class Chain:
         t, b = Fraction(tau), Fraction(beta)
         return t, b, (push * push / (4 * t) + rest) / b
 
-    def tighten(self, tube: Tube, swayed: Radii) -> tuple[float, float]:
-        """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s). swayed: the contribution of
-        noise."""
+    def tighten(self, tube: Tube) -> tuple[float, float]:
+        """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = self.ends(tube, tube.region.X)
         heed, corners = HEED, self.held.corners()
-        away = swayed[0] + self.held.leant[0], swayed[1] + self.held.leant[1]
+        away = self.held.away
         for _ in range(ELLIPSOIDS):
-            pushes = self.held.linear(tube, swayed)
+            pushes = self.held.linear(tube)
             own = [floats(B) * float(b) for B, b in pushes]
             found = smallest(floats(self.held.near.A), np.array(list(map(floats, corners))), own, heed)
             if found is None:
@@ -166,6 +171,35 @@ class Chain:
             tube, (angle, fastest) = inner, end
         return angle, fastest
 
+    def nearest(self) -> tuple[Chain, tuple[float, float]]:
+        """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
+        (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
+        tube = self.held.tube(self.held.region(Fraction(self.levels[-1]["end"])))
+        one = replace(self, ellipsoids=list[Any]())
+        found = [(one, one.respond(tube))]
+        if not one.response or self.held.loop.wheels:
+            found.append((self, self.tighten(tube)))
+        return min(found, key=lambda pair: pair[1][0])
+
+    def respond(self, tube: Tube) -> tuple[float, float]:
+        """Find how often the response brings motions nearer, and return the ultimate bounds."""
+        held, told = self.held, find_response(self.held)
+        (begun, pulled), rounds = first_of(held, tube), 0
+        angle, fastest = self.ends(tube, tube.region.X)
+        response = None if told is None else concluded(responds(held, told["weights"], told["gains"]))
+        while told is not None and response is not None and rounds < ROUNDS:
+            try:
+                begun, pulled, inner = response.after(held, tube, begun, pulled)
+            except RefusedError:
+                break
+            end = self.ends(inner, balls(begun), held.away)
+            if not end[0] < angle * 0.999:
+                break
+            tube, (angle, fastest), rounds = inner, end, rounds + 1
+            self.samples += response.count
+            self.response = {"response": told | {"rounds": rounds}}
+        return angle, fastest
+
     def asks_more(self, limits: dict[str, float]) -> bool:
         """Return whether the law commands more than its limit at some state of the set."""
         most = min((x for name, x in limits.items() if name.startswith("limit")), default=inf)
@@ -192,7 +226,7 @@ class Chain:
             sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
         )
         fastest = (wide + drift / 2.0) * MORE
-        sine = (turned + float(self.held.h) / 4.0 * fastest) * MORE
+        sine = (turned + float(self.held.bend_between(tube))) * MORE
         half = sine
         for _ in range(60):
             half = sine + half**3 / 6.0
@@ -243,7 +277,8 @@ class Pushed:
         else:
             outside = above(exact(outside) + loop.known.modelled_norm)
         self.loop, self.words = loop, words + sign_words(loop.loop)
-        wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None), loop.by_digest))
+        bounds = loop.bounds(words)
+        wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None, **bounds), loop.by_digest))
         self.stiffness = feedback(wired)
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         law = loop.loop.law
@@ -251,12 +286,13 @@ class Pushed:
         self.even = law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
+        self.largest = (0.0, 0.0, "")
         self.told: dict[str, Any] = {"period": loop.loop.period}
         self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
-        wide, turned = self.evidence.get("swayed", ("0", "0"))
-        self.swayed = Fraction(wide), Fraction(turned)
-        self.told |= loop.bounds(words) | more
+        wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
+        self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
+        self.told |= bounds | more
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
@@ -270,7 +306,9 @@ class Pushed:
     def held(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
         V = self.loop.crossed(None if self.even else self.stiffness, epsilon)
-        return V, Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
+        found = Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
+        found.swayed, found.apart = self.swayed, self.apart
+        return V, found
 
     def claim(self, V: str, told: dict[str, Any], **evidence: Any) -> dict[str, Any]:
         """Return the claim with its numbers, and its evidence except that about noise."""
@@ -280,12 +318,22 @@ class Pushed:
         """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
         a start that moves; both are in decreasing order."""
         # A start within a smaller set is also within the larger one.
-        first = bisect_left(angles, True, key=lambda angle: self.begun(angle, rate, limits) is not None)
+        first = bisect_left(angles, True, key=lambda angle: self.kept(self.begun, angle, rate, limits))
         faster = [one for one in beyond if one > rate > 0.0]
         for angle in angles[first:]:
-            place = bisect_left(faster, True, key=lambda one: self.begun(angle, one, limits) is not None)
-            if any(self.find(angle, one, limits) for one in (*faster[place : place + 1], rate)):
+            place = bisect_left(faster, True, key=lambda one: self.kept(self.begun, angle, one, limits))
+            if any(self.kept(self.find, angle, one, limits) for one in (*faster[place : place + 1], rate)):
+                self.loop.failed |= {POINTS: self.largest[-1]} if self.largest[-1] else {}
                 return True
+        return False
+
+    def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
+        """Return whether a start is taken, and keep in `failed` why the largest is not."""
+        if tried(angle, rate, limits):
+            return True
+        start = f"from {degrees(angle):.3g} deg at {degrees(rate):.3g} deg/s: "
+        self.largest = max(self.largest, (angle, rate, start + self.loop.failed[POINTS]))
+        self.loop.failed[POINTS] = self.largest[-1]
         return False
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
@@ -325,15 +373,24 @@ class Pushed:
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return False
         held, start = chain.held, Fraction(chain.level)
-        angle, fastest = chain.tighten(held.tube(held.region(Fraction(chain.levels[-1]["end"]))), self.swayed)
+        chain, (angle, fastest) = chain.nearest()
         told["level"] = chain.level
         told["highest"] = float(start + held.h / 2 * held.swing(held.tube(held.region(start)))) * MORE
         told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
         if not isfinite(angle) or angle > NEARER * told.get("angle", told.get("start.angle", 0.0)):
             loop.failed[POINTS] = "motions do not come near the target"
             return False
-        claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids)
+        claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
         return loop.try_to_show(claim, self.scales)
+
+
+def concluded(part: Part[T]) -> T:
+    """Return what follows from obligations that are taken to be met."""
+    while True:
+        try:
+            next(part)
+        except StopIteration as end:
+            return end.value
 
 
 def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
+from math import ceil, floor
 
-from ..held import Near
-from ..loops import slopes
-from ..numbers import Rows, beside, demand, matrix, plus, rational, read_list, scalar, times, transpose, up
+from ..held import Held
+from ..loops import AXES, AttitudeLoop, slopes
+from ..near import Near, spinning
+from ..numbers import (
+    Account,
+    Rows,
+    beside,
+    demand,
+    matrix,
+    plus,
+    rational,
+    read_list,
+    scalar,
+    shortened,
+    times,
+    up,
+)
 from ..polynomials import var
 from ..programs import Exactly, known, single
 from ..reading import Claim
-from ..regions import RATE, STATE, TURN, Radii
+from ..regions import AT_REST, RATE, STATE, TURN, Radii
 from ..rules import Definite, Exceeds, Part
 from ..sentences import Statement, below
 
@@ -20,36 +36,51 @@ CARRIED, CORRECTED = "errors carried", "errors corrected"
 """The programs of a sample without a new measurement, and with one: from `errors` and standard normal `noise` to the errors
 at the next, and to those of the attitude and the rate that the law is told."""
 TOLD = ("attitude", "rate")
+Spin = tuple[Rows, Rows]
+ROOT = Fraction(17321, 10000)
+"""At least the root of 3."""
 MOST, TERMS = 64, 80
 """How many samples there may be from one measurement to the next; terms of the exponential series."""
+PLACES, FINE, SLIGHT = 100, 160, 40
+"""Binary places of matrices and of covariances, and of the share by which rounding them widens these."""
 
 
-def within_radii(claim: Claim, near: Near) -> Part[tuple[Statement, Radii]]:
+def within_radii(claim: Claim, held: Held) -> Part[tuple[Statement, tuple[Radii, Radii]]]:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
     than noise.attitude and noise.rate, other standard normal vectors no longer than noise.beside, and the rate and the turn
-    that the errors cause in the linear loop no larger than those returned, but with a probability of `share` at most."""
+    that the errors cause near the target no larger than those returned, nor what momentum makes of these, but with a
+    probability of `share` at most."""
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
-    carried = [driven(near, *linear(claim, CARRIED))] * (int(every) - 1) if every > 1 else []
-    steps = [*carried, driven(near, *linear(claim, CORRECTED))]
-    size = len(steps[0][0][0])
-    demand(len(steps[-1][0][0]) == size, "the errors are not those of one estimate")
-    shapes = [matrix(shape, size, size) for shape in read_list(claim.evidence["covariances"], int(every))]
-    parts = {"attitude": slice(size, size + 3), "rate": slice(size + 3, size + 6)}
-    parts |= {"motion's rate": RATE, "motion's turn": TURN}
+    spins, count = spins_of(held.loop), int(every)
+    roles = [CARRIED] * min(count - 1, 1) + [CORRECTED]
+    errors = [linear(claim, role) for role in roles]
+    told = iter(read_list(claim.evidence["covariances"], count * len(spins)))
+    parts = parts_of(len(errors[0][0][0]), spins)
     widths = [rational(x) for x in read_list(claim.evidence["deviations"], len(parts))]
-    wide, turned = (rational(x) for x in read_list(claim.evidence["swayed"], 2))
-    radii = numbers["noise.attitude"], numbers["noise.rate"], wide, turned
-    # The last sample before those of the list is like their last.
-    for k, ((before, after), step) in enumerate(zip(pairwise([shapes[-1], *shapes]), steps, strict=True)):
-        spread = covariance(before, *step)
-        rest = plus(after, [row[:size] for row in spread[:size]], -1)
-        yield f"covariance {k}", Definite(rest)
-        for width, (name, part) in zip(widths, parts.items(), strict=True):
-            own = [row[part] for row in spread[part]]
-            yield f"deviation of the {name} {k}", Definite(plus(scalar(width * width), own, -1))
-    beside, missed = "", samples * sum(map(tail, radii, widths))
+    swayed = [rational(x) for x in read_list(claim.evidence["swayed"], len(parts) - 2)]
+    for place, spin in enumerate(spins):
+        found = [driven(held.near, *own, spin) for own in errors]
+        first, last = found[0], found[-1]
+        size = len(last[0][0])
+        demand(size == len(first[0][0]) and len(last[0]) == len(first[0]), "the errors are not those of one estimate")
+        steps, shapes = (
+            [first] * (count - 1) + [last],
+            [shortened(matrix(next(told), size, size), FINE) for _ in range(count)],
+        )
+        # The last sample before those of the list is like their last.
+        pairs = pairwise([shapes[-1], *shapes])
+        for k, ((before, after), step) in enumerate(zip(pairs, steps, strict=True), place * count):
+            spread = covariance(before, *step)
+            yield f"covariance {k}", Definite(plus(after, [row[:size] for row in spread[:size]], -1))
+            for width, (name, own) in zip(widths, parts.items(), strict=True):
+                for part in own:
+                    found = [row[part] for row in spread[part]]
+                    yield f"deviation of the {name} {k} {part.start}", Definite(plus(scalar(width * width), found, -1))
+    radii = [numbers["noise.attitude"], numbers["noise.rate"], *swayed]
+    often = [1, 1, *(len(spins) * len(own) for own in [*parts.values()][2:])]
+    beside, missed = "", sum(n * samples * tail(*own) for n, *own in zip(often, radii, widths, strict=True))
     if BESIDE in numbers:
         missed += samples * tail(numbers[BESIDE], Fraction(1))
         beside = f", other noise up to {below(numbers[BESIDE])} deviations"
@@ -58,21 +89,62 @@ def within_radii(claim: Claim, near: Near) -> Part[tuple[Statement, Radii]]:
         f", of these errors up to {below(numbers['noise.attitude'])} rad and {below(numbers['noise.rate'])} rad/s driven by"
         f" noise{beside}: all this at {samples} samples on end with a probability of at least {below(1 - share)}"
     )
-    return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate")), (wide, turned)
+    (wide, turned), apart = swayed[:2], swayed[2:]
+    both = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
+    return Statement(text, ("gaussian-noise", "linear-estimate", "settled-estimate")), both
 
 
-def driven(near: Near, errors: Rows, noise: Rows) -> tuple[Rows, Rows]:
+def spins_of(loop: AttitudeLoop) -> list[Spin | None]:
+    """Return what wheels' momentum makes of the rates at three of the six corners of an octahedron that holds all there may
+    be; the others are opposite to these. None without wheels."""
+    if not loop.wheels:
+        return [None]
+    most = ROOT * loop.claim.numbers["momentum"]
+    return [spinning(loop, [most * (i == k) for i in AXES]) for k in AXES]
+
+
+def parts_of(size: int, spins: Sequence[Spin | None]) -> dict[str, list[slice]]:
+    """Return the places of what noise drives, of which `size` are errors: of the errors that are told, and of the rate and
+    the turn that they cause; with wheels of both with and without momentum, and half of what differs."""
+    begun, count = size + (12 if spins[0] else 6), 2 if spins[0] else 1
+    found = {"attitude": [slice(begun, begun + 3)], "rate": [slice(begun + 3, begun + 6)]}
+    places = {"motion's rate": 0, "motion's turn": 3}
+    found |= {name: [slice(6 * k + own, 6 * k + own + 3) for k in range(count)] for name, own in places.items()}
+    apart = {"spun rate": begun + 6, "spun turn": begun + 9} if spins[0] else {}
+    return found | {name: [slice(own, own + 3)] for name, own in apart.items()}
+
+
+def driven(near: Near, errors: Rows, noise: Rows, spin: Spin | None = None) -> tuple[Rows, Rows]:
     """Return A and B of the rates and the turn that errors cause near the target, the errors themselves and those told: from
-    Ax + Bn for these alone. The law is told q + e/2 and w + s."""
+    Ax + Bn for these alone. The law is told q + e/2 and w + s. spin: with a momentum and with the opposite one, to the first
+    order, and half of what differs at the end."""
     size = len(errors) - 6
     turned, rated = ([row[part] for row in near.torque] for part in (TURN, RATE))
 
     def torque(rows: Rows) -> Rows:
-        told, fast = rows[size : size + 3], rows[size + 3 :]
-        return plus(times(rated, fast), times(turned, told), Fraction(1, 2))
+        return plus(times(rated, rows[size + 3 :]), times(turned, rows[size : size + 3]), Fraction(1, 2))
 
+    plain = [times(near.B, torque(rows)) for rows in (errors, noise)]
     still = [[Fraction(0)] * len(STATE) for _ in errors]
-    return beside(near.A, times(near.B, torque(errors))) + beside(still, errors), times(near.B, torque(noise)) + noise
+    if spin is None:
+        return beside(near.A, plain[0]) + beside(still, errors), plain[1] + noise
+    told, body = spin
+
+    def more(rows: Rows) -> Rows:
+        grown = times(near.grown, times(body, times(near.inverse, torque(rows))))
+        return plus(times(near.B, times(told, rows[size + 3 :])), grown)
+
+    # x of both signs is that without, half of their sum, and by its sign what momentum makes of that.
+    half = [[x / 2 for x in row] for row in near.spun(told, body)]
+    (e, own), (n, other) = ((rows, more(given)) for rows, given in zip(plain, (errors, noise), strict=True))
+    both = [
+        beside(beside(plus(near.A, half), half), plus(e, own)),
+        beside(beside([[-x for x in row] for row in half], plus(near.A, half, -1)), plus(e, own, -1)),
+    ]
+    apart = [[(x - y) / 2 for x, y in zip(s, t, strict=True)] for s, t in zip(*both, strict=True)]
+    return both[0] + both[1] + beside(beside(still, still), errors) + apart, plus(n, other) + plus(
+        n, other, -1
+    ) + noise + other
 
 
 def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
@@ -89,8 +161,24 @@ def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
 
 
 def covariance(X: Rows, A: Rows, B: Rows) -> Rows:
-    """Return the covariance of Ax + Bn."""
-    return plus(times(A, times(X, transpose(A))), times(B, transpose(B)))
+    """Return what is no less than the covariance of Ax + Bn, in numbers as short as those of X. With what is rounded off of
+    A and B, b, (a + b)(a + b)' <= (1 + 1/c) aa' + (1 + c) bb', and bb' is no more than squares of entries and the trace."""
+    n, size, one, fine = len(A), len(X), 1 << PLACES, 1 << FINE
+    own, noise = ([{k: y for k, x in enumerate(row) if (y := floor(x * one))} for row in rows] for rows in (A, B))
+    shape = [[floor(x * fine) for x in row] for row in X]
+    Account.spend(size * sum(map(len, own)) + n * sum(map(len, own + noise)), 2 * PLACES + FINE)
+    half = [[sum([x * row[k] for k, x in given.items()]) for row in shape] for given in own]
+    trace, c = sum(X[k][k] for k in range(size)), 1 << SLIGHT
+    room = ceil((1 + c) * n * (size * trace + len(B[0])) * Fraction(fine, one * one)) + n
+    found = scalar(Fraction(room, fine), n)
+    for i, (given, pushed) in enumerate(zip(own, noise, strict=True)):
+        for j in range(i + 1):
+            spread = sum([x * half[j][k] for k, x in given.items()])
+            spread += sum([x * noise[j].get(k, 0) for k, x in pushed.items()]) << FINE
+            entry = Fraction(spread * (c + 1) >> 2 * PLACES + SLIGHT, fine)
+            found[i][j] += entry
+            found[j][i] = found[i][j]
+    return found
 
 
 def tail(radius: Fraction, width: Fraction) -> Fraction:

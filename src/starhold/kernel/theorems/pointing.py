@@ -10,12 +10,16 @@ from ..held import Held
 from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
-from ..regions import ANGLE, AT_REST, RATE, TURN, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, balls, widened
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
 from .limits import within_limits
 from .noise import SHARE, within_radii
+from .response import first_of, responds
+
+ROUNDS = 64
+"""How often responses may be taken, each in the set that was found before."""
 
 HALF_TURN = Fraction(314, 100)
 """At most a half turn (rad)."""
@@ -43,9 +47,9 @@ def points(claim: Claim) -> Proof:
         yield "the sign never changes", Exceeds(region.least, held.turned / 2)
     tube = held.tube(region)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(tube))
-    noise, swayed = Statement("", ()), AT_REST
+    noise = Statement("", ())
     if SHARE in numbers:
-        noise, swayed = yield from within_radii(claim, held.near)
+        noise, (held.swayed, held.apart) = yield from within_radii(claim, held)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
     within = [(Fraction(0), tube.sizes[ANGLE])]
@@ -61,13 +65,13 @@ def points(claim: Claim) -> Proof:
         c, tube = end, held.tube(held.region(end))
         within.append((h * samples, tube.sizes[ANGLE]))
     last, beside, corners = tube.region.X, AT_REST, held.corners()
-    away = swayed[0] + held.leant[0], swayed[1] + held.leant[1]
+    away = held.away
     for k, told in enumerate(ellipsoids):
         shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        pushed = held.linear(tube, swayed)
+        pushed = held.linear(tube)
         for corner, A in enumerate(corners):
             after = image(X, shares, A, pushed)
             yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
@@ -76,9 +80,20 @@ def points(claim: Claim) -> Proof:
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
         tube, last, beside = held.tube(tube.region.within(X, away)), X, away
         within.append((h * samples, tube.sizes[ANGLE]))
+    if (told := claim.evidence.get("response")) is not None:
+        rounds, weights, gains = read_table(told, "rounds", "weights", "gains")
+        demand(type(rounds) is int and 0 < rounds <= ROUNDS, "a response is taken too often")
+        response = yield from responds(held, weights, gains)
+        radii, pulled = first_of(held, tube)
+        for _ in range(rounds):
+            radii, pulled, tube = response.after(held, tube, radii, pulled)
+            samples += response.count
+            within.append((h * samples, tube.sizes[ANGLE]))
+            last, beside = balls(radii), away
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
-    # Both samples next to a time lie in the region; |q| changes by |w|/2 at most, and sin x >= x - x^3/6.
-    near, slow = angle / 2 - angle**3 / 48 - h / 4 * fastest - beside[1], fastest - norm(tube.drift) / 2 - beside[0]
+    # Both samples next to a time lie in the region, and sin x >= x - x^3/6.
+    near = angle / 2 - angle**3 / 48 - held.bend_between(tube) - beside[1]
+    slow = fastest - norm(tube.drift) / 2 - beside[0]
     for name, most_of, part in (("angle", near, TURN), ("rate", slow, RATE)):
         demand(most_of > 0, f"the {name} is too small")
         yield f"end of the {name}", Definite(plus(scalar(most_of * most_of), [row[part] for row in last[part]], -1))

@@ -1,0 +1,65 @@
+"""Finds the weights by which the sums of a loop's impulse response are shown, and these sums."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from math import ceil, log
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from starhold.certification.evidence.finding import floats
+from starhold.kernel.held import Held
+from starhold.kernel.theorems.response import MOST, PARTS
+
+Array = NDArray[np.float64]
+
+LEFT = 7.0
+"""Minus the logarithm of the share of a state that is left after the samples of a response."""
+FINEST, LONGEST, LEAST, MORE = 1e3, 1e9 - 1.0, 1e-4, 1.0 + 1e-7
+"""The least and the largest weight, the least share of a sample beside the mean, and the margin for rounding."""
+
+
+def find_response(held: Held) -> dict[str, Any] | None:
+    """Return the evidence about the impulse response, for one round; None if it lasts too long."""
+    A = floats(held.near.A)
+    radius = float(np.abs(np.linalg.eigvals(A)).max())
+    if radius >= 1.0 or -LEFT / log(radius) > MOST:
+        return None
+    powers = [np.vstack([np.eye(6), floats(held.near.rates)])]
+    for _ in range(ceil(-LEFT / log(radius)) - 1):
+        powers.append(powers[-1] @ A)
+    weighed, gains, B = list[list[int]](), list[list[str]](), list(map(floats, held.ways))
+    for part in PARTS.values():
+        rows = np.array(powers)[:, part]
+        first, last, turn = (G @ G.transpose(0, 2, 1) for G in (rows @ one for one in B))
+        weights = np.minimum(np.rint(FINEST * weigh(first + last)), LONGEST)
+        share = float((1.0 / weights).sum())
+        totals = (np.einsum("k,kij->ij", weights, one) for one in (2.0 * (first + last), last, turn))
+        tops = [float(np.linalg.eigvalsh(one)[-1]) * share for one in totals]
+        weighed.append([int(m) for m in weights])
+        gains.append([float.hex(top**0.5 * MORE) for top in tops])
+    return {"rounds": 1, "weights": weighed, "gains": gains}
+
+
+def weigh(squares: Array) -> Array:
+    """Return weights m_k of matrices S_k, the least of them 1, for which the largest eigenvalue of the sum of m_k S_k times
+    the sum of 1/m_k is about least. It is the largest, over mixtures W of directions, of the square of the sum of the roots
+    of tr(W S_k), and the best m_k go with the inverses of these roots."""
+    optimize: Any = import_module("scipy.optimize")
+    lower = np.tril_indices(3)
+
+    def roots(x: Array) -> Array:
+        L = np.zeros((3, 3))
+        L[lower] = x
+        return np.sqrt(np.maximum(np.einsum("ij,kij->k", L @ L.T / (L * L).sum(), squares), 0.0))
+
+    def cost(x: Array) -> float:
+        return -float(roots(x).sum()) / scale
+
+    even = np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
+    scale = float(roots(even).sum())
+    own = roots(optimize.minimize(cost, even, method="BFGS").x)
+    own = np.maximum(own, LEAST * own.mean())
+    return own.max() / own

@@ -1,0 +1,49 @@
+"""The linear motion of a loop near its target, with its torque held between samples, and what wheels' momentum adds."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
+from .numbers import Rows, beside, inverse, plus, scalar, times
+from .regions import STATE, with_momentum
+
+
+class Near(NamedTuple):
+    """A loop near its target: the law's torque and the acceleration as matrices on (w, q), and A and B such that samples are
+    followed by Ax + Bu, with a torque u that is held beside the law's; what one does that grows to uh; J^-1."""
+
+    torque: Rows
+    rates: Rows
+    A: Rows
+    B: Rows
+    grown: Rows
+    inverse: Rows
+
+    def spun(self, told: Rows, body: Rows) -> Rows:
+        """Return what the law's torque and the body's add to A that are these matrices times the rates."""
+        both = times(self.B, beside(plus(told, body), scalar(0)))
+        return plus(both, times(self.grown, times(body, self.rates)))
+
+
+def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
+    """Return the linear loop with its torque held for h, where nothing comes from outside."""
+    at = loop.on_target | loop.still | {f"{letter}{k + 1}": 0 for letter in "erah" for k in AXES}
+    torque, N = slopes(loop.u, STATE, at), inverse(loop.given)
+    rates = times(N, torque)
+    A = over_period([[-x for x in row] for row in rates], h)
+    B, grown = ([[c * x for x in row] for c in both for row in N] for both in ((h, h * h / 4), (h * h / 2, h**3 / 12)))
+    return Near(torque, rates, A, B, grown, N)
+
+
+def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
+    """Return what wheels' momentum makes of the rates, as matrices: in the law's torque, and in that on the body."""
+    names = {f"h{k + 1}": x for k, x in enumerate(at)}
+    told, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
+    return told, body
+
+
+def over_period(feedback: Rows, h: Fraction) -> Rows:
+    """Return the linear motion of (w, q) over a period in which the acceleration -feedback (w, q) does not change."""
+    return plus(beside(scalar(1), scalar(0)), feedback, -h) + plus(beside(scalar(h / 2), scalar(1)), feedback, -h * h / 4)
