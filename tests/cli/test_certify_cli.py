@@ -1,6 +1,7 @@
 """Certificates as a user meets them: what is printed, what is written, the exit codes."""
 
 import json
+import re
 import subprocess
 import sys
 from fractions import Fraction
@@ -104,6 +105,13 @@ def test_compare_begins_with_the_loop_as_it_flies_once_that_is_asked_for(tmp_pat
     assert rows["pd"].startswith("pd proved within ")
     assert ("pointing" in kinds["pd"], reasons) == (True, [None, memory])
     starhold("check", "out/certificate.json", cwd=tmp_path, code=0)
+
+
+def test_certify_says_why_a_claim_is_about_no_larger_start(tmp_path):
+    done = starhold("certify", "cubesat-slew", "--law", "pd", "--why", "-o", "out", cwd=tmp_path)
+    (subject,) = (one["subject"] for one in json.loads((tmp_path / "out" / "certificate.json").read_text())["certificates"])
+    assert re.fullmatch(r"from [0-9.]+ deg at [0-9.e-]+ deg/s: .*(limit|found)", subject["no_larger_start"])
+    assert f"not proved of a larger start: {subject['no_larger_start']}" in " ".join(done.stdout.split())
 
 
 def test_certify_says_why_nothing_is_proved_of_the_loop_as_it_flies(tmp_path):

@@ -117,6 +117,25 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
             assert (np.abs(way @ left) <= most[:, None]).all()
 
 
+def test_what_turns_the_rates_as_they_drift_is_a_push():
+    """The law makes up for w x Jw at the sample alone. Almost nothing else pushes here."""
+    oracle = Oracle(contents("flying", "skew"), contents("flying", "skew")["claims"][0])
+    level = oracle.numbers["level"] / 1000.0
+    held, fleet = held_loop("skew", outside=1e-12, error=1e-12), fleet_of("skew", 0.0, 0.0)
+    tube = held.tube(held.region(Fraction(level)))
+    q, w = states_of(oracle, level, fleet.lanes)
+    later, rate = after_a_period(fleet, q, w, fleet.directions())
+    left = np.concatenate([rate, later[1:]]) - floats(held.near.A) @ np.concatenate([w, q[1:]])
+
+    def used():
+        most = sum(np.linalg.norm(floats(B)[:3], axis=1) * float(b) for B, b in held.linear(tube))
+        return float((np.abs(left[:3]) / most[:, None]).max())
+
+    assert used() <= 1.0
+    held.tumbled = [Poly({})] * 3
+    assert used() > 1.0
+
+
 def test_roots_and_rounded_numbers_are_not_below_and_near():
     Account.open()
     r = random.Random(4)

@@ -328,12 +328,11 @@ class Pushed:
         return False
 
     def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
-        """Return whether a start is taken, and keep in `failed` why the largest is not."""
+        """Return whether a start is taken, and keep why the largest is not."""
         if tried(angle, rate, limits):
             return True
         start = f"from {degrees(angle):.3g} deg at {degrees(rate):.3g} deg/s: "
         self.largest = max(self.largest, (angle, rate, start + self.loop.failed[POINTS]))
-        self.loop.failed[POINTS] = self.largest[-1]
         return False
 
     def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
