@@ -88,6 +88,12 @@ def test_rocq_accepts_what_is_proved_of_attitude_laws(scenario, law, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["body", "moving", "noisy"])
+def test_rocq_accepts_what_is_proved_of_pointing(name, tmp_path):
+    assert accepted(printed(check(text(contents("flying", name)))), tmp_path) == ""
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("scenario", "law"), FLOWN)
 def test_rocq_accepts_what_is_proved_of_station_keeping(scenario, law, tmp_path):
     assert accepted(printed(check(json.dumps(proof(flown(scenario, law))))), tmp_path) == ""
