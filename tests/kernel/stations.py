@@ -144,6 +144,8 @@ class StationOracle:
         def pulled(x):
             return self.read("field", np.array([x, *place[1:]]), np.zeros(3))[0]
 
+        if np.abs(self.read("law", place, np.zeros(3))[1:]).max() > n["limit"] * (1.0 + 1e-12):
+            return False
         s = math.sqrt(pulled(1.0))
         for _ in range(300):
             share, part = self.rng.uniform(0.01, 1.0), self.rng.uniform(-1.0, 1.0)
@@ -169,8 +171,9 @@ class StationOracle:
         return bool(there and size * (1 + 1e-12) >= n["control"] > n.get("limit.norm", n.get("limit.axis")))
 
     def _does_not_return(self):
-        found = self.slopes([0.1, 0.7, 0.4, 0.3, 0.1, 0.2])
-        return any(max(found[k, k], found[k, k + 3]) > -1e-6 for k in range(3))
+        slopes = self.slopes([0.1, 0.7, 0.4, 0.3, 0.1, 0.2])
+        alone = [k for k in range(3) if np.abs(np.delete(slopes[k], [k, k + 3])).max() < 1e-6]
+        return any(max(slopes[k, k], slopes[k, k + 3]) > -1e-6 for k in alone)
 
     def _holds_another_circle(self):
         """Just beside the circle in every direction what the relay takes off turns the error round."""
@@ -178,6 +181,8 @@ class StationOracle:
         r = n["radius"]
         for turn in self.rng.uniform(0.0, 2.0 * math.pi, 8):
             x = np.array([0.0, r * math.cos(turn), r * math.sin(turn)])
+            if abs(self.acceleration(x, np.array([0.0, -rate * x[2], rate * x[1]]))[0]) > 1e-9:
+                return False
             for off in np.linspace(0.0, 2.0 * math.pi, 9):
                 e = 1e-5 * np.array([math.cos(off), math.sin(off)])
                 v = np.array([0.0, e[0] - rate * x[2], e[1] + rate * x[1]])

@@ -169,6 +169,20 @@ def test_only_this_hypothesis_about_a_layer_fails_and_the_claim_is_false(number,
     assert not Oracle(content, claim).holds()
 
 
+@pytest.mark.parametrize(("number", "hypothesis"), [("motors.1", "motor"), ("stored.1", "wheel")])
+def test_only_this_hypothesis_about_wheels_fails_and_the_claim_is_false(number, hypothesis):
+    content = contents("cubesat-nadir", "wheel", 1)
+    (claim,) = content["claims"]
+    claim["numbers"] |= {
+        name: str(rational(x) * 2) for name, x in claim["numbers"].items() if name[:-1] in ("motors.", "stored.")
+    }
+    assert Oracle(content, claim).holds()
+    assert failing(claim, content["programs"]) == set()
+    claim["numbers"][number] = str(rational(claim["numbers"][number]) / 1000)
+    assert failing(claim, content["programs"]) == {hypothesis}
+    assert not all(Oracle(content, claim, seed).holds() for seed in range(3))
+
+
 def test_a_law_that_cancels_what_wheels_store_is_not_taken_to_slide():
     def cancelling(m):
         return add(sliding(0.1)(m), cross(m.body_rate, m.wheel_momentum))

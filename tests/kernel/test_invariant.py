@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import pytest
 
+from starhold.algebra.scalar import less, where
 from starhold.kernel.check import check
 from starhold.kernel.numbers import WORK, Account, RefusedError, rational
 from starhold.kernel.programs import digest
@@ -107,25 +108,53 @@ def test_a_start_set_is_what_a_claim_speaks_of():
     assert "start in {start >= 0} of the box stay in {V < 2} of the box and come to the equilibrium" in proved.statement.text
 
 
-@pytest.mark.parametrize(
-    ("word", "rates", "V", "state"),
-    [
-        ("does not fall", lambda x, y: (-x + x * x * x, -y), round_, ("6/5", "1/10")),
-        ("reaches the border", lambda x, y: (-x, -y), round_, ("2", "0")),
-        ("is not positive", lambda x, y: (-x, -y), lambda x, y: x * x - y * y, ("1", "1")),
-        ("does not grow", lambda x, y: (1 - x, -y), round_, ("-1", "1")),
-    ],
-)
-def test_refutations_are_states(word, rates, V, state):
-    numbers = ORIGIN | {"state.x": state[0], "state.y": state[1]}
-    (proved,) = check(certificate(attempt("fails", rates, {"V": V}, SQUARE, numbers, taken=(word,))))
+FAILS = [
+    ("does not fall", lambda x, y: (-x + x * x * x, -y), round_, ("6/5", "1/10"), ("1/10", "0")),
+    ("reaches the border", lambda x, y: (-x, -y), round_, ("2", "0"), ("1", "0")),
+    ("is not positive", lambda x, y: (-x, -y), lambda x, y: x * x - y * y, ("1", "1"), ("1", "0")),
+    ("does not grow", lambda x, y: (1 - x, -y), round_, ("-1", "1"), ("1/2", "0")),
+    ("jumps", lambda x, y: (-x, -y), lambda x, y: where(less(0.0, x), round_(x, y), y), ("0", "2"), ("0", "1")),
+]
+"""What V does at the first state, and does not at the second."""
+
+
+def slope_of(rates, V, x, y, step=1e-6):
+    a, b = rates(x, y)
+    return (V(x + step * a, y + step * b) - V(x - step * a, y - step * b)) / (2.0 * step)
+
+
+SEEN = {
+    "does not fall": lambda rates, V, x, y: V(x, y) > 0.0 and slope_of(rates, V, x, y) > 0.0,
+    "does not grow": lambda rates, V, x, y: V(x, y) > 0.0 and slope_of(rates, V, x, y) <= 0.0,
+    "reaches the border": lambda rates, V, x, y: max(abs(x), abs(y)) == 2.0,
+    "is not positive": lambda rates, V, x, y: V(x, y) <= 0.0 and (x, y) != (0.0, 0.0),
+    "jumps": lambda rates, V, x, y: abs(V(x + 1e-9, y) - V(x - 1e-9, y)) > 1e-6,
+}
+"""The same in floats."""
+
+
+@pytest.mark.parametrize(("word", "rates", "V", "state", "other"), FAILS)
+def test_refutations_are_states(word, rates, V, state, other):
+    def tried(at):
+        numbers = {} if word == "jumps" else ORIGIN
+        numbers = numbers | {"state.x": at[0], "state.y": at[1]}
+        return attempt("fails", rates, {"V": V}, SQUARE, numbers, taken=(word,))
+
+    def seen(at):
+        return SEEN[word](rates, V, *(float(Fraction(x)) for x in at))
+
+    (proved,) = check(certificate(tried(state)))
     assert proved.statement.text
-    with pytest.raises(AssertionError):
-        check_fails(attempt("fails", rates, {"V": V}, SQUARE, numbers | {"state.x": "1/10", "state.y": "0"}, taken=(word,)))
+    assert seen(state)
+    assert not seen(other)
+    with pytest.raises(RefusedError, match=f"V is not shown to fail: {word}"):
+        check(json.dumps(unproved(tried(other))))
 
 
-def check_fails(tried):
-    assert certificate(tried).startswith("{")
+def unproved(tried):
+    """Return the certificate of a claim without evidence."""
+    programs = {digest(program): program for program in tried.programs.values()}
+    return {"format": "starhold certificate 3", "programs": programs, "claims": [tried.claim()]}
 
 
 @pytest.mark.slow

@@ -7,8 +7,11 @@ import time
 
 import pytest
 
+from starhold.algebra.polynomial import Polynomial
+from starhold.certification.invariant.theorems import program
 from starhold.kernel.check import check
 from starhold.kernel.numbers import RefusedError
+from starhold.kernel.programs import digest
 from tests.kernel.certificates import failing, rekeyed, text
 from tests.kernel.mutations import refusals
 from tests.kernel.stations import BEST, REST, SOFT, StationOracle, certify_station, flown, loop_of, proof
@@ -95,6 +98,8 @@ FALSE = [
     ("limited axis", "numbers", {"reach": "1/10"}, "x follows"),
     ("limited axis", "numbers", {"boundary": "2/5"}, "nothing returns from beyond"),
     ("deficit", "numbers", {"limit.norm": "7/2"}, "more than the limit"),
+    ("deficit", "numbers", {"control": "100"}, "control"),
+    ("relay", "numbers", {"radius": "1"}, "another circle"),
     ("rest", "subject", {"gains.k_x": "8"}, "returns"),
     ("rest", "subject", {"gains.k_velocity.1": "-1"}, "returns"),
 ]
@@ -107,6 +112,55 @@ def test_only_this_hypothesis_fails_and_the_claim_is_false(name, part, changed, 
     claim[part] |= changed
     assert failing(claim, content["programs"]) == {hypothesis}
     assert not all(StationOracle(content, claim, seed).holds() for seed in range(3))
+
+
+# Steps that come after a program's own: an operand counts from the first of the program, or names an output.
+PUSHED = [
+    ("relay", "law", 0, [["constant", "1"], ["plus", "out", -1]], "the plane is not left"),
+    ("relay", "law", 1, [["constant", "1000"], ["plus", "out", -1]], "the drift"),
+    ("relay", "law", 1, [["constant", "1"], ["divide", -1, 34], ["select", 32, -1, 25], ["plus", "out", -1]], "the relay"),
+    ("circle", "lyapunov", 0, [["minus", "out", 0]], "V is a sum of squares"),
+    ("rest", "rest", 0, [["constant", "1"], ["plus", "out", -1]], "rest is one"),
+    ("limited axis", "field", 0, [["constant", "1"], ["plus", "out", -1]], "the field along X"),
+    ("limited axis", "law", 0, [["constant", "1"], ["plus", "out", -1]], "the law along X"),
+    ("limited axis", "law", 1, [["constant", "1000"], ["plus", "out", -1]], "Y can be held"),
+]
+
+
+def push(content, role, place, steps):
+    """Change an output of a program by further steps."""
+    (claim,) = content["claims"]
+    program = content["programs"][claim["programs"][role]]
+    for name, *operands in steps:
+        last = len(program["inputs"]) + len(program["steps"])
+        known = {"out": program["outputs"][place], -1: last - 1}
+        program["steps"].append([name, *(operands if name == "constant" else (known.get(k, k) for k in operands))])
+    program["outputs"][place] = last
+    return rekeyed(content)
+
+
+@pytest.mark.parametrize(("name", "role", "place", "steps", "hypothesis"), PUSHED)
+def test_only_this_hypothesis_about_a_program_fails_and_the_claim_is_false(name, role, place, steps, hypothesis):
+    content = push(made(name), role, place, steps)
+    (claim,) = content["claims"]
+    assert failing(claim, content["programs"]) == {hypothesis}
+    assert not all(StationOracle(content, claim, seed).holds() for seed in range(3))
+
+
+def test_an_axis_that_another_one_moves_may_return():
+    """x'' = -3x' - y, y'' = x - 2y - 3y': along x nothing pulls back but y, and all motions come to rest."""
+    x, y, z, u, v, w = (Polynomial.variable(f"{name}.{k}") for name in ("position", "velocity") for k in range(3))
+    content = made("x leaves")
+    (claim,) = content["claims"]
+    roles = {
+        "field": program((0 * x - y, x - 2 * y, 0 * z - z), [f"position.{k}" for k in range(3)]),
+        "law": program(tuple(-3 * a for a in (u, v, w)), [f"velocity.{k}" for k in range(3)]),
+    }
+    roles["law"]["inputs"] = [f"measurement.{name}" for name in roles["law"]["inputs"]]
+    claim |= {"programs": {role: digest(one) for role, one in roles.items()}, "subject": {}}
+    content["programs"] = {digest(one): one for one in roles.values()}
+    assert failing(claim, content["programs"]) == {"an axis on its own"}
+    assert not StationOracle(content, claim).holds()
 
 
 def refused(name, match, **numbers):

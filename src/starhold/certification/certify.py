@@ -104,8 +104,8 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
     elif not unflown:
         pointing = wanted.pointing or wanted.disturbance > 0.0
-        told = wanted.slew_angle, wanted.rate, wanted.inertia_tolerance
-        proved, failed = proved_claims(subject, *told, pointing, wanted.begun)
+        bounds = wanted.slew_angle, wanted.rate, wanted.inertia_tolerance
+        proved, failed = proved_claims(subject, *bounds, pointing, wanted.begun)
         if loop.law.lyapunov is not None:
             claims.extend(_by_lyapunov(subject, wanted, proved, failed))
         else:
@@ -146,8 +146,8 @@ def _by_lyapunov(subject: Subject, wanted: Wanted, proved: Mapping[str, Claim], 
     if main is None:
         read(subject.loop)
         everything = rate is None or isinf(rate)
-        told = {"rate_everywhere": None if everything else rate, "everything": everything}
-        main = undecided("convergence", told, subject, reason)
+        numbers = {"rate_everywhere": None if everything else rate, "everything": everything}
+        main = undecided("convergence", numbers, subject, reason)
     limits = next((text for name, text in failed.items() if name.endswith("limits")), reason)
     others = [proved[kind] for kind in ("wheels", "torque-limit", "inertia") if kind in proved]
     return [main, *others, *_unshown(subject, wanted, proved, limits, failed.get(NEARBY, reason))]
@@ -158,19 +158,19 @@ def _unshown(
 ) -> list[Claim]:
     """Yield requested claims that are not proved."""
     rate, turn, tolerance, loop = wanted.rate, wanted.slew_angle, wanted.inertia_tolerance, subject.loop
-    asked: list[tuple[str, dict[str, Any], str]] = []
+    requested: list[tuple[str, dict[str, Any], str]] = []
     if rate is not None and loop.law.lyapunov is None:
-        told = {"rate_everywhere": None if isinf(rate) else rate, "everything": isinf(rate)}
-        asked.append(("convergence", told, reason))
+        numbers = {"rate_everywhere": None if isinf(rate) else rate, "everything": isinf(rate)}
+        requested.append(("convergence", numbers, reason))
     limit, wheels = loop.craft.torque_limit, loop.wheels
     if wheels is not None:
         if turn is not None or (wanted.momentum is not None and loop.law.lyapunov is not None):
-            asked.append(("wheels", {} if turn is None else {"slew_angle": turn}, reason))
+            requested.append(("wheels", {} if turn is None else {"slew_angle": turn}, reason))
     elif turn is not None and loop.limit != "none" and isfinite(limit):
-        asked.append(("torque-limit", {"slew_angle": turn, "kind": loop.limit, "limit": limit}, reason))
+        requested.append(("torque-limit", {"slew_angle": turn, "kind": loop.limit, "limit": limit}, reason))
     if tolerance is not None:
-        asked.append(("inertia", {"tolerance": tolerance}, uncertain or reason))
-    return [undecided(kind, told, subject, why) for kind, told, why in asked if kind not in proved]
+        requested.append(("inertia", {"tolerance": tolerance}, uncertain or reason))
+    return [undecided(kind, numbers, subject, why) for kind, numbers, why in requested if kind not in proved]
 
 
 def undecided(kind: str, numbers: dict[str, Any], subject: Subject, reason: str) -> Claim:

@@ -81,8 +81,8 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     """Add up the bounds of the parts of a loop that declare them."""
     torques, errors = [Push(0.0)], [Push(0.0)]
     for fitted in _acting(loop):
-        for told, found in zip((torques, errors), _pushes(fitted, envelope), strict=True):
-            told += [] if found is None else [found]
+        for pushed, push in zip((torques, errors), _pushes(fitted, envelope), strict=True):
+            pushed += [] if push is None else [push]
     driven = driven_errors(loop)
     estimated = _estimated(loop, driven)
 
@@ -91,9 +91,11 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
         noisy = driven is not None and fitted in driven.parts
         return fitted not in estimated and (noisy or not _is_random(_noise(fitted, loop.period)))
 
-    told = [NO_ERRORS, *(found for f in _acting(loop) if (found := _bounded(f)) is not None and counts(f))]
-    attitude, rate, *_ = (sum(own) for own in zip(*told, strict=True))
-    (torque, per_rate), (command, command_per_rate) = ([sum(x) for x in zip(*own, strict=True)] for own in (torques, errors))
+    bounds = [NO_ERRORS, *(bound for f in _acting(loop) if (bound := _bounded(f)) is not None and counts(f))]
+    attitude, rate, *_ = (sum(sizes) for sizes in zip(*bounds, strict=True))
+    (torque, per_rate), (command, command_per_rate) = (
+        [sum(x) for x in zip(*pushed, strict=True)] for pushed in (torques, errors)
+    )
     turn = band_of(loop)[2:] if loop.target.part.name == "orbital" else (0.0, 0.0)
     return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *turn)))
 
@@ -106,18 +108,22 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
     estimators = loop.used("estimator")
     wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
-    told = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
-    if not sensors or not told or loop.target.part.flag("BY_MODE"):
+    declared = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
+    if not sensors or not declared or loop.target.part.flag("BY_MODE"):
         return None
     noise = Noise()
     several = getattr(estimators[0].part.module, "SEVERAL", ()) if estimators else ()
     attitudes, rates = ([_noise(f, loop.period) for f in sensors if name in _shown(f)] for name in ("attitude", "rate"))
-    if len(rates) > 1 or (len(attitudes) > 1 and ("attitude" not in several or len({own.every for own in attitudes}) > 1)):
+    if len(rates) > 1 or (
+        len(attitudes) > 1 and ("attitude" not in several or len({reading.every for reading in attitudes}) > 1)
+    ):
         return None
-    for own in attitudes[:1]:
-        noise = noise._replace(attitude=own.attitude, every=own.every, more=tuple(other.attitude for other in attitudes[1:]))
-    for own in rates:
-        noise = noise._replace(rate=own.rate, walk=own.walk)
+    for reading in attitudes[:1]:
+        noise = noise._replace(
+            attitude=reading.attitude, every=reading.every, more=tuple(other.attitude for other in attitudes[1:])
+        )
+    for reading in rates:
+        noise = noise._replace(rate=reading.rate, walk=reading.walk)
     if estimators:
         tell: Any = estimators[0].part.hook("recursion")
         recursion = None if tell is None else tell(estimators[0].params, noise, loop.period, _rate(loop))
@@ -203,8 +209,8 @@ def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | Non
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
-    found = [None if tell is None else tell(fitted.params, envelope) for tell in tells]
-    torque, error = (push if push is None or is_read(fitted) or all(map(isfinite, push)) else None for push in found)
+    declared = [None if tell is None else tell(fitted.params, envelope) for tell in tells]
+    torque, error = (push if push is None or is_read(fitted) or all(map(isfinite, push)) else None for push in declared)
     return torque, error
 
 
@@ -216,8 +222,8 @@ def _estimated(loop: ClosedLoop, driven: Driven | None) -> Collection[Fitted]:
 def _bounded(fitted: Fitted) -> Errors | None:
     """Read the declared largest errors of a part beside its noise, where they are finite."""
     tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
-    found = NO_ERRORS if tell is None else tell(fitted.params)
-    return None if tell is None or not all(map(isfinite, found)) else found
+    largest = NO_ERRORS if tell is None else tell(fitted.params)
+    return None if tell is None or not all(map(isfinite, largest)) else largest
 
 
 def _is_removed(errors: Errors | None, estimated: bool) -> bool:
@@ -258,8 +264,8 @@ def _as_read(noise: Noise) -> Recursion | None:
         return None
 
     def read(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
-        told = apply(noise.attitude, random[2]), scale(noise.rate, random[0])
-        return told, *told
+        misread = apply(noise.attitude, random[2]), scale(noise.rate, random[0])
+        return misread, *misread
 
     return Recursion(read, read, 1, 2)
 

@@ -15,7 +15,7 @@ from starhold.kernel.points import PointLoop
 from starhold.kernel.polynomials import multiple
 from starhold.kernel.programs import digest
 from starhold.kernel.rules import Exceeds, Squares
-from starhold.kernel.theorems.station import Circle, declared
+from starhold.kernel.theorems.station import Circle, weighed
 from starhold.laws.point_programs import point_programs, point_subject
 from starhold.loop.closed_loop import ClosedLoop
 
@@ -23,8 +23,8 @@ CIRCLE, MORE, HELD = "ends on the circle", "needs more control on the circle", "
 REST, ASTRAY, LIMITED = "comes to rest", "does not return", "returns with limited control"
 ROLES = {
     CIRCLE: ("field", "law", "errors", "lyapunov"),
-    MORE: ("field", "law", "errors", "lyapunov"),
-    HELD: ("field", "law", "errors", "lyapunov"),
+    MORE: ("field", "law", "errors"),
+    HELD: ("field", "law", "errors"),
     REST: ("field", "law", "rest"),
     ASTRAY: ("field", "law", "errors"),
     LIMITED: ("field", "law", "rest", "limited"),
@@ -84,7 +84,7 @@ class Station:
     def circle(self) -> tuple[PointLoop, Circle]:
         """The loop as the kernel has it, and the circle of its law. RefusedError where it declares none."""
         loop = PointLoop(read(self.claim(CIRCLE), self.by_digest))
-        return loop, ended(declared(loop))
+        return loop, ended(weighed(loop))
 
     def contents(self, level: float) -> dict[str, float]:
         """Return the numbers of a level: radii of circles in the set, errors of the velocity, distance from the bodies."""

@@ -4,8 +4,8 @@ All are about the loop of `points`. Assumed of every one: two bodies on circles,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from ..loops import wired
@@ -27,9 +27,9 @@ class Circle:
     errors: list[Poly]
     square: Fraction
     rate: Fraction
-    weights: list[Fraction]
     size: str
     inverse: str
+    weights: Sequence[Fraction] = ()
 
     @property
     def lyapunov(self) -> Poly:
@@ -55,7 +55,7 @@ def ends_on_circle(claim: Claim) -> Proof:
     """Every motion from {V <= level} ends on the circle, with x = 0. The set holds circles between two radii, and errors of
     the velocity; on it the control is limited."""
     loop, numbers = PointLoop(claim), claim.numbers
-    circle = yield from declared(loop)
+    circle = yield from weighed(loop)
     c, heavy = circle.square, circle.weights[0]
     level, inner, outer, velocity = (numbers[name] for name in ("level", "inner", "outer", "velocity"))
     yield "the level is positive", Exceeds(level)
@@ -74,18 +74,25 @@ def ends_on_circle(claim: Claim) -> Proof:
 
 
 def declared(loop: PointLoop) -> Part[Circle]:
-    """The law's errors are those of a circle that is run through, and V is a positive sum of their squares."""
-    errors, (V,) = loop.single("errors", 3), loop.single("lyapunov", 1)
+    """The law's errors are those of a circle."""
+    errors = loop.single("errors", 3)
     square, rate = -errors[0].at({"x2": 0, "x3": 0}).number, errors[1].slope("x3").number
     (_, y, z), (_, v, w) = loop.x, loop.v
     expected = [y * y + z * z - square, v + rate * z, w - rate * y]
     yield from vanish("the errors are those of a circle", minus(errors, expected), first=1)
-    weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
     loop.sides  # noqa: B018 (asks for roots)
-    circle = Circle(errors, square, rate, weights, *loop.relay(errors[1:]))
+    return Circle(errors, square, rate, *loop.relay(errors[1:]))
+
+
+def weighed(loop: PointLoop) -> Part[Circle]:
+    """The circle is run through, and V is a positive sum of the squares of its errors."""
+    circle = yield from declared(loop)
+    (V,) = loop.single("lyapunov", 1)
+    weights = [V.terms.get(m, Fraction(0)) for m in (("x2",) * 4, ("v2",) * 2, ("v3",) * 2)]
+    circle = replace(circle, weights=weights)
     yield "V is a sum of squares", Vanishes(V - circle.lyapunov)
     yield "V is positive", Exceeds(min(weights))
-    yield "the circle is run through", Exceeds(min(square, rate * rate))
+    yield "the circle is run through", Exceeds(min(circle.square, circle.rate * circle.rate))
     return circle
 
 
