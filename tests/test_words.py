@@ -12,12 +12,6 @@ FRAGMENT = re.compile(r"(What|The same|Of)\b")
 
 BARE = {"told", "found", "own", "held", "asked"}
 """Names that hide whether a value is a measurement, a bound, a command or a result."""
-NOT_YET = {
-    *("certification/hand_over.py", "certification/subject.py"),
-    *(f"certification/evidence/{name}.py" for name in ("ellipsoids", "noise", "pointing")),
-    *("kernel/held.py", "kernel/theorems/noise.py", "kernel/theorems/pointing.py"),
-}
-"""Files that have such names still."""
 
 
 def files_of(place):
@@ -56,9 +50,8 @@ def names(path):
 @pytest.mark.parametrize("folder", sorted({path.relative_to(SOURCE).parts[0] for path in SOURCE.rglob("*.py")}))
 def test_names_say_what_a_value_is(folder):
     bare = [
-        f"{place}:{line}: {name}"
+        f"{path.relative_to(SOURCE)}:{line}: {name}"
         for path in files_of(SOURCE / folder)
-        if (place := path.relative_to(SOURCE).as_posix()) not in NOT_YET
         for line, name in names(path)
         if name in BARE
     ]

@@ -70,7 +70,7 @@ def test_a_motor_has_room_for_what_the_law_is_told_wrongly():
     Account.left = 10**12
     found = Loop(make_subject(rotors("wheel", GAINS)))
     own = Pushed(found, Pushes(1e-5))
-    claim = own.claim(own.leans[0][1], own.told | found.limits | {"level": 1e-4})
+    claim = own.claim(own.leans[0][1], own.numbers | found.limits | {"level": 1e-4})
     loop = AttitudeLoop(read(claim, found.by_digest))
     exact, misread = (dict(within_limits(loop, Fraction(x))) for x in ("0", "1/100"))
     assert any(name.startswith("motor") for name in exact)

@@ -31,7 +31,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     loop = Loop(make_subject(build(given, given.pick(law))))
     own = Pushed(loop, pushes(loop.loop, loop.known.envelope(False)))
     _, V, held, _ = own.leans[0]
-    oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.told))
+    oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.numbers))
     n, h, rng = oracle.numbers, loop.loop.period, np.random.default_rng(3)
     region = held.region((held.s + held.G[3][3]) * round(share * 2**30) / 2**30)
     tube, inverse = held.tube(region), np.linalg.inv(oracle.J)
@@ -99,7 +99,7 @@ def test_a_target_whose_motion_is_misread_moves_the_torque_by_no_more_than_its_b
     wrong = wrong._replace(target_rate=1e-4, target_acceleration=3e-4)
     own = Pushed(loop, wrong)
     _, V, held, _ = own.leans[0]
-    oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.told), 7)
+    oracle = Oracle({"programs": loop.by_digest}, loop.claim("points", own.words, V, **own.numbers), 7)
     region = held.region(held.s / 1000)
     bound, rng, far = float(held.misread(region)[0]), oracle.rng, 0.0
     states = np.linalg.cholesky(floats(region.X)) @ along(rng.normal(size=(6, 300)))
@@ -121,7 +121,7 @@ def test_a_body_that_leans_on_its_momentum_is_where_it_is_said_to_be_and_stays()
     loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
     own = Pushed(loop, pushes(loop.loop, loop.known.envelope(True))._replace(attitude=0.0, rate=0.0))
     held = own.leans[0][2]
-    n, A, B = own.told, floats(held.near.A), floats(held.near.B)
+    n, A, B = own.numbers, floats(held.near.A), floats(held.near.B)
     b = sum(b for _, b in held.linear(held.tube(held.region(held.s / 2**26)))[:2]) / 2
     torque = np.cross(np.eye(3)[0] * n["target.rate"], np.eye(3)[2] * n["momentum"])
     assert np.isclose(np.linalg.norm(torque), float(held.lasting), rtol=1e-9)
@@ -158,6 +158,6 @@ def test_a_potential_that_is_even_holds_motions_on_one_side_of_a_half_turn():
             high = middle
     with pytest.raises(RefusedError, match="a half turn"):
         held.tube(held.region(low))
-    claim = own.claim(V, own.told | {"level": 1e-6, "start.angle": 3.2, "start.rate": 0.0, "highest": 1.0})
+    claim = own.claim(V, own.numbers | {"level": 1e-6, "start.angle": 3.2, "start.rate": 0.0, "highest": 1.0})
     with pytest.raises(RefusedError, match="the other quaternion"):
         dict(points(read(claim, loop.by_digest)))

@@ -98,7 +98,7 @@ def test_a_period_takes_no_state_farther_than_its_bounds(name, power):
     Q, H, F, pushed, rest = held.fall(tube)
     Q, H, F, pushes = floats(Q), floats(H), floats(F), held.linear(tube)
     # What F has beside the push is of its growth in a period.
-    grown, A = float(pushed / (tube.held + tube.pushed)), held.near.A
+    grown, A = float(pushed / (tube.steady + tube.pushed)), held.near.A
     V = oracle.lyapunov(q, w)
     assert ((x * (H @ x)).sum(0) * (1 + 1e-9) >= V).all()
     for unit in (fleet.push(0, q, w), fleet.directions(), along(F[:3] @ x)):

@@ -31,10 +31,10 @@ def hand_over(loop: ClosedLoop, before: ClosedLoop, name: str, levels: Mapping[s
     if loop.remembers or loop.law.lyapunov is None or not (loop.wheels is None or gives_allocated_torque(loop.wheels)):
         return None
     subject, (rate, angle) = make_subject(loop), ends(levels, before, loop)
-    found = taken_over(subject, rate, angle)
-    if found is None:
+    loop_claims = taken_over(subject, rate, angle)
+    if loop_claims is None:
         return None
-    proved, failed = found
+    proved, failed = loop_claims
     beyond = undecided("hand-over", {"rate": rate, "angle": angle}, subject, "it reaches beyond the region of convergence")
     claims = [proved.get("hand-over", beyond), *between_samples(subject, proved, failed)]
     return Certificate(name, described(subject), named(claims, loop))
@@ -49,8 +49,8 @@ def flown_ends(
     errors = {name: 0.0 if claim is None else claim.numbers[error] for name, error in TESTS.items()}
     tested = {name: x + errors[name] for name, x in levels.items() if name in TESTS}
     settled = {} if last is None else {"rate_below": last.numbers["rate"], "angle_below": last.numbers["angle"]}
-    found = [[inf if x is None else x for x in ends(told, before, after)] for told in (tested, settled)]
-    rate, angle = map(min, zip(*found, strict=True))
+    reached = [[inf if x is None else x for x in ends(condition, before, after)] for condition in (tested, settled)]
+    rate, angle = map(min, zip(*reached, strict=True))
     return rate, angle
 
 

@@ -76,7 +76,7 @@ def make_subject(
         axes, norm = _gravity_gradient_bounds(loop)
     # The subject is what its file says.
     axes, (norm, rate, acceleration) = (
-        tuple(exact(above(x)) for x in found) for found in (axes, (norm, rate, acceleration))
+        tuple(exact(above(x)) for x in bounds) for bounds in (axes, (norm, rate, acceleration))
     )
     total = fmpq(0)
     if loop.wheels is not None:
@@ -141,10 +141,10 @@ def followed(loop: ClosedLoop) -> Knots | None:
 
 def described_gains(law: Law, gains: Any) -> dict[str, Any]:
     """Return a law's gains by name; a choice is given by its own name."""
-    found: dict[str, Any] = {}
+    described: dict[str, Any] = {}
     for item, value in zip(law.fields(), gains, strict=True):
-        found[item.name] = item.gain.choices[value] if item.gain.choices else _plain(value)
-    return found
+        described[item.name] = item.gain.choices[value] if item.gain.choices else _plain(value)
+    return described
 
 
 def _described_wheels(subject: Subject, wheels: Wheels) -> dict[str, Any]:
@@ -166,8 +166,8 @@ def _finite(x: float) -> float | None:
 
 def above(x: Any) -> float:
     """A float not below a rational."""
-    found = number(x)
-    return found if exact(found) >= x else float(np.nextafter(found, np.inf))
+    value = number(x)
+    return value if exact(value) >= x else float(np.nextafter(value, np.inf))
 
 
 def below(x: Any) -> float:

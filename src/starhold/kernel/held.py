@@ -67,22 +67,25 @@ class Held:
         self.turned, self.rated = (x + y for x, y in zip(self.noise, errors, strict=True))
         self.led, self.hurried = (numbers.get(f"error.target.{name}") or Fraction(0) for name in ("rate", "acceleration"))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
-        told = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
+        given = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
         names = {"r": "target.rate", "a": "target.acceleration", "h": "momentum"}
         each = {"e": [f"outside.{k}" for k in AXES]} | {letter: [name] * 3 for letter, name in names.items()}
         self.others: Sizes = {
-            f"{letter}{k + 1}": numbers[name] for letter, own in each.items() if told[letter] for k, name in enumerate(own)
+            f"{letter}{k + 1}": numbers[name]
+            for letter, keys in each.items()
+            if given[letter]
+            for k, name in enumerate(keys)
         }
         alone = dict.fromkeys(self.others, 0)
         self.u, free = ([p.at(alone) for p in parts] for parts in (loop.u, loop.balance(NONE)))
         loop.autonomous(self.u)
-        loop.autonomous(loop.u, kept="".join(letter for letter in told if told[letter]))
-        self.told = {name: numbers[name] for letter, own in each.items() if told[letter] for name in own}
+        loop.autonomous(loop.u, kept="".join(letter for letter in given if given[letter]))
+        self.bounded = {name: numbers[name] for letter, keys in each.items() if given[letter] for name in keys}
         self.beside = minus(loop.balance(NONE), free)
         # What of it vanishes with the state is in V' as it is: that by momentum of wheels does no work.
-        asked, turning = minus(loop.u, self.u), growing(self.beside)
-        self.more = growing(asked)
-        left = [p + q for p, q in zip(minus(asked, self.more), minus(self.beside, turning), strict=True)]
+        commanded, turning = minus(loop.u, self.u), growing(self.beside)
+        self.more = growing(commanded)
+        left = [p + q for p, q in zip(minus(commanded, self.more), minus(self.beside, turning), strict=True)]
         # What does not: that of momentum and the target's rate is slow, the rest by the first that it has of what comes from
         # outside.
         self.slow = [with_momentum(p, "r") for p in left]
@@ -103,7 +106,7 @@ class Held:
         self.pull = apply(self.N, [p + q for p, q in zip(self.u, self.more, strict=True)])
         self.bend = apply(self.N, self.gyroscopic)
         self.rate = loop.slopes_along(V, self.accelerated)
-        held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
+        commanded_rates = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
         # What the law's torque has beside that near its target.
         on, linear = {"q0": 1 - var("v")}, apply(self.near.torque, x)
         self.heeded = [with_momentum(p) for p in loop.u]
@@ -115,10 +118,10 @@ class Held:
         # The acceleration at samples, what V' has of the rates, and that linearly.
         rates = apply(self.near.rates, x)
         self.odd = [p.at(on) for p in minus(self.pull, rates)]
-        self.speeding = [(p - g - own).at(on) for p, g, own in zip(self.pull, self.bend, rates, strict=True)]
+        self.speeding = [(p - g - rate).at(on) for p, g, rate in zip(self.pull, self.bend, rates, strict=True)]
         parts = zip(self.u, self.more, linear, self.gyroscopic, self.turning, strict=True)
-        self.left = [(p + more - own - g - turning).at(on) for p, more, own, g, turning in parts]
-        steep = [self.rate.slope(name).at(held).at(on) for name in STATE[RATE]]
+        self.left = [(p + more - near - g - turning).at(on) for p, more, near, g, turning in parts]
+        steep = [self.rate.slope(name).at(commanded_rates).at(on) for name in STATE[RATE]]
         bent = ("q0", *STATE, *MOMENTA)
         self.curvature = {name: [self.rate.slope(name).slope(other) for other in bent] for name in STATE[RATE]}
         at = dict.fromkeys((*STATE, "v", *self.others), 0)
@@ -155,8 +158,8 @@ class Held:
             rates.append(loop.slopes_along(p, self.accelerated) + more)
             share *= self.h / (len(rates))
             mean += share * rates[-1]
-        held = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
-        return mean.at(held), rates[-1], share * self.h / (len(rates) + 1)
+        commanded = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
+        return mean.at(commanded), rates[-1], share * self.h / (len(rates) + 1)
 
     def form(self, c: Fraction) -> Rows:
         """Return the matrix of x.Gx + c |q|^2."""
@@ -204,8 +207,8 @@ class Held:
 
     def size(self, letter: str) -> Fraction:
         """Return a bound of the norm of a vector from outside."""
-        own = [x for name, x in self.others.items() if name[0] == letter]
-        return norm(own) if letter == "e" else max(own, default=Fraction(0))
+        sizes = [x for name, x in self.others.items() if name[0] == letter]
+        return norm(sizes) if letter == "e" else max(sizes, default=Fraction(0))
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds of the torque from outside and of the error of the command at rates, to which the target's adds."""
@@ -236,8 +239,8 @@ class Held:
     def speeds(self, sizes: Sizes) -> Sizes:
         """Return how fast the variables of a motion without pushes change at most."""
         w = sizes[SPEED]
-        found = dict.fromkeys(("q0", *STATE[TURN]), w / 2) | dict.fromkeys(MOMENTA, w * self.size("h"))
-        return found | {x: sizes[f"u{k + 1}"] + most(self.bend[k], sizes) for k, x in enumerate(STATE[RATE])}
+        speeds = dict.fromkeys(("q0", *STATE[TURN]), w / 2) | dict.fromkeys(MOMENTA, w * self.size("h"))
+        return speeds | {x: sizes[f"u{k + 1}"] + most(self.bend[k], sizes) for k, x in enumerate(STATE[RATE])}
 
     def tube(self, region: Region) -> Tube:
         """Return what motions stay in for a period."""
@@ -247,10 +250,10 @@ class Held:
         even = [root(times(times([row], region.X), transpose([row]))[0][0]) for row in self.near.rates]
         even = [min(x, sizes.get(PULL, x)) for x in even]
         odd = [most(p, near) for p in self.odd]
-        held = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
+        asks = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
         begun = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
         steady, uneven = self.misread(region)
-        rigid = sum((felt(own, x, sizes) * self.size(x) for x, own in self.rigid.items()), Fraction(0))
+        rigid = sum((felt(within_tube, x, sizes) * self.size(x) for x, within_tube in self.rigid.items()), Fraction(0))
         steady, uneven = steady + rigid + self.lasting, uneven + rigid + self.lasting
         widths = [norm(row) for row in self.N]
 
@@ -259,9 +262,9 @@ class Held:
             return sizes | named(STATE[RATE], wide) | {SPEED: sizes[SPEED] + drift}
 
         def reached(wide: list[Fraction]) -> list[Fraction]:
-            own = within(wide)
-            push = steady + self.pushed(own)["both"] + self.stale(own, self.beside)
-            slopes = [[most(p.slope(name), own) for name in STATE[RATE]] for p in self.bend]
+            within_tube = within(wide)
+            push = steady + self.pushed(within_tube)["both"] + self.stale(within_tube, self.beside)
+            slopes = [[most(p.slope(name), within_tube) for name in STATE[RATE]] for p in self.bend]
             further = reach(slopes, [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)])
             columns = zip(STATE[RATE], begun, further, widths, strict=True)
             return [sizes[x] + self.h * (u + more + push * n) for x, u, more, n in columns]
@@ -269,7 +272,7 @@ class Held:
         wide = settled(reached, [sizes[name] for name in STATE[RATE]])
         far = within(wide)
         turned = self.h / 2 * far[SPEED]
-        far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | held
+        far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | asks
         demand(not self.even or region.least > turned, "motions pass a half turn")
         drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
@@ -280,7 +283,7 @@ class Held:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
         h, region, L, (mean, last, share) = self.h, tube.region, self.rate, self.motion
         near = region.sizes | {"v": 1 - region.least}
-        push = tube.held + tube.pushed
+        push = tube.steady + tube.pushed
         demand(push > 0, "nothing pushes")
         # How far pushes take the rates from where they go without: momentum turns with the body, less what they do to that.
         widths, (calm, slower) = [norm(row) for row in self.N], self.unlike_body(tube.sizes, self.parted)
@@ -356,7 +359,7 @@ class Held:
         odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
         # What noise adds has in it what momentum makes of it, but not what it makes of that.
         noisy = felt(self.heeded, "w", self.others) * self.noise[1] * stretch(self.N)
-        drift = norm(self.astray(tube, self.lasting + tube.held - tube.uneven))
+        drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven))
         drift += h * (pulled + self.pulled(self.apart) + noisy)
         late = self.stale(tube.sizes, self.beside, letters="rh")
         steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale - late

@@ -21,9 +21,9 @@ class Near(NamedTuple):
     grown: Rows
     inverse: Rows
 
-    def spun(self, told: Rows, body: Rows) -> Rows:
+    def spun(self, law: Rows, body: Rows) -> Rows:
         """Return what the law's torque and the body's add to A that are these matrices times the rates."""
-        both = times(self.B, beside(plus(told, body), scalar(0)))
+        both = times(self.B, beside(plus(law, body), scalar(0)))
         return plus(both, times(self.grown, times(body, self.rates)))
 
 
@@ -40,8 +40,8 @@ def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
 def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
     """Return what wheels' momentum makes of the rates, as matrices: in the law's torque, and in that on the body."""
     names = {f"h{k + 1}": x for k, x in enumerate(at)}
-    told, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
-    return told, body
+    law, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
+    return law, body
 
 
 def over_period(feedback: Rows, h: Fraction) -> Rows:

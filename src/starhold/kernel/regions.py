@@ -55,7 +55,7 @@ class Tube:
     sizes: Sizes
     drift: list[Fraction]
     turned: Fraction
-    held: Fraction
+    steady: Fraction
     pushed: Fraction
     stale: Fraction
     uneven: Fraction
@@ -64,7 +64,7 @@ class Tube:
     @property
     def push(self) -> Fraction:
         """Return the bound of all together, in the mean."""
-        return self.held + self.pushed + self.stale
+        return self.steady + self.pushed + self.stale
 
 
 def least_form(p: Poly, region: Region) -> Rows:

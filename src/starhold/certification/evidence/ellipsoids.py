@@ -41,14 +41,14 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
         kept = 1.0 - shares.sum()
         if radius**2 * (1.0 + more) >= kept:
             return inf, A, shares
-        found: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
-        own = (found + found.T) / 2.0
+        solution: Array = linalg.solve_discrete_lyapunov(A * sqrt((1.0 + more) / kept), fed)
+        symmetric = (solution + solution.T) / 2.0
         # So much larger that no corner leaves it.
-        room = own - corners @ own @ corners.transpose(0, 2, 1) / kept
+        room = symmetric - corners @ symmetric @ corners.transpose(0, 2, 1) / kept
         if np.linalg.eigvalsh(room).min() <= 0.0:
             return inf, A, shares
-        own = own * max(float(linalg.eigh(fed, one, eigvals_only=True)[-1]) for one in room)
-        return extent(own, heed), own, shares
+        symmetric = symmetric * max(float(linalg.eigh(fed, one, eigvals_only=True)[-1]) for one in room)
+        return extent(symmetric, heed), symmetric, shares
 
     def size(x: Array) -> float:
         return shape(x)[0]
@@ -60,12 +60,12 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
     optimize: Any = import_module("scipy.optimize")
     # Where no trial is finite, their differences are not numbers.
     with np.errstate(invalid="ignore"):
-        found = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
-    least, X, shares = shape(found.x)
+        optimum = optimize.minimize(size, weight, method="Nelder-Mead", options=options)
+    least, X, shares = shape(optimum.x)
     if not isfinite(least):
         return None
-    own = fitted(corners, pushes, shares, X, heed) if len(corners) > 1 else None
-    better = X if own is None or extent(own, heed) >= least else own
+    common = fitted(corners, pushes, shares, X, heed) if len(corners) > 1 else None
+    better = X if common is None or extent(common, heed) >= least else common
     return better * LARGER, [float(a) for a in shares]
 
 
@@ -92,15 +92,15 @@ def fitted(corners: Array, pushes: list[Array], shares: Array, X: Array, heed: f
         rows.append(triangle(np.concatenate([basis[:, part, part], units])).T)
         right.append(np.zeros(6))
     cost = np.array([*[0.0] * len(PAIRS), heed, 1.0])
-    found = interior_point(cost, np.vstack(rows), np.concatenate(right), 0, 0, [6] * len(corners) + [3, 3])
-    if found is None:
+    solution = interior_point(cost, np.vstack(rows), np.concatenate(right), 0, 0, [6] * len(corners) + [3, 3])
+    if solution is None:
         return None
-    own = np.einsum("n,nij->ij", found[: len(PAIRS)], basis) * np.outer(scale, scale)
+    fit = np.einsum("n,nij->ij", solution[: len(PAIRS)], basis) * np.outer(scale, scale)
     plain = sum((B @ B.T / a for B, a in zip(pushes, shares, strict=True)), np.zeros_like(X))
-    room = own - corners @ own @ corners.transpose(0, 2, 1) / kept
-    if np.linalg.eigvalsh(own)[0] <= 0.0 or np.linalg.eigvalsh(room).min() <= 0.0:
+    room = fit - corners @ fit @ corners.transpose(0, 2, 1) / kept
+    if np.linalg.eigvalsh(fit)[0] <= 0.0 or np.linalg.eigvalsh(room).min() <= 0.0:
         return None
-    return own * max(float(linalg.eigh(plain, one, eigvals_only=True)[-1]) for one in room)
+    return fit * max(float(linalg.eigh(plain, one, eigvals_only=True)[-1]) for one in room)
 
 
 def triangle(M: Array) -> Array:

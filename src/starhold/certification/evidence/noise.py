@@ -44,7 +44,7 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     parts, shapes = parts_of(len(errors[0][0][0]), spins), list[Array]()
     widths = dict.fromkeys(parts, 0.0)
     for spin in spins:
-        carried, corrected = (tuple(map(floats, driven(near, *own, spin))) for own in errors)
+        carried, corrected = (tuple(map(floats, driven(near, *pair, spin))) for pair in errors)
         steps = [carried] * (every - 1) + [corrected]
         size = len(carried[0][0])
         whole, spread = period(steps, size, 0.0 * np.eye(size))
@@ -73,12 +73,12 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
         return width * float(optimize.brentq(missed, 1.0, 12.0)) * MORE
 
     shares = SHARES if len(parts) == len(SHARES) else (*(0.9 * x for x in SHARES), *(0.1 * SHARES[0],) * 2)
-    often = [len(spins) * len(own) if k > 1 else 1 for k, own in enumerate(parts.values())]
+    often = [len(spins) * len(pair) if k > 1 else 1 for k, pair in enumerate(parts.values())]
     radii = [radius(width, share / n) for width, share, n in zip(deviations, shares, often, strict=True)]
     numbers = {SHARE: RARELY, "samples": samples, "every": every, "noise.attitude": radii[0], "noise.rate": radii[1]}
     numbers |= {BESIDE: DEVIATIONS} if measures_noisy_field(loop.loop) else {}
     evidence = {
-        "covariances": [[[float.hex(x) for x in row] for row in own.tolist()] for own in shapes],
+        "covariances": [[[float.hex(x) for x in row] for row in pair.tolist()] for pair in shapes],
         "deviations": [str(Fraction(x)) for x in deviations],
         "swayed": [str(Fraction(x)) for x in radii[2:]],
     }
@@ -89,6 +89,6 @@ def period(steps: list[tuple[Array, ...]], size: int, more: Array) -> tuple[Arra
     """Return the factor of errors over all steps together, and the covariance that the steps add, each with a margin."""
     whole, spread = np.eye(size), np.zeros((size, size))
     for A, B in steps:
-        own, noise = A[:size], B[:size]
-        whole, spread = own @ whole, own @ spread @ own.T + noise @ noise.T + more
+        motion, noise = A[:size], B[:size]
+        whole, spread = motion @ whole, motion @ spread @ motion.T + noise @ noise.T + more
     return whole, spread

@@ -71,10 +71,10 @@ Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 class Chain:
     """Levels from a set down to where disturbances outweigh the damping, and ellipsoids from there on."""
 
-    held: Held
+    motion: Held
     V: str
     level: float
-    found: dict[Fraction, Lower | None] = field(default_factory=dict[Fraction, "Lower | None"])
+    tried: dict[Fraction, Lower | None] = field(default_factory=dict[Fraction, "Lower | None"])
     """The results of `lower`, for all chains of one V."""
     levels: list[dict[str, str]] = field(default_factory=list[dict[str, str]])
     ellipsoids: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
@@ -83,38 +83,38 @@ class Chain:
 
     def aim(self) -> float:
         """Return the level that disturbances allow where all motions are nearly linear."""
-        found = self.lower((self.held.s + self.held.G[3][3]) / 2**20)
-        return inf if found is None else float(found[2])
+        lower = self.lower((self.motion.s + self.motion.G[3][3]) / 2**20)
+        return inf if lower is None else float(lower[2])
 
     def decreases(self) -> bool:
         """Return whether V decreases on the whole set, down to a lower level."""
-        found = self.lower(Fraction(self.level))
-        return found is not None and found[2] < Fraction(self.level)
+        lower = self.lower(Fraction(self.level))
+        return lower is not None and lower[2] < Fraction(self.level)
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
         c = Fraction(self.level)
-        while len(self.levels) < LEVELS and (found := self.lower(c)) is not None:
-            tau, beta, floor = found
+        while len(self.levels) < LEVELS and (lower := self.lower(c)) is not None:
+            tau, beta, floor = lower
             end = Fraction(max(float(floor) * FLOOR, float(c) / DEEPEST))
             if end > c * Fraction(9, 10):
                 break
             self.levels.append({"end": str(end), "tau": str(tau), "beta": str(beta)})
-            self.samples += periods(self.held.h * beta, floor, c, end)
+            self.samples += periods(self.motion.h * beta, floor, c, end)
             c = end
         return float(c)
 
     def lower(self, c: Fraction) -> Lower | None:
         """Return tau and beta for the lowest level proved to be reached from another, and that level."""
-        if c not in self.found:
-            self.found[c] = self.lowest(c)
-        return self.found[c]
+        if c not in self.tried:
+            self.tried[c] = self.lowest(c)
+        return self.tried[c]
 
     def lowest(self, c: Fraction) -> Lower | None:
         """Find what `lower` returns."""
-        held = self.held
+        motion = self.motion
         try:
-            exact, above, felt, push, rest = held.fall(held.tube(held.region(c)))
+            exact, above, felt, push, rest = motion.fall(motion.tube(motion.region(c)))
         except RefusedError:
             return None
         Q, H, F = floats(exact), floats(above), floats(felt)
@@ -126,7 +126,7 @@ class Chain:
         def floor(share: float) -> tuple[float, float, float]:
             tau = largest * share
             beta = float(linalg.eigh(Q - tau * R, H, eigvals_only=True)[0]) * (1.0 - 1e-6)
-            beta = min(beta, (1.0 - 1e-6) / float(held.h))
+            beta = min(beta, (1.0 - 1e-6) / float(motion.h))
             return ((float(push) ** 2 / (4.0 * tau) + float(rest)) / beta if beta > 0.0 else inf), tau, beta
 
         _, tau, beta = min(floor(share) for share in np.linspace(0.02, 0.98, 33))
@@ -138,19 +138,19 @@ class Chain:
     def tighten(self, tube: Tube) -> tuple[float, float]:
         """Find the ellipsoids, and return the ultimate bounds of angle (rad) and rate (rad/s)."""
         angle, fastest = self.ends(tube, tube.region.X)
-        heed, corners = HEED, self.held.corners()
-        away = self.held.away
+        heed, corners = HEED, self.motion.corners()
+        away = self.motion.away
         for _ in range(ELLIPSOIDS):
-            pushes = self.held.linear(tube)
-            own = [floats(B) * float(b) for B, b in pushes]
-            found = smallest(floats(self.held.near.A), np.array(list(map(floats, corners))), own, heed)
-            if found is None:
+            pushes = self.motion.linear(tube)
+            sized = [floats(B) * float(b) for B, b in pushes]
+            ellipsoid = smallest(floats(self.motion.near.A), np.array(list(map(floats, corners))), sized, heed)
+            if ellipsoid is None:
                 break
-            shape, shares = found
+            shape, shares = ellipsoid
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
             rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
             reach = highest_ratio(widened(tube.region.X, away), X)
-            inner = self.held.tube(tube.region.within(X, away))
+            inner = self.motion.tube(tube.region.within(X, away))
             end = self.ends(inner, X, away)
             if rate >= 1.0 or end[0] > angle * 0.99:
                 if not heed:
@@ -174,36 +174,36 @@ class Chain:
     def nearest(self) -> tuple[Chain, tuple[float, float]]:
         """Return the chain with the response or with ellipsoids, whichever leads nearer, and the ultimate bounds of angle
         (rad) and rate (rad/s). Without wheels no ellipsoid does better than the response."""
-        tube = self.held.tube(self.held.region(Fraction(self.levels[-1]["end"])))
+        tube = self.motion.tube(self.motion.region(Fraction(self.levels[-1]["end"])))
         one = replace(self, ellipsoids=list[Any]())
-        found = [(one, one.respond(tube))]
-        if not one.response or self.held.loop.wheels:
-            found.append((self, self.tighten(tube)))
-        return min(found, key=lambda pair: pair[1][0])
+        ends = [(one, one.respond(tube))]
+        if not one.response or self.motion.loop.wheels:
+            ends.append((self, self.tighten(tube)))
+        return min(ends, key=lambda pair: pair[1][0])
 
     def respond(self, tube: Tube) -> tuple[float, float]:
         """Find how often the response brings motions nearer, and return the ultimate bounds."""
-        held, told = self.held, find_response(self.held)
-        (begun, pulled), rounds = first_of(held, tube), 0
+        motion, evidence = self.motion, find_response(self.motion)
+        (begun, pulled), rounds = first_of(motion, tube), 0
         angle, fastest = self.ends(tube, tube.region.X)
-        response = None if told is None else concluded(responds(held, told["weights"], told["gains"]))
-        while told is not None and response is not None and rounds < ROUNDS:
+        response = None if evidence is None else concluded(responds(motion, evidence["weights"], evidence["gains"]))
+        while evidence is not None and response is not None and rounds < ROUNDS:
             try:
-                begun, pulled, inner = response.after(held, tube, begun, pulled)
+                begun, pulled, inner = response.after(motion, tube, begun, pulled)
             except RefusedError:
                 break
-            end = self.ends(inner, balls(begun), held.away)
+            end = self.ends(inner, balls(begun), motion.away)
             if not end[0] < angle * 0.999:
                 break
             tube, (angle, fastest), rounds = inner, end, rounds + 1
             self.samples += response.count
-            self.response = {"response": told | {"rounds": rounds}}
+            self.response = {"response": evidence | {"rounds": rounds}}
         return angle, fastest
 
     def asks_more(self, limits: dict[str, float]) -> bool:
         """Return whether the law commands more than its limit at some state of the set."""
         most = min((x for name, x in limits.items() if name.startswith("limit")), default=inf)
-        r, G, s = np.random.default_rng(1), floats(self.held.G), float(self.held.s)
+        r, G, s = np.random.default_rng(1), floats(self.motion.G), float(self.motion.s)
         along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STATES)))
         half = r.uniform(0.0, pi, STATES)
         q = np.sin(half) * axes
@@ -214,7 +214,7 @@ class Chain:
         far = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
         names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
         x = dict(zip(names, (np.cos(half), *q, *(far * along)), strict=True))
-        u = [valued(p, x) for p in self.held.u]
+        u = [valued(p, x) for p in self.motion.u]
         size = np.linalg.norm(u, axis=0) if "limit.norm" in limits else np.abs(u).max(axis=0)
         return bool(size[inside].max(initial=0.0) > most)
 
@@ -226,7 +226,7 @@ class Chain:
             sqrt(float(np.linalg.eigvalsh(shape[k, k])[-1])) + float(r) for k, r in zip((RATE, TURN), swayed, strict=True)
         )
         fastest = (wide + drift / 2.0) * MORE
-        sine = (turned + float(self.held.bend_between(tube))) * MORE
+        sine = (turned + float(self.motion.bend_between(tube))) * MORE
         half = sine
         for _ in range(60):
             half = sine + half**3 / 6.0
@@ -248,8 +248,8 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
         kinds = [SHARE in like]
     for noisy in kinds:
-        own = pushes(loop.loop, loop.known.envelope(noisy))
-        against = own._replace(outside=own.outside + float(loop.known.disturbance))
+        bounds = pushes(loop.loop, loop.known.envelope(noisy))
+        against = bounds._replace(outside=bounds.outside + float(loop.known.disturbance))
         try:
             pushed = Pushed(loop, against, noisy)
             if any(pushed.find_largest(*one) for one in tried):
@@ -287,32 +287,32 @@ class Pushed:
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
         self.largest = (0.0, 0.0, "")
-        self.told: dict[str, Any] = {"period": loop.loop.period}
-        self.told |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
+        self.numbers: dict[str, Any] = {"period": loop.loop.period}
+        self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
         wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
         self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
-        self.told |= bounds | more
+        self.numbers |= bounds | more
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}
         self.leans = [
-            (float(f"{lean * slow:.4g}"), *self.held(float(f"{lean * slow:.4g}")), dict[Fraction, Lower | None]())
+            (float(f"{lean * slow:.4g}"), *self.sampled(float(f"{lean * slow:.4g}")), dict[Fraction, Lower | None]())
             for lean in LEANS
         ]
         # The locally best is tried first, and taken if it descends from the whole set.
         self.leans.sort(key=lambda lean: Chain(lean[2], lean[1], 0.0, lean[3]).aim())
 
-    def held(self, epsilon: float) -> tuple[str, Held]:
+    def sampled(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
         V = self.loop.crossed(None if self.even else self.stiffness, epsilon)
-        found = Held(AttitudeLoop(read(self.claim(V, self.told), self.loop.by_digest)))
-        found.swayed, found.apart = self.swayed, self.apart
-        return V, found
+        motion = Held(AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest)))
+        motion.swayed, motion.apart = self.swayed, self.apart
+        return V, motion
 
-    def claim(self, V: str, told: dict[str, Any], **evidence: Any) -> dict[str, Any]:
+    def claim(self, V: str, numbers: dict[str, Any], **evidence: Any) -> dict[str, Any]:
         """Return the claim with its numbers, and its evidence except that about noise."""
-        return self.loop.claim(POINTS, self.words, V, **told) | {"evidence": self.evidence | evidence}
+        return self.loop.claim(POINTS, self.words, V, **numbers) | {"evidence": self.evidence | evidence}
 
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
         """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
@@ -339,22 +339,22 @@ class Pushed:
         """Return the claim's numbers of the start set, and a chain from there for each lean of V; None, and the reason in
         `failed`, where V does not decrease on the set or the torque exceeds its limits."""
         loop, J, begun, half = self.loop, self.J, list[Chain](), min(angle, pi) / 2.0
-        told = self.told | limits
-        told |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
-        for epsilon, V, held, found in self.leans:
-            rest = 2.0 * float(held.s) * sin(angle / 4.0) ** 2
-            rest += float(np.linalg.eigvalsh(floats(held.G)[TURN, TURN])[-1]) * sin(half) ** 2
+        numbers = self.numbers | limits
+        numbers |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
+        for epsilon, V, motion, tried in self.leans:
+            rest = 2.0 * float(motion.s) * sin(angle / 4.0) ** 2
+            rest += float(np.linalg.eigvalsh(floats(motion.G)[TURN, TURN])[-1]) * sin(half) ** 2
             level = rest + J * rate * (rate / 2.0 + epsilon * sin(half))
-            begun.append(Chain(held, V, level * (1.0 + 1e-6), found))
+            begun.append(Chain(motion, V, level * (1.0 + 1e-6), tried))
         if begun[0].asks_more(limits):
             loop.failed[POINTS] = "the torque exceeds its limit"
             return None
         if not any(chain.decreases() for chain in begun):
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return None
-        if not begins(loop, self.claim(begun[0].V, told | {"level": begun[0].level}), self.scales):
+        if not begins(loop, self.claim(begun[0].V, numbers | {"level": begun[0].level}), self.scales):
             return None
-        return told, begun
+        return numbers, begun
 
     def find(self, angle: float, rate: float = 0.0, limits: dict[str, float] | None = None) -> bool:
         """Find the pointing claim of the loop, and add it. The set contains rotations of up to `angle` (rad) at up to `rate`
@@ -362,7 +362,7 @@ class Pushed:
         loop, start_of = self.loop, self.begun(angle, rate, limits or {})
         if start_of is None:
             return False
-        told, begun = start_of
+        numbers, begun = start_of
         for chain in begun:
             if chain.descend() < NEARLY * chain.aim() and chain.levels:
                 break
@@ -371,15 +371,15 @@ class Pushed:
         if not chain.levels:
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return False
-        held, start = chain.held, Fraction(chain.level)
+        motion, start = chain.motion, Fraction(chain.level)
         chain, (angle, fastest) = chain.nearest()
-        told["level"] = chain.level
-        told["highest"] = float(start + held.h / 2 * held.swing(held.tube(held.region(start)))) * MORE
-        told |= {"end.angle": angle, "end.rate": fastest, "settling": float(held.h * chain.samples) * MORE}
-        if not isfinite(angle) or angle > NEARER * told.get("angle", told.get("start.angle", 0.0)):
+        numbers["level"] = chain.level
+        numbers["highest"] = float(start + motion.h / 2 * motion.swing(motion.tube(motion.region(start)))) * MORE
+        numbers |= {"end.angle": angle, "end.rate": fastest, "settling": float(motion.h * chain.samples) * MORE}
+        if not isfinite(angle) or angle > NEARER * numbers.get("angle", numbers.get("start.angle", 0.0)):
             loop.failed[POINTS] = "motions do not come near the target"
             return False
-        claim = self.claim(chain.V, told, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
+        claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
         return loop.try_to_show(claim, self.scales)
 
 

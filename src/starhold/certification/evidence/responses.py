@@ -21,16 +21,16 @@ FINEST, LONGEST, LEAST, MORE = 1e3, 1e9 - 1.0, 1e-4, 1.0 + 1e-7
 """The least and the largest weight, the least share of a sample beside the mean, and the margin for rounding."""
 
 
-def find_response(held: Held) -> dict[str, Any] | None:
+def find_response(motion: Held) -> dict[str, Any] | None:
     """Return the evidence about the impulse response, for one round; None if it lasts too long."""
-    A = floats(held.near.A)
+    A = floats(motion.near.A)
     radius = float(np.abs(np.linalg.eigvals(A)).max())
     if radius >= 1.0 or -LEFT / log(radius) > MOST:
         return None
-    powers = [np.vstack([np.eye(6), floats(held.near.rates)])]
+    powers = [np.vstack([np.eye(6), floats(motion.near.rates)])]
     for _ in range(ceil(-LEFT / log(radius)) - 1):
         powers.append(powers[-1] @ A)
-    weighed, gains, B = list[list[int]](), list[list[str]](), list(map(floats, held.ways))
+    weighed, gains, B = list[list[int]](), list[list[str]](), list(map(floats, motion.ways))
     for part in PARTS.values():
         rows = np.array(powers)[:, part]
         first, last, turn = (G @ G.transpose(0, 2, 1) for G in (rows @ one for one in B))
@@ -60,6 +60,6 @@ def weigh(squares: Array) -> Array:
 
     even = np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])
     scale = float(roots(even).sum())
-    own = roots(optimize.minimize(cost, even, method="BFGS").x)
-    own = np.maximum(own, LEAST * own.mean())
-    return own.max() / own
+    best = roots(optimize.minimize(cost, even, method="BFGS").x)
+    best = np.maximum(best, LEAST * best.mean())
+    return best.max() / best

@@ -45,7 +45,7 @@ PLACES, FINE, SLIGHT = 100, 160, 40
 """Binary places of matrices and of covariances, and of the share by which rounding them widens these."""
 
 
-def within_radii(claim: Claim, held: Held) -> Part[tuple[Statement, tuple[Radii, Radii]]]:
+def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radii, Radii]]]:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
     than noise.attitude and noise.rate, other standard normal vectors no longer than noise.beside, and the rate and the turn
     that the errors cause near the target no larger than those returned, nor what momentum makes of these, but with a
@@ -53,34 +53,34 @@ def within_radii(claim: Claim, held: Held) -> Part[tuple[Statement, tuple[Radii,
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
-    spins, count = spins_of(held.loop), int(every)
+    spins, count = spins_of(motion.loop), int(every)
     roles = [CARRIED] * min(count - 1, 1) + [CORRECTED]
     errors = [linear(claim, role) for role in roles]
-    told = iter(read_list(claim.evidence["covariances"], count * len(spins)))
+    rows = iter(read_list(claim.evidence["covariances"], count * len(spins)))
     parts = parts_of(len(errors[0][0][0]), spins)
     widths = [rational(x) for x in read_list(claim.evidence["deviations"], len(parts))]
     swayed = [rational(x) for x in read_list(claim.evidence["swayed"], len(parts) - 2)]
     for place, spin in enumerate(spins):
-        found = [driven(held.near, *own, spin) for own in errors]
-        first, last = found[0], found[-1]
+        driven_by = [driven(motion.near, *pair, spin) for pair in errors]
+        first, last = driven_by[0], driven_by[-1]
         size = len(last[0][0])
         demand(size == len(first[0][0]) and len(last[0]) == len(first[0]), "the errors are not those of one estimate")
         steps, shapes = (
             [first] * (count - 1) + [last],
-            [shortened(matrix(next(told), size, size), FINE) for _ in range(count)],
+            [shortened(matrix(next(rows), size, size), FINE) for _ in range(count)],
         )
         # The last sample before those of the list is like their last.
         pairs = pairwise([shapes[-1], *shapes])
         for k, ((before, after), step) in enumerate(zip(pairs, steps, strict=True), place * count):
             spread = covariance(before, *step)
             yield f"covariance {k}", Definite(plus(after, [row[:size] for row in spread[:size]], -1))
-            for width, (name, own) in zip(widths, parts.items(), strict=True):
-                for part in own:
-                    found = [row[part] for row in spread[part]]
-                    yield f"deviation of the {name} {k} {part.start}", Definite(plus(scalar(width * width), found, -1))
+            for width, (name, blocks) in zip(widths, parts.items(), strict=True):
+                for part in blocks:
+                    block = [row[part] for row in spread[part]]
+                    yield f"deviation of the {name} {k} {part.start}", Definite(plus(scalar(width * width), block, -1))
     radii = [numbers["noise.attitude"], numbers["noise.rate"], *swayed]
-    often = [1, 1, *(len(spins) * len(own) for own in [*parts.values()][2:])]
-    beside, missed = "", sum(n * samples * tail(*own) for n, *own in zip(often, radii, widths, strict=True))
+    often = [1, 1, *(len(spins) * len(blocks) for blocks in [*parts.values()][2:])]
+    beside, missed = "", sum(n * samples * tail(*pair) for n, *pair in zip(often, radii, widths, strict=True))
     if BESIDE in numbers:
         missed += samples * tail(numbers[BESIDE], Fraction(1))
         beside = f", other noise up to {below(numbers[BESIDE])} deviations"
@@ -107,11 +107,11 @@ def parts_of(size: int, spins: Sequence[Spin | None]) -> dict[str, list[slice]]:
     """Return the places of what noise drives, of which `size` are errors: of the errors that are told, and of the rate and
     the turn that they cause; with wheels of both with and without momentum, and half of what differs."""
     begun, count = size + (12 if spins[0] else 6), 2 if spins[0] else 1
-    found = {"attitude": [slice(begun, begun + 3)], "rate": [slice(begun + 3, begun + 6)]}
+    where = {"attitude": [slice(begun, begun + 3)], "rate": [slice(begun + 3, begun + 6)]}
     places = {"motion's rate": 0, "motion's turn": 3}
-    found |= {name: [slice(6 * k + own, 6 * k + own + 3) for k in range(count)] for name, own in places.items()}
+    where |= {name: [slice(6 * k + first, 6 * k + first + 3) for k in range(count)] for name, first in places.items()}
     apart = {"spun rate": begun + 6, "spun turn": begun + 9} if spins[0] else {}
-    return found | {name: [slice(own, own + 3)] for name, own in apart.items()}
+    return where | {name: [slice(first, first + 3)] for name, first in apart.items()}
 
 
 def driven(near: Near, errors: Rows, noise: Rows, spin: Spin | None = None) -> tuple[Rows, Rows]:
@@ -128,23 +128,23 @@ def driven(near: Near, errors: Rows, noise: Rows, spin: Spin | None = None) -> t
     still = [[Fraction(0)] * len(STATE) for _ in errors]
     if spin is None:
         return beside(near.A, plain[0]) + beside(still, errors), plain[1] + noise
-    told, body = spin
+    law, body = spin
 
     def more(rows: Rows) -> Rows:
         grown = times(near.grown, times(body, times(near.inverse, torque(rows))))
-        return plus(times(near.B, times(told, rows[size + 3 :])), grown)
+        return plus(times(near.B, times(law, rows[size + 3 :])), grown)
 
     # x of both signs is that without, half of their sum, and by its sign what momentum makes of that.
-    half = [[x / 2 for x in row] for row in near.spun(told, body)]
-    (e, own), (n, other) = ((rows, more(given)) for rows, given in zip(plain, (errors, noise), strict=True))
+    half = [[x / 2 for x in row] for row in near.spun(law, body)]
+    (e, spun), (n, shaken) = ((rows, more(given)) for rows, given in zip(plain, (errors, noise), strict=True))
     both = [
-        beside(beside(plus(near.A, half), half), plus(e, own)),
-        beside(beside([[-x for x in row] for row in half], plus(near.A, half, -1)), plus(e, own, -1)),
+        beside(beside(plus(near.A, half), half), plus(e, spun)),
+        beside(beside([[-x for x in row] for row in half], plus(near.A, half, -1)), plus(e, spun, -1)),
     ]
     apart = [[(x - y) / 2 for x, y in zip(s, t, strict=True)] for s, t in zip(*both, strict=True)]
-    return both[0] + both[1] + beside(beside(still, still), errors) + apart, plus(n, other) + plus(
-        n, other, -1
-    ) + noise + other
+    return both[0] + both[1] + beside(beside(still, still), errors) + apart, plus(n, shaken) + plus(
+        n, shaken, -1
+    ) + noise + shaken
 
 
 def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
@@ -164,21 +164,21 @@ def covariance(X: Rows, A: Rows, B: Rows) -> Rows:
     """Return what is no less than the covariance of Ax + Bn, in numbers as short as those of X. With what is rounded off of
     A and B, b, (a + b)(a + b)' <= (1 + 1/c) aa' + (1 + c) bb', and bb' is no more than squares of entries and the trace."""
     n, size, one, fine = len(A), len(X), 1 << PLACES, 1 << FINE
-    own, noise = ([{k: y for k, x in enumerate(row) if (y := floor(x * one))} for row in rows] for rows in (A, B))
+    motion, noise = ([{k: y for k, x in enumerate(row) if (y := floor(x * one))} for row in rows] for rows in (A, B))
     shape = [[floor(x * fine) for x in row] for row in X]
-    Account.spend(size * sum(map(len, own)) + n * sum(map(len, own + noise)), 2 * PLACES + FINE)
-    half = [[sum([x * row[k] for k, x in given.items()]) for row in shape] for given in own]
+    Account.spend(size * sum(map(len, motion)) + n * sum(map(len, motion + noise)), 2 * PLACES + FINE)
+    half = [[sum([x * row[k] for k, x in given.items()]) for row in shape] for given in motion]
     trace, c = sum(X[k][k] for k in range(size)), 1 << SLIGHT
     room = ceil((1 + c) * n * (size * trace + len(B[0])) * Fraction(fine, one * one)) + n
-    found = scalar(Fraction(room, fine), n)
-    for i, (given, pushed) in enumerate(zip(own, noise, strict=True)):
+    bound = scalar(Fraction(room, fine), n)
+    for i, (given, pushed) in enumerate(zip(motion, noise, strict=True)):
         for j in range(i + 1):
             spread = sum([x * half[j][k] for k, x in given.items()])
             spread += sum([x * noise[j].get(k, 0) for k, x in pushed.items()]) << FINE
             entry = Fraction(spread * (c + 1) >> 2 * PLACES + SLIGHT, fine)
-            found[i][j] += entry
-            found[j][i] = found[i][j]
-    return found
+            bound[i][j] += entry
+            bound[j][i] = bound[i][j]
+    return bound
 
 
 def tail(radius: Fraction, width: Fraction) -> Fraction:

@@ -35,64 +35,64 @@ def points(claim: Claim) -> Proof:
     noise.attitude and noise.rate beside."""
     loop = AttitudeLoop(claim)
     yield from loop.sound()
-    held, numbers, samples = Held(loop), claim.numbers, 0
-    c, h = numbers["level"], held.h
+    motion, numbers, samples = Held(loop), claim.numbers, 0
+    c, h = numbers["level"], motion.h
     starts = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
-    demand(not held.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
+    demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     start = yield from contents(loop, loop.lyapunov)
-    region = held.region(c)
-    limited = yield from within_limits(loop, held.misread(region)[0])
+    region = motion.region(c)
+    limited = yield from within_limits(loop, motion.misread(region)[0])
     signs = [word for word in (SHORTEST, HYSTERESIS) if claim.taken.get(word)]
     if signs:
-        yield "the sign never changes", Exceeds(region.least, held.turned / 2)
-    tube = held.tube(region)
-    yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * held.swing(tube))
+        yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
+    tube = motion.tube(region)
+    yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * motion.swing(tube))
     noise = Statement("", ())
     if SHARE in numbers:
-        noise, (held.swayed, held.apart) = yield from within_radii(claim, held)
+        noise, (motion.swayed, motion.apart) = yield from within_radii(claim, motion)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))
     demand(bool(levels), "no level is told")
     within = [(Fraction(0), tube.sizes[ANGLE])]
-    for k, told in enumerate(levels):
-        end, tau, beta = map(rational, read_table(told, "end", "tau", "beta"))
+    for k, one in enumerate(levels):
+        end, tau, beta = map(rational, read_table(one, "end", "tau", "beta"))
         demand(tau > 0 and 0 < h * beta <= 1 and 0 < end < c, "a level is not properly told")
-        Q, H, F, push, rest = held.fall(tube)
+        Q, H, F, push, rest = motion.fall(tube)
         pushed = push * push / (4 * tau) + rest
         fallen = plus(plus(Q, times(transpose(F), F), -tau), H, -beta)
         yield f"V decreases by a share {k}", Definite(fallen)
         yield f"level {k}", Exceeds(end, pushed / beta)
         samples += periods(h * beta, pushed / beta, c, end) if end > pushed / beta else 0
-        c, tube = end, held.tube(held.region(end))
+        c, tube = end, motion.tube(motion.region(end))
         within.append((h * samples, tube.sizes[ANGLE]))
-    last, beside, corners = tube.region.X, AT_REST, held.corners()
-    away = held.away
-    for k, told in enumerate(ellipsoids):
-        shape, parts, *rest = read_table(told, "shape", "shares", "rate", "reach")
+    last, beside, corners = tube.region.X, AT_REST, motion.corners()
+    away = motion.away
+    for k, one in enumerate(ellipsoids):
+        shape, parts, *rest = read_table(one, "shape", "shares", "rate", "reach")
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        pushed = held.linear(tube)
+        pushed = motion.linear(tube)
         for corner, A in enumerate(corners):
             after = image(X, shares, A, pushed)
             yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
         yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(tube.region.X, away), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
-        tube, last, beside = held.tube(tube.region.within(X, away)), X, away
+        tube, last, beside = motion.tube(tube.region.within(X, away)), X, away
         within.append((h * samples, tube.sizes[ANGLE]))
-    if (told := claim.evidence.get("response")) is not None:
-        rounds, weights, gains = read_table(told, "rounds", "weights", "gains")
+    if (summed := claim.evidence.get("response")) is not None:
+        rounds, weights, gains = read_table(summed, "rounds", "weights", "gains")
         demand(type(rounds) is int and 0 < rounds <= ROUNDS, "a response is taken too often")
-        response = yield from responds(held, weights, gains)
-        radii, pulled = first_of(held, tube)
+        response = yield from responds(motion, weights, gains)
+        radii, pulled = first_of(motion, tube)
         for _ in range(rounds):
-            radii, pulled, tube = response.after(held, tube, radii, pulled)
+            radii, pulled, tube = response.after(motion, tube, radii, pulled)
             samples += response.count
             within.append((h * samples, tube.sizes[ANGLE]))
             last, beside = balls(radii), away
     angle, fastest = numbers["end.angle"], numbers["end.rate"]
     # Both samples next to a time lie in the region, and sin x >= x - x^3/6.
-    near = angle / 2 - angle**3 / 48 - held.bend_between(tube) - beside[1]
+    near = angle / 2 - angle**3 / 48 - motion.bend_between(tube) - beside[1]
     slow = fastest - norm(tube.drift) / 2 - beside[0]
     for name, most_of, part in (("angle", near, TURN), ("rate", slow, RATE)):
         demand(most_of > 0, f"the {name} is too small")
@@ -100,22 +100,22 @@ def points(claim: Claim) -> Proof:
     yield "settling", Exceeds(numbers["settling"], h * samples)
 
     def most(name: str) -> str:
-        growing = held.per_rate[name]
+        growing = motion.per_rate[name]
         more = f" and {below(growing)} N m s times the rate of the body" if growing else ""
         return f"of up to {below(numbers[name])} N m{more}"
 
-    told = [f"errors of the command {most('error')}"]
-    kinds = [("attitude that it is told", held.turned, "rad"), ("rate", held.rated, "rad/s")]
-    kinds += [("target's rate", held.led, "rad/s"), ("target's acceleration", held.hurried, "rad/s2")]
-    told += [f"of the {name} of up to {below(x)} {unit}" for name, x, unit in kinds if x]
-    begun = below(numbers["level"]) + ", q0 > 0" * held.even
+    errors = [f"errors of the command {most('error')}"]
+    kinds = [("attitude that it is told", motion.turned, "rad"), ("rate", motion.rated, "rad/s")]
+    kinds += [("target's rate", motion.led, "rad/s"), ("target's acceleration", motion.hurried, "rad/s2")]
+    errors += [f"of the {name} of up to {below(x)} {unit}" for name, x, unit in kinds if x]
+    begun = below(numbers["level"]) + ", q0 > 0" * motion.even
     text = (
         f"every motion from {{V <= {begun}}} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
         f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside"
-        f" {most('outside')} and {enumerated(told)}"
+        f" {most('outside')} and {enumerated(errors)}"
     )
-    text += "".join(f", {name} of up to {below(x)}" for name, x in held.told.items()) + noise.text
+    text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
     assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
     assumed += ["bounded-outside-torque"] * loop.outside + ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", "sign-at-once" if signs else "quaternion-as-fed"]
@@ -125,10 +125,10 @@ def points(claim: Claim) -> Proof:
 
 def image(X: Rows, shares: Sequence[Fraction], A: Rows, pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
     """Return the matrix of an ellipsoid that holds Ax + the sum of B v, of x.X^-1 x <= 1 and |v| <= b."""
-    found = [[entry / (1 - sum(shares)) for entry in row] for row in times(A, times(X, transpose(A)))]
+    grown = [[entry / (1 - sum(shares)) for entry in row] for row in times(A, times(X, transpose(A)))]
     for (B, b), share in zip(pushes, shares, strict=True):
-        found = plus(found, times(B, transpose(B)), b * b / share)
-    return found
+        grown = plus(grown, times(B, transpose(B)), b * b / share)
+    return grown
 
 
 def periods(fall: Fraction, floor: Fraction, start: Fraction, end: Fraction) -> int:

@@ -43,58 +43,58 @@ class Response:
     gains: list[list[Fraction]]
     left: Rows
 
-    def after(self, held: Held, tube: Tube, begun: Radii, pulled: Fraction) -> tuple[Radii, Fraction, Tube]:
+    def after(self, motion: Held, tube: Tube, begun: Radii, pulled: Fraction) -> tuple[Radii, Fraction, Tube]:
         """Return |w| and |q| of z after these samples in the tube's region, its acceleration, and the tube from there on:
         from what they were before. What momentum makes of z is a push here."""
-        away, swayed, own = held.away, held.swayed, tube.region.sizes
-        first, last, turn = (b for _, b in held.linear(tube, begun[0], pulled))
+        away, swayed, region_sizes = motion.away, motion.swayed, tube.region.sizes
+        first, last, turn = (b for _, b in motion.linear(tube, begun[0], pulled))
         pushes = first, last - first, turn
-        sizes = [min(own[name] + away[i // 3], begun[i // 3]) for i, name in enumerate(STATE)]
+        sizes = [min(region_sizes[name] + away[i // 3], begun[i // 3]) for i, name in enumerate(STATE)]
         wide, turned, pulled = (
             up(sum((gain * b for gain, b in zip(gains, pushes, strict=True)), norm(reach(self.left[part], sizes))))
             for gains, part in zip(self.gains, PARTS.values(), strict=True)
         )
-        pull = pulled + held.pulled(swayed) + held.lasting * stretch(held.N)
-        return (wide, turned), pulled, held.tube(tube.region.around((wide + away[0], turned + away[1]), pull))
+        pull = pulled + motion.pulled(swayed) + motion.lasting * stretch(motion.N)
+        return (wide, turned), pulled, motion.tube(tube.region.around((wide + away[0], turned + away[1]), pull))
 
 
-def first_of(held: Held, tube: Tube) -> tuple[Radii, Fraction]:
+def first_of(motion: Held, tube: Tube) -> tuple[Radii, Fraction]:
     """Return |w| and |q| of z in the tube's region, and its acceleration."""
-    wide, turned = (tube.region.sizes[name] + x for name, x in zip((SPEED, ANGLE), held.away, strict=True))
-    return (wide, turned), held.pulled((wide, turned))
+    wide, turned = (tube.region.sizes[name] + x for name, x in zip((SPEED, ANGLE), motion.away, strict=True))
+    return (wide, turned), motion.pulled((wide, turned))
 
 
-def responds(held: Held, weights: Any, gains: Any) -> Part[Response]:
+def responds(motion: Held, weights: Any, gains: Any) -> Part[Response]:
     """The gains are no less than those of the loop. weights: m_k, for each part of what is bounded. Of the sum x of
     C_k B v_k (y.x)^2 is no more than the sum of 1/m_k times that of m_k |B'C_k'y|^2 (Cauchy and Schwarz)."""
-    (A, below), (B, under) = columns(held.near.A), columns(reduce(beside, held.ways))
+    (A, below), (B, under) = columns(motion.near.A), columns(reduce(beside, motion.ways))
     count = len(read_list(read_list(weights, len(PARTS))[0]))
     demand(0 < count <= MOST, "a response has no samples, or too many")
     weighed = [read_list(one, count) for one in weights]
-    most = [list(map(rational, read_list(one, len(held.ways)))) for one in read_list(gains, len(PARTS))]
-    demand(all(type(m) is int and m > 0 for own in weighed for m in own), "a weight is not a whole number")
-    rows = [[(x.numerator << PLACES) // x.denominator for x in row] for row in scalar(1, 6) + held.near.rates]
-    sums = [[[[0] * 3 for _ in range(3)] for _ in held.ways] for _ in weighed]
+    most = [list(map(rational, read_list(one, len(motion.ways)))) for one in read_list(gains, len(PARTS))]
+    demand(all(type(m) is int and m > 0 for chosen in weighed for m in chosen), "a weight is not a whole number")
+    rows = [[(x.numerator << PLACES) // x.denominator for x in row] for row in scalar(1, 6) + motion.near.rates]
+    sums = [[[[0] * 3 for _ in range(3)] for _ in motion.ways] for _ in weighed]
     for k in range(count):
         Account.spend(160, 3 * PLACES)
         steps = carried(rows, B, under)
         for part, weights, parts in zip(PARTS.values(), weighed, sums, strict=True):
             m = weights[k]
             for place, total in enumerate(parts):
-                own = [row[3 * place : 3 * place + 3] for row in steps[part]]
-                for x, row in zip(total, own, strict=True):
-                    x[:] = [y + m * sum(map(mul, row, other)) for y, other in zip(x, own, strict=True)]
+                block = [row[3 * place : 3 * place + 3] for row in steps[part]]
+                for x, row in zip(total, block, strict=True):
+                    x[:] = [y + m * sum(map(mul, row, other)) for y, other in zip(x, block, strict=True)]
         rows = carried(rows, A, below)
     # What is rounded off, in each entry, all the while.
     off = Fraction(count + 1, 1 << PLACES)
-    for name, own, (first, last, turn), gains in zip(PARTS, weighed, sums, most, strict=True):
-        share = Fraction(sum(-(-(1 << PLACES) // m) for m in own), 1 << 3 * PLACES)
+    for name, chosen, (first, last, turn), gains in zip(PARTS, weighed, sums, most, strict=True):
+        share = Fraction(sum(-(-(1 << PLACES) // m) for m in chosen), 1 << 3 * PLACES)
         # (|a| + |b|)^2 <= 2 (|a|^2 + |b|^2)
         both = [[2 * (x + y) for x, y in zip(*rows, strict=True)] for rows in zip(first, last, strict=True)]
         for place, (total, gain) in enumerate(zip((both, last, turn), gains, strict=True)):
             demand(gain > 6 * off, "a gain is too small")
-            found = [[share * x for x in row] for row in total]
-            yield f"response of the {name} {place}", Definite(plus(scalar((gain - 6 * off) ** 2), found, -1))
+            weighted = [[share * x for x in row] for row in total]
+            yield f"response of the {name} {place}", Definite(plus(scalar((gain - 6 * off) ** 2), weighted, -1))
     return Response(count, most, [[abs(Fraction(x, 1 << PLACES)) + off for x in row] for row in rows])
 
 
