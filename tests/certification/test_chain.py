@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from starhold.certification.certificate import Certificate, Claim, Obligation
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import STUDY
-from starhold.studies.chain import chains, links_of, summary
+from starhold.studies.chain import chains, links_of, sentence, summary
 from starhold.studies.modes import fresh_momentum, hand_overs
 from tests.certification.handed import POINT, bounded
 from tests.certification.pointing_hunt import Attack
@@ -85,20 +86,91 @@ def test_wheels_that_rest_in_a_mode_keep_what_they_have():
     assert fresh_momentum(second, 0.0) == math.inf
 
 
+def stated(name, momentum, angle=0.1, rate=0.02):
+    """A certificate of a mode or a switch with a claim of these numbers (mN m s, deg, deg/s), from 25° at 0.6°/s."""
+    start = {"slew_angle": math.radians(25.0), "rate_start": math.radians(0.6), "momentum": 1e-3 * momentum}
+    end = {"angle": math.radians(angle), "rate": math.radians(rate), "settling": 700.0, "share": 0.9973}
+    errors = {"attitude_error": 5e-4, "rate_error": 2e-4, "samples": 1000, "period": 0.5}
+    claim = Claim("pointing", start | end | errors, {}, (), (Obligation("level", "", "proved"),))
+    return Certificate(f"mission: {name}", {}, (claim,))
+
+
+def mission_links(*certificates):
+    scenario = load("cubesat-mission")
+    return links_of(build(scenario, scenario.laws[0]), "mission", {one.name: one for one in certificates})
+
+
+def test_a_mode_that_begins_with_more_momentum_is_entered_by_its_wider_claim():
+    modes = stated("sun", 6.7), stated("nadir", 3.2), stated("unload", 3.2, 0.4)
+    wide = stated("sun to nadir", 6.7, 0.19), stated("nadir to unload", 6.7, 0.5, 0.2)
+    links = mission_links(*modes, *wide)
+    assert not any(link.lacks for link in links)
+    assert [(link.before, link.after, link.wide) for link in links] == [
+        ("detumble", "sun", False),
+        ("sun", "nadir", True),
+        ("nadir", "unload", True),
+        ("unload", "nadir", False),
+        ("nadir", "unload", False),
+        ("unload", "nadir", False),
+    ]
+    # Nadir ends at 3 mN m s: with more it does not settle first, and later it does.
+    assert links[2].angle == math.inf
+    assert links[2].assumed == ("unload begins within 25° of its target at up to 0.6°/s",)
+    assert links[4].assumed == ("nadir lasts 700 s",)
+    # Unload ends at 1 mN m s in the wheels; the body and the turn of the orbit's frame add theirs.
+    turn = 2.0 * math.pi / 5677.0
+    assert links[3].momentum == pytest.approx(1e-3 + 0.065 * (math.radians(0.2) + turn), rel=1e-3)
+    assert links[3].assumed[0] == "unload brings the wheels' momentum below 1 mN m s"
+    whole = sentence(links)
+    assert whole.startswith(
+        "from up to 0.511°/s and within 25° of the target of sun, sun comes within 0.1° after 700 s, then nadir"
+    )
+    assert "0.19°" in whole
+    assert "unload brings the wheels' momentum below 1 mN m s" in whole
+
+
+def test_without_a_wider_claim_as_wide_as_what_is_handed_over_the_chain_ends():
+    modes = stated("sun", 6.7), stated("nadir", 3.2), stated("unload", 3.2, 0.4)
+    for wide in ((), (stated("sun to nadir", 6.69),)):
+        links = mission_links(*modes, *wide)
+        assert [bool(link.lacks) for link in links] == [False, True, False, False]
+        assert links[1].heavy
+        assert "nadir may begin with 6.7 mN m s of momentum, and is proved with up to 3.2" in links[1].text
+        assert "nadir" not in sentence(links)
+    # Momentum is not all that lacks: a wider claim would not help.
+    links = mission_links(stated("sun", 6.7, rate=0.7), *modes[1:])
+    assert not links[1].heavy
+    assert len(links[1].lacks) == 2
+
+
+def test_a_mode_whose_test_its_claim_does_not_meet_is_assumed_to_end():
+    # It ends within 1°, measured with an error of 5e-4.
+    for angle, assumed in ((0.97, ()), (0.98, ("sun ends",))):
+        links = mission_links(stated("sun", 3.0, angle), stated("nadir", 3.2), stated("unload", 3.2))
+        assert [text for text in links[1].assumed if text.endswith(" ends")] == [*assumed]
+
+
+def sun_of(found):
+    return found["mission: sun"].claim("pointing")
+
+
 @pytest.mark.slow
 def test_the_mission_turns_to_the_sun_from_what_detumbling_leaves_and_no_flight_contradicts_it():
     scenario = load("cubesat-mission")
     _, found = certified(scenario)
     (links,) = chains(scenario, list(found.values())).values()
-    assert [bool(link.lacks) for link in links] == [False, True, False, False]
-    assert "momentum" in links[1].text
+    assert not any(link.lacks for link in links)
+    assert [link.wide for link in links] == [False, True, True, False, False, False]
+    assert links[1].claim.numbers["momentum"] >= sun_of(found).numbers["momentum"] > 2 * links[3].claim.numbers["momentum"]
+    assert math.degrees(links[1].claim.numbers["angle"]) < 0.2
+    assert math.degrees(links[3].claim.numbers["angle"]) < 0.1
     assert links[0].rate > math.radians(0.5)
     assert links[0].angle == math.inf
-    sun = found["mission: sun"].claim("pointing")
+    sun = sun_of(found)
     assert (sun.outcome, sun.left_out) == ("proved", [])
     assert math.degrees(sun.numbers["angle"]) < 0.2
     assert math.degrees(sun.numbers["slew_angle"]) > 24.0
-    for mode in ("sun", "nadir", "unload"):
+    for mode in ("sun", "nadir", "unload", "sun to nadir", "nadir to unload"):
         claim = found[f"mission: {mode}"].claim("pointing")
         broken, reached = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, 1).worst()
         assert not broken

@@ -28,7 +28,7 @@ from starhold.cli.show import print_rows, printable
 from starhold.report.commands import Column, coloured
 from starhold.report.commands import Table as Rows
 from starhold.report.text import unflown_text
-from starhold.studies.chain import summary
+from starhold.studies.chain import sentence, summary
 
 if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
@@ -84,6 +84,8 @@ def print_chain(name: str, links: Sequence[Link]) -> None:
         word = "undecided" if link.lacks else "proved"
         table.add_row(f"  {coloured(word)}", _safe(f"{link.before} to {link.after}"), _safe(link.text))
     console.print(table)
+    if whole := sentence(links):
+        console.print(f"  together: {_safe(whole)}")
     console.print()
 
 

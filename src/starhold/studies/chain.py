@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import takewhile
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from starhold.studies.modes import HandOver, fresh_momentum, hand_overs
+from starhold.studies.body import Issued
+from starhold.studies.modes import RELEASED, STORED, HandOver, fresh_momentum, hand_overs, left_momentum
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate, Claim
+    from starhold.certification.certify import Wanted
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
 
@@ -19,7 +23,8 @@ if TYPE_CHECKING:
 class Link(NamedTuple):
     """A switch to the next mode, with the modes' names. rate, angle, momentum: up to which the next mode begins (rad/s, rad,
     relative to its target, N m s), inf where nothing bounds them; claim: what is proved of the next mode as it flies, if
-    anything; assumed: under which that is so; lacks: why the claim does not begin there."""
+    anything; assumed: under which that is so; lacks: why the claim does not begin there; heavy: whether only the momentum is
+    too large for it; wide: whether the claim is the one with the momentum that is handed over; name: that of the switch."""
 
     before: str
     after: str
@@ -29,33 +34,109 @@ class Link(NamedTuple):
     claim: Claim | None
     assumed: tuple[str, ...]
     lacks: tuple[str, ...]
+    heavy: bool = False
+    wide: bool = False
+    name: str = ""
 
     @property
     def text(self) -> str:
         """Say whether the next mode takes over, and what is proved of it then."""
         if self.claim is None or self.lacks:
             return f"not taken over: {listed(self.lacks)}"
-        n = self.claim.numbers
-        begun = f"at up to {np.degrees(self.rate):.3g}°/s" + (
-            f" and {np.degrees(self.angle):.3g}°" if self.angle < inf else ""
-        )
-        end = f"within {np.degrees(n['angle']):.3g}° of the target after {n['settling']:.4g} s"
         given = f", assuming that {listed(self.assumed)}" if self.assumed else ""
-        return f"taken over {begun}: {end}{given}"
+        n, bounds = self.claim.numbers, list[str]()
+        bounds += [f"{np.degrees(self.rate):.3g}°/s"] if self.rate < inf else []
+        bounds += [f"{np.degrees(self.angle):.3g}°"] if self.angle < inf else []
+        bounds += [f"{1e3 * self.momentum:.3g} mN m s of momentum"] if self.wide else []
+        begun = f" at up to {listed(bounds)}" if bounds else ""
+        end = f"within {np.degrees(n['angle']):.3g}° of the target after {n['settling']:.4g} s"
+        return f"taken over{begun}: {end}{given}"
 
 
 def links_of(loop: ClosedLoop, name: str, certificates: Mapping[str, Certificate]) -> list[Link]:
-    """Return the links of a law's modes, from the certificates of the modes by name; switches back are none."""
+    """Return the links of a law's modes, from the first mode on as it reaches the others, from the certificates of the modes
+    and of the switches by name; switches back are none. A mode has two links where it is left from either of its claims."""
     modes = [mode.name for mode in loop.law.module.modes]  # pyright: ignore[reportAttributeAccessIssue]
     flown: dict[str, Claim | None] = {mode: _flown(certificates.get(f"{name}: {mode}")) for mode in modes}
     switches = [one for one in hand_overs(loop, name) if one.key == "until"]
-    return [_link(one, modes[one.places[0]], modes[one.places[1]], flown) for one in switches]
+    links, reached = list[Link](), set[tuple[int, str, bool]]()
+
+    def leave(place: int, last: Claim | None, begun: float, entry: str = "") -> None:
+        leaving = [one for one in switches if one.places[0] == place]
+        way = place, entry, any(_is_early(one, begun) for one in leaving)
+        if way in reached:
+            return
+        reached.add(way)
+        for one in leaving:
+            before, after = modes[place], modes[one.places[1]]
+            link = _link(one, before, after, last, flown[after], begun)
+            wider = _flown(certificates.get(one.name)) if link.heavy else None
+            other = _link(one, before, after, last, wider, begun)._replace(wide=True)
+            link = link if other.lacks else other
+            links.append(link)
+            leave(one.places[1], link.claim, 0.0 if link.lacks else link.momentum, one.name if link.wide else "")
+
+    for place, mode in enumerate(modes):
+        if place not in {one for one, *_ in reached}:
+            leave(place, flown[mode], 0.0)
+    return links
+
+
+def widened(loop: ClosedLoop, name: str, issued: Sequence[Issued], wanted: Wanted) -> list[Issued]:
+    """Return the certificates of a law's modes, with a further claim, in the certificate of the switch, of each mode as it
+    flies that a switch begins with more momentum than its claim is about: from the same start, with that momentum."""
+    from starhold.certification.certify import certify
+
+    every, tried = list(issued), set[str]()
+    switches = {one.name: one for one in hand_overs(loop, name) if one.key == "until"}
+
+    def heavy() -> Link | None:
+        links = links_of(loop, name, {one.certificate.name: one.certificate for one in every})
+        return next((one for one in links if one.heavy and one.momentum < inf and one.name not in tried), None)
+
+    while (link := heavy()) is not None:
+        tried.add(link.name)
+        one = switches[link.name]
+        sought = replace(wanted, alone=True, momentum=link.momentum, like=link.claim)
+        wider = certify(one.after, link.name, sought)
+        if wider.outcome != "proved":
+            continue
+        before, after = one.places
+        if link.name not in [one.certificate.name for one in every]:
+            every.append(Issued(replace(wider, claims=()), one.after, mode=after + 1, before=before + 1))
+        last = max(k for k, one in enumerate(every) if one.certificate.name == link.name)
+        given = every[last].certificate
+        every[last] = every[last]._replace(certificate=replace(given, claims=(*given.claims, *wider.claims)))
+    return every
 
 
 def summary(links: Sequence[Link]) -> str:
     """Say of how many switches the next mode is proved to take over as the loop flies."""
     taken = sum(not link.lacks for link in links)
     return f"as it flies, {taken} of {len(links)} switches between modes lead into what is proved of the next mode"
+
+
+def sentence(links: Sequence[Link]) -> str:
+    """Say in one sentence what the links prove one after another, up to the first one that lacks something; empty if that is
+    the first."""
+    follows = (k == 0 or link.before == links[k - 1].after for k, link in enumerate(links))
+    taken = [link for link, _ in takewhile(lambda pair: not pair[0].lacks and pair[1], zip(links, follows, strict=True))]
+    if not taken:
+        return ""
+    steps, assumed, shares = dict[str, None](), dict[str, None](), dict[str, None]()
+    for link in taken:
+        n = link.claim.numbers  # pyright: ignore[reportOptionalMemberAccess]
+        # What repeats itself is said once.
+        steps[f"{link.after} comes within {np.degrees(n['angle']):.3g}° after {n['settling']:.4g} s"] = None
+        assumed |= dict.fromkeys(link.assumed)
+        if n["share"]:
+            shares[f" in at least {100.0 * n['share']:.4g} % of spans of {n['samples'] * n['period']:.4g} s"] = None
+    first = taken[0]
+    angle = min(first.angle, first.claim.numbers["slew_angle"])  # pyright: ignore[reportOptionalMemberAccess]
+    rate = f"up to {np.degrees(first.rate):.3g}°/s and " if first.rate < inf else ""
+    begun = f"from {rate}within {np.degrees(angle):.3g}° of the target of {first.after}"
+    given = f", assuming that {listed(tuple(assumed))}" if assumed else ""
+    return f"{begun}, {', then '.join(steps)}, each of its target and counted from its begin{listed(tuple(shares))}{given}"
 
 
 def chains(scenario: Scenario, certificates: list[Certificate], law: str | None = None) -> dict[str, list[Link]]:
@@ -72,9 +153,9 @@ def chains(scenario: Scenario, certificates: list[Certificate], law: str | None 
     return {entry.name: links for entry in entries if (links := built(entry))}
 
 
-def listed(clauses: tuple[str, ...]) -> str:
+def listed(clauses: Sequence[str]) -> str:
     """List clauses for a sentence."""
-    return " and ".join(clauses)
+    return " and ".join(filter(None, (", ".join(clauses[:-1]), *clauses[-1:])))
 
 
 def _flown(certificate: Certificate | None) -> Claim | None:
@@ -82,30 +163,59 @@ def _flown(certificate: Certificate | None) -> Claim | None:
     return claim if claim is not None and claim.outcome == "proved" else None
 
 
-def _link(one: HandOver, before: str, after: str, flown: Mapping[str, Claim | None]) -> Link:
+def _link(one: HandOver, before: str, after: str, last: Claim | None, claim: Claim | None, begun: float) -> Link:
+    """Return the link of a switch. last, claim: of the mode before and the next one; begun: the momentum with which the mode
+    before begins (N m s)."""
     from starhold.certification.hand_over import flown_ends
 
-    last, claim = flown[before], flown[after]
-    rate, angle = flown_ends(one.levels, one.before, one.after, last, claim)
+    early = _is_early(one, begun)
+    rate, angle = flown_ends(one.levels, one.before, one.after, None if early else last, claim)
     momentum = _momentum(one, last, rate)
-    assumed = [f"{before} ends"] if last is None else []
-    if last is not None and one.least < last.numbers["settling"]:
+    assumed = [] if last is None else _unending(one, before, last)
+    assumed += [f"{before} ends"] if last is None else []
+    if last is not None and not early and one.least < last.numbers["settling"]:
         assumed.append(f"{before} lasts {last.numbers['settling']:.4g} s")
-    if claim is not None and angle == inf:
-        assumed.append(f"{after} begins within {np.degrees(claim.numbers['slew_angle']):.3g}° of its target")
-    lacks = _lacking(before, after, claim, rate, angle, momentum)
-    return Link(before, after, rate, angle, momentum, claim, tuple(assumed), tuple(lacks))
+    early = early and rate == inf
+    if claim is not None and (angle == inf or early):
+        fast = f" at up to {np.degrees(claim.numbers['rate_start']):.3g}°/s" if early else ""
+        assumed.append(f"{after} begins within {np.degrees(claim.numbers['slew_angle']):.3g}° of its target{fast}")
+    lacks = _lacking(before, after, claim, 0.0 if early else rate, angle)
+    heavy = [] if claim is None else _heavy(after, claim, momentum)
+    alone = bool(heavy) and not lacks
+    return Link(before, after, rate, angle, momentum, claim, tuple(assumed), (*lacks, *heavy), alone, name=one.name)
+
+
+def _is_early(one: HandOver, begun: float) -> bool:
+    """Return whether a mode may end before it settles, because it begins with the momentum that ends it."""
+    return begun > one.levels.get(STORED, inf)
+
+
+def _unending(one: HandOver, before: str, last: Claim) -> list[str]:
+    """Return what must be assumed for a mode to end that has settled; nothing of one that is as good if it does not."""
+    from starhold.certification.subject import above, make_subject
+
+    n = last.numbers
+    rate = n["rate"] + n["rate_error"]
+    settled = {"angle_below": n["angle"] + n["attitude_error"], "rate_below": rate, STORED: -inf}
+    settled["body_rate_below"] = rate + above(make_subject(one.before).target_rate)
+    unmet = [test for test, level in one.levels.items() if not settled.get(test, inf) < level]
+    if unmet == [RELEASED]:
+        return [f"{before} brings the wheels' momentum below {1e3 * one.levels[RELEASED]:.3g} mN m s"]
+    return [f"{before} ends"] if unmet else []
 
 
 def _momentum(one: HandOver, last: Claim | None, rate: float) -> float:
-    """Return the largest momentum with which a mode begins (N m s): that of the claim about the mode before; or that of the
-    rotors at the start, which they keep in a mode in which wheels are inactive, and the body's."""
+    """Return the largest momentum with which a mode begins (N m s): that of the claim about the mode before, or that at
+    which the switch happens; or that of the rotors at the start, which they keep in a mode in which wheels are inactive, and
+    the body's."""
     fresh = fresh_momentum(one, rate)
-    return fresh if last is None or fresh < inf else float(last.numbers.get("momentum", inf))
+    if last is None or fresh < inf:
+        return fresh
+    return min(float(last.numbers.get("momentum", inf)), left_momentum(one, rate))
 
 
-def _lacking(before: str, after: str, claim: Claim | None, rate: float, angle: float, momentum: float) -> list[str]:
-    """Return why the claim of the next mode does not begin where the mode before ends."""
+def _lacking(before: str, after: str, claim: Claim | None, rate: float, angle: float) -> list[str]:
+    """Return why the claim of the next mode does not begin where the mode before ends, its momentum aside."""
     if claim is None:
         return [f"nothing is proved of {after} as it flies"]
     n, clauses = claim.numbers, list[str]()
@@ -116,9 +226,12 @@ def _lacking(before: str, after: str, claim: Claim | None, rate: float, angle: f
         clauses.append(f"{before} may end at {np.degrees(rate):.3g}°/s, and {after} is proved from up to {shown:.3g}°/s")
     if n["slew_angle"] < angle < inf:
         clauses.append(f"{before} may end {np.degrees(angle):.3g}° from the target")
-    if momentum > n.get("momentum", inf):
-        stored = "any" if momentum == inf else f"{1e3 * momentum:.3g} mN m s of"
-        clauses.append(
-            f"{after} may begin with {stored} momentum, and is proved with up to {1e3 * n['momentum']:.3g} mN m s"
-        )
     return clauses
+
+
+def _heavy(after: str, claim: Claim, momentum: float) -> list[str]:
+    """Return that the next mode may begin with more momentum than its claim is about, if it may."""
+    most = claim.numbers.get("momentum", inf)
+    stored = "any" if momentum == inf else f"{1e3 * momentum:.3g} mN m s of"
+    clause = f"{after} may begin with {stored} momentum, and is proved with up to {1e3 * most:.3g} mN m s"
+    return [clause] if momentum > most else []

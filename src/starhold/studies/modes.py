@@ -33,10 +33,10 @@ if TYPE_CHECKING:
 NEXT = "another mode begins"
 SEEN = 2_000
 """The number of samples of a run at which conditions that never held are looked at again."""
-SPARE, SLOW = 1.05, math.radians(0.2)
+SPARE, SLOW = 1.05, math.radians(0.3)
 """The margin of a rate that a mode hands over, and the least rate (rad/s) from which the next mode is to be proved."""
-STORED = "wheel_momentum_above"
-"""The test of a switch for the wheels' momentum."""
+STORED, RELEASED = "wheel_momentum_above", "wheel_momentum_below"
+"""The tests of a switch for the wheels' momentum."""
 
 
 class Stretch(NamedTuple):
@@ -247,6 +247,17 @@ def fresh_momentum(one: HandOver, rate: float) -> float:
         return math.inf
     rotors = np.array(one.after.rotors) @ np.array(wheels.axes)
     return float(np.linalg.norm(rotors)) + float(np.linalg.eigvalsh(tensor(craft.inertia))[-1]) * rate
+
+
+def left_momentum(one: HandOver, rate: float) -> float:
+    """Return the largest momentum (N m s) at which a switch happens at a rate (rad/s) relative to the next target: what it
+    allows the wheels, and the body's; inf where it allows any."""
+    from starhold.certification.subject import above, make_subject
+
+    if RELEASED not in one.levels:
+        return math.inf
+    fastest = rate + above(make_subject(one.after).target_rate)
+    return one.levels[RELEASED] + float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1]) * fastest
 
 
 def mode_departures(issued: Issued, run: Recording, fault: int | None) -> dict[str, tuple[Departure, ...]]:

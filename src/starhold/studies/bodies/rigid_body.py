@@ -16,6 +16,7 @@ from starhold.parts.part import same_numbers
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
+from starhold.studies.chain import widened
 from starhold.studies.modes import (
     begins_asked,
     certify_modes,
@@ -152,7 +153,8 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing:
 
     wanted = wanted_of(scenario, pointing)
     if mode_laws(loop.law, loop.gains):
-        return certify_modes(loop, entry.name, wanted)
+        issued = certify_modes(loop, entry.name, wanted)
+        return widened(loop, entry.name, issued, wanted) if pointing else issued
     return [Issued(certify(now, name, wanted), now, step) for name, now, step in _named(scenario, entry, loop)]
 
 
