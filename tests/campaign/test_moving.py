@@ -195,7 +195,7 @@ def test_draws_that_no_equation_follows_are_built_one_by_one():
 def test_what_is_drawn_of_an_orbit_and_a_filter_builds_no_scenario_for_each_run(monkeypatch):
     made = []
     plainly = lane_making.build
-    monkeypatch.setattr(lane_making, "build", lambda *given: (made.append(1), plainly(*given))[1])
+    monkeypatch.setattr(lane_making, "build", lambda *given, **more: (made.append(1), plainly(*given, **more))[1])
     over = {
         "orbit.raan": uniform(0.0, 6.28),
         "orbit.altitude": normal(1e4),

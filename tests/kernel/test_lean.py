@@ -117,7 +117,7 @@ NARROW = {"the angle is too small"}
 DROPPED = {
     "x stands where z does": (SLOW, {"leant": AT_REST}, NARROW, 3.0),
     "the slow torque is nowhere": (SLOW, {"leant": AT_REST, "soft": Fraction(0)}, NARROW, 100.0),
-    "the place to lean to does not move": (SWINGING, {"soft": Fraction(0)}, {"ellipsoid"}, 1.3),
+    "the place to lean to does not move": (SWINGING, {"soft": Fraction(0)}, {"ellipsoid"}, 1.05),
 }
 """A loop, what is left out of the kernel, why the whole one refuses the claim, and how many times farther it then flies."""
 

@@ -10,8 +10,8 @@ import starhold as sh
 from starhold.algebra.structure import flatten
 from starhold.loop.kernels import make_step
 from starhold.scenario.building import build
-from starhold.simulation.lane import simulate
 from starhold.simulation.stepper import Stepper
+from tests.making import flown
 from tests.simulation.loops import CAUTIOUS
 
 FOLDER = Path(CAUTIOUS).parent
@@ -35,13 +35,13 @@ def without_estimator():
 @pytest.mark.parametrize("scenario", [made, in_modes], ids=["alone", "in modes"])
 def test_a_law_only_damps_while_its_estimate_is_not_valid(scenario):
     loop = build(scenario(), scenario().laws[0])
-    run = simulate(loop, 60)
-    valid = run["mekf_is_valid"].values
+    run = flown(loop, 60)
+    valid = run["mekf_is_valid"]
     # Through the outage of 4 s to 12 s, from where the deviation exceeds what counts as valid.
     assert valid.tolist() == [1.0] * 12 + [0.0] * 12 + [1.0] * 37
-    damping = -0.2 * run["mekf_rate"].values
-    assert np.array_equal(run["command"].values[12:24], damping[12:24])
-    turned = np.abs(run["command"].values - damping).max(axis=1)
+    damping = -0.2 * run["mekf_rate"]
+    assert np.array_equal(run["command"][12:24], damping[12:24])
+    turned = np.abs(run["command"] - damping).max(axis=1)
     assert (turned[valid > 0.5] > 1e-4).all()
     flight = Stepper(loop)
     assert [flight.step().measurement.is_valid for _ in range(59)] == valid[1:60].tolist()
@@ -51,7 +51,7 @@ def test_a_law_only_damps_while_its_estimate_is_not_valid(scenario):
 def test_without_an_estimator_it_is_always_valid():
     loop = build(without_estimator(), without_estimator().laws[0])
     pd = made(part=[], law=[{"type": "pd"} | {k: x for k, x in TEXT["law"][0].items() if k != "file"}])
-    command, expected = (simulate(one, 40)["command"].values for one in (loop, build(pd, pd.laws[0])))
+    command, expected = (flown(one, 40)["command"] for one in (loop, build(pd, pd.laws[0])))
     assert np.array_equal(command, expected)
     assert Stepper(loop).step().measurement.is_valid == 1.0
 

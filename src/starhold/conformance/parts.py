@@ -215,7 +215,8 @@ def draws_in_its_range(part: Part) -> None:
 def keeps_what_it_says(part: Part) -> None:
     """No torque is larger than its `bound`, no error than its `error`, beside its `noise`, and no motion of a target than
     its `motion`."""
-    tell_torque, tell_errors, tell_motion = part.hook("bound"), part.hook("error"), part.hook("motion")
+    tell_torque, tell_errors = part.hook("bound"), part.hook("error")
+    tell_motion = part.hook("motion") if part.role == "target" else None
     if tell_torque is None and tell_errors is None and tell_motion is None:
         raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
     if tell_motion is not None:

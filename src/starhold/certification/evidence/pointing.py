@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio, smallest
-from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
+from starhold.certification.evidence.finding import NotFoundError, concluded, evidence, floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.responses import find_response
@@ -31,7 +31,6 @@ from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
 from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, balls, widened
-from starhold.kernel.rules import Part
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import ROUNDS, image, periods, points
 from starhold.kernel.theorems.response import first_of, responds
@@ -381,15 +380,6 @@ class Pushed:
             return False
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
         return loop.try_to_show(claim, self.scales)
-
-
-def concluded(part: Part[T]) -> T:
-    """Return what follows from obligations that are taken to be met."""
-    while True:
-        try:
-            next(part)
-        except StopIteration as end:
-            return end.value
 
 
 def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
