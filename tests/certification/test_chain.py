@@ -3,9 +3,12 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from starhold.certification.certificate import Certificate, Claim, Obligation
+from starhold.certification.subject import make_subject
+from starhold.parts.craft import tensor
 from starhold.scenario.building import build
 from starhold.scenario.reading import load, parse
 from starhold.studies.bodies.rigid_body import STUDY
@@ -77,8 +80,7 @@ def test_what_nothing_bounds_is_assumed_or_lacks(missioned):
 
 
 def test_wheels_that_rest_in_a_mode_keep_what_they_have():
-    scenario = load("cubesat-mission")
-    loop = build(scenario, scenario.laws[0])
+    loop = mission_loop()
     first, second = (one for one in hand_overs(loop, "") if one.key == "until" and one.places[0] < 2 and one.places[1] > 0)
     # Of four rotors the parts along the axis of the pyramid add up.
     assert fresh_momentum(first, 0.0) == pytest.approx(4 * 0.0025 / math.sqrt(3.0), rel=1e-6)
@@ -95,9 +97,13 @@ def stated(name, momentum, angle=0.1, rate=0.02):
     return Certificate(f"mission: {name}", {}, (claim,))
 
 
-def mission_links(*certificates):
+def mission_loop():
     scenario = load("cubesat-mission")
-    return links_of(build(scenario, scenario.laws[0]), "mission", {one.name: one for one in certificates})
+    return build(scenario, scenario.laws[0])
+
+
+def mission_links(*certificates):
+    return links_of(mission_loop(), "mission", {one.name: one for one in certificates})
 
 
 def test_a_mode_that_begins_with_more_momentum_is_entered_by_its_wider_claim():
@@ -117,6 +123,10 @@ def test_a_mode_that_begins_with_more_momentum_is_entered_by_its_wider_claim():
     assert links[2].angle == math.inf
     assert links[2].assumed == ("unload begins within 25° of its target at up to 0.6°/s",)
     assert links[4].assumed == ("nadir lasts 700 s",)
+    # Rotors that rested keep what they have, and the body turns no faster than relative to the Sun and with it.
+    sun = hand_overs(mission_loop(), "")[0].after
+    turned = float(np.linalg.norm(tensor(sun.craft.inertia), 2)) * (links[0].rate + float(make_subject(sun).target_rate))
+    assert links[0].momentum == pytest.approx(0.01 / math.sqrt(3.0) + turned, rel=1e-9)
     # Unload ends at 1 mN m s in the wheels; the body and the turn of the orbit's frame add theirs.
     turn = 2.0 * math.pi / 5677.0
     assert links[3].momentum == pytest.approx(1e-3 + 0.065 * (math.radians(0.2) + turn), rel=1e-3)

@@ -208,10 +208,14 @@ def _momentum(one: HandOver, last: Claim | None, rate: float) -> float:
     """Return the largest momentum with which a mode begins (N m s): that of the claim about the mode before, or that at
     which the switch happens; or that of the rotors at the start, which they keep in a mode in which wheels are inactive, and
     the body's."""
-    fresh = fresh_momentum(one, rate)
+    from starhold.certification.subject import above, make_subject
+
+    # The rate is relative to the target.
+    fastest = rate + above(make_subject(one.after).target_rate)
+    fresh = fresh_momentum(one, fastest)
     if last is None or fresh < inf:
         return fresh
-    return min(float(last.numbers.get("momentum", inf)), left_momentum(one, rate))
+    return min(float(last.numbers.get("momentum", inf)), left_momentum(one, fastest))
 
 
 def _lacking(before: str, after: str, claim: Claim | None, rate: float, angle: float) -> list[str]:

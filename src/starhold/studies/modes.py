@@ -250,14 +250,9 @@ def fresh_momentum(one: HandOver, rate: float) -> float:
 
 
 def left_momentum(one: HandOver, rate: float) -> float:
-    """Return the largest momentum (N m s) at which a switch happens at a rate (rad/s) relative to the next target: what it
-    allows the wheels, and the body's; inf where it allows any."""
-    from starhold.certification.subject import above, make_subject
-
-    if RELEASED not in one.levels:
-        return math.inf
-    fastest = rate + above(make_subject(one.after).target_rate)
-    return one.levels[RELEASED] + float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1]) * fastest
+    """Return the largest momentum (N m s) at which a switch happens while the body turns at a rate (rad/s): what it allows
+    the wheels, and the body's; inf where it allows any."""
+    return one.levels.get(RELEASED, math.inf) + float(np.linalg.eigvalsh(tensor(one.after.craft.inertia))[-1]) * rate
 
 
 def mode_departures(issued: Issued, run: Recording, fault: int | None) -> dict[str, tuple[Departure, ...]]:
