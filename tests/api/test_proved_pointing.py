@@ -13,7 +13,9 @@ from starhold.report.attitude_plots import collect
 from starhold.report.commands.failures import present
 from starhold.scenario.bodies.rigid_body.craft import wheels_of
 from starhold.scenario.building import build
+from starhold.scenario.reading import load
 from starhold.studies.budget import TOGETHER
+from starhold.studies.certificates import certify_scenario
 from starhold.studies.failures import _flown, _left
 from starhold.studies.pointing import ProvedPointing, prove_pointing
 from tests.running import starhold
@@ -57,6 +59,14 @@ def loop_of(scenario):
 
 def proved_of(scenario):
     return prove_pointing(scenario, loop_of(scenario))
+
+
+def test_flights_from_the_set_of_an_even_v_begin_on_the_side_of_the_target():
+    """On the other side the same V may increase: there motions turn the long way round a half turn."""
+    (tried,) = certify_scenario(load("wheels-orbital"), "uncompensated")
+    (claim,) = (claim for claim in tried.certificate.claims if claim.kind == "pointing")
+    assert claim.outcome == "proved"
+    assert tried.trial.highest_share <= 1.0 + 1e-6
 
 
 @pytest.mark.slow

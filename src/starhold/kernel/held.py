@@ -40,7 +40,7 @@ from .regions import (
     with_momentum,
 )  # fmt: skip
 
-WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 1000
+WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 MOMENTA = ("h1", "h2", "h3")
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
