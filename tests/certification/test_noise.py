@@ -257,9 +257,9 @@ def test_what_is_proved_of_a_cubesat_as_it_flies_is_checked(law, tmp_path):
     given = sh.load("cubesat-nadir")
     certificate = certify(build(given, given.pick(law)), law, Wanted(pointing=True))
     assert certificate.outcome == "proved"
-    assert math.degrees(certificate.claim("pointing").numbers["angle"]) < 0.21
-    # The motors forbid more of the stiffer law.
-    assert ("motor" in certificate.no_larger_start) == (law == "lyapunov")
+    assert math.degrees(certificate.claim("pointing").numbers["angle"]) < 0.20
+    # The motors forbid more.
+    assert "motor" in certificate.no_larger_start
     path = tmp_path / "certificate.json"
     write([certificate], "cubesat-nadir", path)
     assert passed(check_file(path))
