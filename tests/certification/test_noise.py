@@ -251,6 +251,16 @@ def test_a_torque_that_is_told_changes_as_fast_as_it_does_in_the_loop_of_the_cla
         assert f"{name} is exceeded" in numbers_apart(claim | {"numbers": claim["numbers"] | less}, own)
 
 
+def test_a_torque_may_turn_over_at_once_if_its_position_is_told_or_its_part_does_not_say(monkeypatch):
+    loop = nadir()
+    envelope = envelope_of(loop, 0.0, noisy=True)
+    receiver = find("sensor", "gnss")
+    assert max(change_of_modelled(loop, envelope)) < 1e-6
+    assert min(change_of_modelled(loop.with_parts(Fitted(receiver, receiver.examples()[0])), envelope)) == math.inf
+    monkeypatch.delattr(find("environment", "gravity-gradient").module, "torque_change")
+    assert min(change_of_modelled(loop, envelope)) == math.inf
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["lyapunov", "wheel"])
 def test_what_is_proved_of_a_cubesat_as_it_flies_is_checked(law, tmp_path):
