@@ -148,6 +148,7 @@ class Attack(Oracle):
             n.get("momentum") if "wheels" in self.words else None,
             *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
             self.noise(LANES, self.rng) if "share" in n else None,
+            (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
         )  # fmt: skip
         return found
 

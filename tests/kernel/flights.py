@@ -49,7 +49,8 @@ def moved(J, inverse, q, w, torque, h):
 
 class Surroundings(NamedTuple):
     """Bounds of a torque that the law is told (about each axis), of a target's rate and acceleration, of the momentum with
-    wheels (None: there are none), and of errors of the attitude and the rate that it is told."""
+    wheels (None: there are none), of errors of the attitude and the rate that it is told, and of how fast the torque changes
+    that it is told, with what is more for each rad that the body turns."""
 
     told: list
     rate: float
@@ -58,6 +59,7 @@ class Surroundings(NamedTuple):
     turned: float
     rated: float
     noise: "Noise | None" = None
+    change: tuple = (np.inf, 0.0)
 
 
 class Noise:
@@ -86,7 +88,7 @@ def turned_on(q, angles):
 
 class Around:
     """What acts on lanes from their surroundings: targets that swing about axes of their own as fast as they may, told
-    torques that change sides, and errors along the pushes."""
+    torques that change sides, at once if they may, and errors along the pushes."""
 
     def __init__(self, bounds, J, inverse, rng, lanes):
         self.bounds, self.J, self.inverse = bounds, J, inverse
@@ -95,6 +97,7 @@ class Around:
         self.swing = bounds.acceleration / max(bounds.rate, 1e-300)
         self.told = np.array(bounds.told)[:, None]
         self.kept = 0.7 * (bounds.momentum or 0.0) * along(rng.normal(size=(3, lanes)))
+        self.load, self.sudden = None, not np.isfinite(bounds.change[0])
 
     def target(self, q, t):
         if not self.bounds.rate and not self.bounds.acceleration:
@@ -113,7 +116,19 @@ class Around:
         rate = w + r - off + fast
         stored = self.kept - self.J @ (w + r)
         total = stored + self.J @ (rate + off) if self.bounds.momentum is not None else self.kept
-        return law(wrong, rate, -self.told * np.sign(unit), off, a, total)
+        if self.load is None or self.sudden:
+            self.load = -self.told * np.sign(unit)
+        # What is told of it is that at the attitude that is told.
+        load = self.load if self.sudden else self.load - self.bounds.change[1] * self.bounds.turned * unit
+        return law(wrong, rate, load, off, a, total)
+
+    def loaded(self, unit, fast, time):
+        """The told torque in the mean of a time in which it turns over, as fast as it may with the body's rates."""
+        change, more = self.bounds.change
+        over = self.told * np.sign(unit) - self.load
+        part = 1.0 if self.sudden else (change + more * fast) * time / np.maximum(np.linalg.norm(over, axis=0), 1e-300)
+        begun, self.load = self.load, self.load + np.minimum(part, 1.0) * over
+        return self.load if self.sudden else (begun + self.load) / 2
 
     def after(self, q, w, t, torque, outside, h):
         """The state after a time in which torques do not change."""
@@ -181,8 +196,7 @@ class Fleet:
                 pushed, error = (x + c * fast for x, c in zip((self.outside, self.error), self.growing, strict=True))
                 command = around.command(self.law, q, w, t, unit) + error * unit
                 for k in range(parts):
-                    # A torque that was told comes the other way at once.
-                    outside = pushed * unit + around.told * np.sign(unit)
+                    outside = pushed * unit + around.loaded(unit, fast, part)
                     q, w = around.after(q, w, t + (k + 0.5) * part, command, outside, part)
                     # What would exceed the momentum is taken out as it comes in.
                     stored = np.maximum(np.linalg.norm(around.kept, axis=0), 1e-300)

@@ -1,5 +1,8 @@
 """A period of loops with wheels and a target that moves: no state is farther than what is shown of the period."""
 
+from fractions import Fraction
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -9,7 +12,9 @@ from starhold.certification.evidence.claims import floats
 from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.pointing import Pushed
 from starhold.certification.subject import make_subject
-from starhold.certification.unmodelled import pushes
+from starhold.certification.unmodelled import Pushes, pushes
+from starhold.kernel.held import CHANGE, Held
+from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.regions import ANGLE, AT_REST, SPEED, STATE
 from starhold.kernel.theorems.pointing import points
@@ -19,6 +24,13 @@ from tests.kernel.oracle import Oracle, run
 from tests.tiers import leading
 
 LANES = 2000
+
+
+def changing(n):
+    """How fast a torque that the law is told may change."""
+    return tuple(n.get(name, other) for name, other in zip(CHANGE, (np.inf, 0.0), strict=True))
+
+
 FLOWN = [
     (*loop, share) for share in (1e-3, 1e-5, 0.03) for loop in (("cubesat-nadir", "lyapunov"), ("wheels-orbital", "wheel"))
 ]
@@ -39,7 +51,7 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
     x *= rng.uniform(size=LANES) ** 0.2
     w, q = x[:3], np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]])
     told = [n.get(f"outside.{k}", 0.0) for k in range(3)]
-    bounds = Surroundings(told, n["target.rate"], n["target.acceleration"], n["momentum"], 0.0, 0.0)
+    bounds = Surroundings(told, n["target.rate"], n["target.acceleration"], n["momentum"], 0.0, 0.0, None, changing(n))
     Q, H, F, size, rest = held.fall(tube)
     Q, H, F = floats(Q), floats(H), floats(F)
     corners = np.array([floats(A) for A in held.corners()])
@@ -62,9 +74,8 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
         later, rate, turned = q, w, rng.uniform()
         for part, sign in ((turned, 1.0), (1.0 - turned, -1.0)):
             for k in range(4):
-                outside = sign * (n["outside"] + n.get("outside.per.rate", 0.0) * turning) * unit + around.told * np.sign(
-                    unit
-                )
+                outside = sign * (n["outside"] + n.get("outside.per.rate", 0.0) * turning) * unit
+                outside = outside + around.loaded(unit, turning, part * h / 4)
                 later, rate = around.after(later, rate, h * k / 4, command, outside, part * h / 4)
         y, ended = np.concatenate([rate, later[1:]]), leaning(around, later, h)
         assert np.linalg.norm(begun, axis=0).max() <= float(held.leant[1])
@@ -88,6 +99,88 @@ def test_a_period_with_wheels_takes_no_state_farther_than_its_bounds(scenario, l
             assert used <= 1.0
             grown = max(grown, used)
     assert grown > 0.1
+
+
+@cache
+def calm():
+    """A loop on which almost nothing acts but a torque that the law is told."""
+    given = sh.load("cubesat-nadir")
+    loop = Loop(make_subject(build(given, given.pick("wheel"))))
+    return loop, Pushed(loop, Pushes(0.0))
+
+
+def carried(**more):
+    """That loop with other numbers, and its programs."""
+    Account.left = 10**12
+    loop, own = calm()
+    n = {name: x for name, x in own.numbers.items() if name not in CHANGE} | more
+    n |= dict.fromkeys(("momentum", "target.rate", "target.acceleration"), 1e-9)
+    claim = own.claim(own.leans[0][1], n)
+    return Held(AttitudeLoop(read(claim, loop.by_digest))), Oracle({"programs": loop.by_digest}, claim)
+
+
+def test_a_torque_that_is_told_changes_a_motion_by_no_more_than_as_fast_as_it_may():
+    sudden, _ = carried()
+    held, oracle = carried(**dict(zip(CHANGE, (4e-7, 1e-9), strict=True)))
+    n, h, rng, lanes = oracle.numbers, float(held.h), np.random.default_rng(8), 300
+    told = np.array([[n[f"outside.{k}"]] for k in range(3)])
+    # In a period it changes by less than it may at once, but not by much less.
+    assert 0.2 < h * n[CHANGE[0]] / (2 * np.linalg.norm(told)) < 0.9
+    region = held.region((held.s + held.G[3][3]) / 2**40)
+    inverse = np.linalg.inv(oracle.J)
+    x = np.linalg.cholesky(floats(region.X)) @ along(rng.normal(size=(6, lanes)))
+    w, q = x[:3], np.concatenate([[np.sqrt(1.0 - (x[3:] ** 2).sum(0))], x[3:]])
+    around = Around(
+        Surroundings(told[:, 0], 0.0, 0.0, n["momentum"], 0.0, 0.0, None, changing(n)), oracle.J, inverse, rng, lanes
+    )
+    around.kept = 0.0 * w
+    unit = np.sign(rng.normal(size=(3, lanes)))
+    command = around.command(lambda *given: run(oracle.programs["law"], oracle.inputs(*given)[0]), q, w, 0.0, unit)
+    later, rate = q, w
+    for k in range(8):
+        later, rate = around.after(later, rate, k * h / 8, command, around.loaded(unit, 0.0, h / 8), h / 8)
+    y = np.concatenate([rate, later[1:]])
+    left, ways = y - floats(held.near.A) @ x, np.concatenate([np.eye(6), rng.normal(size=(100, 6))])
+    change = oracle.lyapunov(later, rate) - oracle.lyapunov(q, w)
+
+    def used(held):
+        tube = held.tube(region)
+        most = sum(np.linalg.norm(ways @ floats(B), axis=1) * float(b) for B, b in held.linear(tube))
+        Q, _, F, size, rest = held.fall(tube)
+        Q, F = floats(Q), floats(F)
+        fall = h * (float(size) * np.linalg.norm(F @ x, axis=0) + float(rest) - (x * (Q @ x)).sum(0))
+        widest = np.array([[float(one)] for one in tube.drift])
+        return (
+            float((np.abs(ways @ left) / most[:, None]).max()),
+            float((change / fall).max()),
+            float((np.abs(rate - w) / widest).max()),
+        )
+
+    assert 0.9 < max(used(held)) <= 1.0
+    assert max(used(sudden)) < 0.5
+    held.change = [x / 2 for x in held.change]
+    assert max(used(held)) > 1.0
+    # One that could change faster than it may at once is no different from that.
+    held.change = [Fraction(1), Fraction(0)]
+    assert used(held) == used(sudden)
+
+
+def test_a_torque_that_is_told_at_a_misread_attitude_is_misread_by_no_more_than_its_bound():
+    angle, steep = 1e-3, 2e-3
+    held, oracle = carried(**{"error.attitude": angle}, **dict(zip(CHANGE, (0.0, steep), strict=True)))
+    rng, none = np.random.default_rng(9), np.zeros((3, 200))
+    turned, off = along(rng.normal(size=(3, 200))), along(rng.normal(size=(3, 200)))
+    off[:, :100] = -turned[:, :100]
+
+    def asked(half, torque):
+        q = np.concatenate([[np.sqrt(1.0 - (half**2).sum(0))], half])
+        return np.array(run(oracle.programs["law"], oracle.inputs(q, none, torque, none, none, none)[0]))
+
+    wrong = asked(np.sin(angle / 2) * turned, steep * angle * off) - asked(none, none)
+    bound = float(held.misread(held.region((held.s + held.G[3][3]) / 2**40))[0])
+    assert 0.5 * bound < np.linalg.norm(wrong, axis=0).max() <= bound
+    held.change = None
+    assert float(held.misread(held.region((held.s + held.G[3][3]) / 2**40))[0]) < 0.5 * bound
 
 
 def test_a_target_whose_motion_is_misread_moves_the_torque_by_no_more_than_its_bound():

@@ -14,7 +14,7 @@ from starhold.parts.contract import Envelope
 from starhold.parts.craft import make_craft
 from starhold.parts.effectors import magnetic_unloading, wheels
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
-from starhold.parts.environments import drag
+from starhold.parts.environments import drag, gravity_gradient
 from starhold.parts.orbit import BODIES, Elements, from_elements, highest_speed, lowest
 from starhold.parts.plates import BOX, largest_torque
 from tests.tiers import leading
@@ -73,6 +73,31 @@ DRAG = [
 def test_no_torque_of_the_air_exceeds_its_bound_and_some_come_near(params, reached):
     found = list(shares(params, 1))
     assert reached < max(found) <= 1.0 + 1e-12
+
+
+def changes_of_gravity(random, count, size):
+    """How fast the gravity gradient changes on a random orbit, by the slope of an own formula, in what is said of it; of
+    bodies that turn by up to `size` in the rate of a circular orbit."""
+    inertia = np.diag(random.uniform(0.5, 1.0, 3))
+    axes = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    J = axes @ inertia @ axes.T
+    (place, velocity), around = orbit(random)
+    said = gravity_gradient.torque_change((), make_craft(J.tolist(), gravity=GRAVITY), around)
+    r, along = np.linalg.norm(place), np.linalg.qr(random.normal(size=(count, 3, 3)))[0]
+    R, v = along @ place, along @ velocity
+    w = size * (GRAVITY / around.distance**3) ** 0.5 * random.uniform(size=(count, 1)) * directions(random, count)
+    turned = v - np.cross(w, R)
+    slope = np.cross(turned, R @ J) + np.cross(R, turned @ J) - 5.0 * (np.dot(place, velocity) / r**2) * np.cross(R, R @ J)
+    change = 3.0 * GRAVITY / r**5 * np.linalg.norm(slope, axis=1)
+    return change / (said.torque + said.per_rate * np.linalg.norm(w, axis=1))
+
+
+@pytest.mark.parametrize(("size", "reached"), [(0.0, 0.5), (1.0, 0.6), (100.0, 0.95)])
+def test_no_gravity_gradient_changes_faster_than_is_said_and_some_nearly_do(size, reached):
+    """So what is said is noticed if it is halved, of bodies that turn and of those that do not."""
+    random = np.random.default_rng(7)
+    found = max(float(changes_of_gravity(random, 4000, size).max()) for _ in range(25))
+    assert reached < found <= 1.0 + 1e-12
 
 
 def plates_of_a_kind(random, kind, count):

@@ -104,6 +104,15 @@ BROKEN = {
         },
         {"keeps_what_it_says"},
     ),
+    "a torque that changes faster than it says": (
+        "environment",
+        {
+            "def torque": "def torque_change(params, craft, envelope):\n    return Push(0.0)\n\n\ndef torque",
+            "import Card, Parameter": "import Card, Parameter, Push",
+            "state.rate)": "state.attitude[1:])",
+        },
+        {"keeps_what_it_says"},
+    ),
     "a target that turns faster than it says": (
         "target",
         {

@@ -149,6 +149,7 @@ ASSUMPTIONS = {
     "no-outside-torque": Assumption("no torque from outside", _pulled),
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),
     "bounded-outside-torque": Assumption("torque from outside bounded on each axis"),
+    "changing-outside-torque": Assumption("torque from outside told as at the attitude told, its rate bounded"),
     "unknown-outside-torque": Assumption("torque from outside bounded in norm"),
     "bounded-target": Assumption("target's motion at most as told"),
     VALID_ESTIMATE: Assumption("estimate valid throughout", _unsure),

@@ -14,7 +14,8 @@ from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import fraction
 from starhold.certification.subject import above, make_subject
-from starhold.certification.unmodelled import Pushes, driven_errors, pushes, samples_of
+from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes, samples_of
+from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import rational
 from starhold.kernel.theorems.noise import BESIDE
@@ -64,6 +65,10 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if claim["theorem"] == POINTS:
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(exact(numbers.get("momentum", 0))))
         pushed = pushes(loop, envelope).numbers
+        if not numbers.keys().isdisjoint(CHANGE):
+            # Without both a torque may turn over at once.
+            numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers
+            pushed |= dict(zip(CHANGE, change_of_modelled(loop, envelope), strict=True))
         yield from (f"{name} has no bound" for name, x in pushed.items() if not isfinite(x))
         least |= {name: exact(x) for name, x in pushed.items() if isfinite(x)}
         if "outside" in least and OUTSIDE not in claim["taken"]:

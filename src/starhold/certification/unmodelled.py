@@ -100,6 +100,18 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *turn)))
 
 
+def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
+    """Add up how fast the torques change at most that laws are told as they are at the attitude that these are told: `inf`
+    for a part that does not say, or if a position is told that could be off."""
+    parts = [f for f in loop.used("environment") if f.part.flag("MODELLED")]
+    tells: list[Any] = [f.part.hook("torque_change") for f in parts]
+    telling = [*(_shown(f) for f in loop.used("sensor")), *(f.part.module.Estimate._fields for f in loop.used("estimator"))]
+    if None in tells or any("position" in names for names in telling):
+        return Push(inf, inf)
+    declared = [Push(0.0), *(tell(f.params, loop.craft, envelope) for tell, f in zip(tells, parts, strict=True))]
+    return Push(*(sum(x) * MORE for x in zip(*declared, strict=True)))
+
+
 def driven_errors(loop: ClosedLoop) -> Driven | None:
     """Return the noise-driven errors of an estimate, or of readings that the law uses directly; None without noise, where
     parts do not fully declare it, where an estimator leaves other errors in, where sensors of one quantity are not read

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from starhold.algebra.quaternion import NO_TURN, conjugate, multiply, to_reference, vector_part
+from starhold.algebra.quaternion import NO_TURN, conjugate, multiply, normalise, to_reference, vector_part
 from starhold.algebra.structure import flatten, leaves
 from starhold.algebra.vector import ZERO, Vector, add, apply, norm, scale, subtract
 from starhold.certification.unmodelled import COMMANDED, envelope_of
@@ -213,11 +213,12 @@ def draws_in_its_range(part: Part) -> None:
 
 
 def keeps_what_it_says(part: Part) -> None:
-    """No torque is larger than its `bound`, no error than its `error`, beside its `noise`, and no motion of a target than
-    its `motion`."""
-    tell_torque, tell_errors = part.hook("bound"), part.hook("error")
+    """No torque is larger than its `bound` or changes faster than its `torque_change`, no error is larger than its `error`,
+    beside its `noise`, and no motion of a target than its `motion`."""
+    tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
+    # A body has an equation of this name.
     tell_motion = part.hook("motion") if part.role == "target" else None
-    if tell_torque is None and tell_errors is None and tell_motion is None:
+    if all(tell is None for tell in (tell_torque, tell_errors, tell_motion, tell_change)):
         raise NotApplicableError("it says no bound of its torque, of its errors or of its motion")
     if tell_motion is not None:
         _moves_as_it_says(part)
@@ -226,17 +227,40 @@ def keeps_what_it_says(part: Part) -> None:
         loop = loop_with(part, params)
         # In a few steps torques from outside bring in little.
         envelope = envelope_of(loop, 1.01 * norm(_momentum(loop, loop.carry())), noisy=True)
-        errors, torque, command = UNBOUNDED, Push(inf), Push(inf)
+        errors, torque, command, change = UNBOUNDED, Push(inf), Push(inf), Push(inf)
         if tell_errors and part.role in COMMANDED:
             command = tell_errors(params, envelope)
         elif tell_errors:
             errors = tell_errors(params)
         if tell_torque:
             torque = tell_torque(params, envelope)
-        limits = (*errors, *torque, *command)
+        if tell_change:
+            change = tell_change(params, loop.craft, envelope)
+        limits = (*errors, *torque, *command, *change)
         require(min(limits) >= 0.0, f"the bounds {limits} are not all positive or 0")
-        for name, size, bound in _pushes(part, loop, errors, torque, command):
+        pushed = _pushes(part, loop, errors, torque, command)
+        for name, size, bound in (*pushed, *(_changes(part, loop, change) if tell_change else ())):
             require(size <= bound * (1.0 + 1e-9) + 1e-12, f"the {name} is {size:g}, larger than {bound:g}")
+
+
+def _changes(part: Part, loop: ClosedLoop, change: Push) -> Iterator[tuple[str, float, float]]:
+    """Yield how fast a part's torque changes on the orbit, of bodies that turn and that do not, and its bounds."""
+    module, numbers = part.module, next(f for f in loop.parts if f.part == part).prepared(loop.period)
+    random, time = np.random.default_rng(2), 1e-3
+    memory = module.remember(numbers) if part.hook("remember") else None
+    for rate in (ZERO, *(cast(Any, tuple(x)) for x in random.normal(size=(STEPS, 3)).tolist())):
+        for turned in random.normal(size=(STEPS, 4)):
+            attitude: Any = tuple((turned / np.linalg.norm(turned)).tolist())
+            torques: list[Vector] = []
+            for t in (-time, time):
+                state = loop.start._replace(
+                    attitude=normalise(multiply(attitude, (1.0, *scale(0.5 * t, rate)))),
+                    rate=rate,
+                    position=add(loop.start.position, scale(t, loop.start.velocity)),
+                )
+                torques.append(module.torque(state, numbers, loop.craft, memory))
+            size = norm(subtract(torques[1], torques[0])) / (2.0 * time)
+            yield "change of the torque", size, change.torque + change.per_rate * norm(rate)
 
 
 def _moves_as_it_says(part: Part) -> None:

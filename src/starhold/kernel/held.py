@@ -42,6 +42,8 @@ from .regions import (
 
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 MOMENTA = ("h1", "h2", "h3")
+CHANGE = "told.change", "told.change.per.rate"
+"""How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
 AROUND = [
@@ -81,6 +83,8 @@ class Held:
         loop.autonomous(self.u)
         loop.autonomous(loop.u, kept="".join(letter for letter in given if given[letter]))
         self.bounded = {name: numbers[name] for letter, keys in each.items() if given[letter] for name in keys}
+        self.change = [numbers.get(name) or Fraction(0) for name in CHANGE] if CHANGE[0] in numbers else None
+        self.bounded |= dict(zip(CHANGE, self.change or [], strict=False))
         self.beside = minus(loop.balance(NONE), free)
         # What of it vanishes with the state is in V' as it is: that by momentum of wheels does no work.
         commanded, turning = minus(loop.u, self.u), growing(self.beside)
@@ -194,6 +198,8 @@ class Held:
         turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
         wrong = {"q": self.turned / 2, "w": self.rated + turn["r"]} | turn
         wrong["h"] = stretch(self.loop.given) * self.rated
+        # A torque that turns over at once is what the law is told.
+        wrong["e"] = self.change[1] * self.turned if self.change else Fraction(0)
         sizes = {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in region.sizes.items()}
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
@@ -222,7 +228,13 @@ class Held:
         e, r, a, H = (self.size(letter) for letter in "erah")
         w, outside = sizes[SPEED], self.pushed(sizes)["outside"]
         turned = (turning * w + r) * H + e + outside
-        return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": 2 * e}
+        return {"r": self.h / 2 * (a + w * r), "a": 2 * a, "h": self.h / 2 * turned, "e": min(2 * e, self.gradual(sizes))}
+
+    def gradual(self, sizes: Sizes) -> Fraction:
+        """Return by how much a torque that is told changes in the mean of a period, or twice itself if it may at once."""
+        if self.change is None:
+            return 2 * self.size("e")
+        return self.h / 2 * (self.change[0] + self.change[1] * (sizes[SPEED] + self.size("r")))
 
     def stale(self, sizes: Sizes, parts: list[Poly], turning: int = 1, letters: str = "raeh") -> Fraction:
         """Return by how much parts change by that, or by some of it."""
@@ -361,7 +373,8 @@ class Held:
         noisy = felt(self.heeded, "w", self.others) * self.noise[1] * stretch(self.N)
         drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven))
         drift += h * (pulled + self.pulled(self.apart) + noisy)
-        late = self.stale(tube.sizes, self.beside, letters="rh")
+        growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))
+        late = self.stale(tube.sizes, self.beside, letters=growing)
         steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale - late
         # Of what momentum makes of the rates A has the rest of the drift.
         grown = (

@@ -19,6 +19,7 @@ ASSUMPTIONS = {
     "no-outside-torque": "there is no torque from outside",
     "known-outside-torque": "a torque from outside is as the law is told",
     "bounded-outside-torque": "a torque from outside is at most as told",
+    "changing-outside-torque": "a torque from outside is told as at the attitude told, and changes no faster than told",
     "bounded-push": "torques from outside and errors of the command are no larger than told",
     "held-torque": "the torque is what the law asks for at the last sample, and the error",
     "gaussian-noise": "noise is Gaussian, and independent from sample to sample",

@@ -51,6 +51,7 @@ EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"),
 """Equations that parts of a role have at least one of."""
 BOUNDS: dict[str, tuple[str, ...]] = {
     "bound": ("params", "envelope"),
+    "torque_change": ("params", "craft", "envelope"),
     "noise": ("params", "period"),
     "recursion": ("params", "noise", "period", "rate"),
 }

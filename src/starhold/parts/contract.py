@@ -102,7 +102,8 @@ class Envelope(NamedTuple):
 
 class Push(NamedTuple):
     """A bound of the norm of a torque or of an error of the command, which may grow with the body's rate: `torque` (N m),
-    and `per_rate` (N m s) times the norm of the rate (rad/s); `inf` for one without a bound."""
+    and `per_rate` (N m s) times the norm of the rate (rad/s); `inf` for one without a bound. Of how fast a torque changes
+    both are so much per second."""
 
     torque: float
     per_rate: float = 0.0

@@ -4,7 +4,7 @@ import json
 import warnings
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from starhold.kernel.reading import Claim, Numbers, Told
 from starhold.kernel.theorems import THEOREMS
 
 linalg: Any = import_module("scipy.linalg")
-T = TypeVar("T")
 
 
 class NotFoundError(Exception):
@@ -164,12 +163,3 @@ def certificate(programs: list[dict[str, Any]], claims: list[dict[str, Any]]) ->
         "programs": {n: p for n, p in by_digest.items() if n in used},
         "claims": claims,
     }
-
-
-def concluded(part: rules.Part[T]) -> T:
-    """Return what follows from obligations that are taken to be met."""
-    while True:
-        try:
-            next(part)
-        except StopIteration as end:
-            return end.value

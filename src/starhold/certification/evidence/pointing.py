@@ -10,7 +10,7 @@ from fractions import Fraction
 from importlib import import_module
 from itertools import takewhile
 from math import degrees, inf, isfinite, pi, radians, sin, sqrt
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +18,15 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio, smallest
-from starhold.certification.evidence.finding import NotFoundError, concluded, evidence, floats, read
+from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.evidence.responses import find_response
+from starhold.certification.evidence.responses import concluded, find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import above
-from starhold.certification.unmodelled import Pushes, driven_errors, pushes
-from starhold.kernel.held import Held
+from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes
+from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
@@ -62,7 +62,6 @@ examined.
 """
 
 
-T = TypeVar("T")
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 
 
@@ -291,7 +290,8 @@ class Pushed:
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
         wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
         self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
-        self.numbers |= bounds | more
+        changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
+        self.numbers |= bounds | more | (dict(zip(CHANGE, changes, strict=True)) if all(map(isfinite, changes)) else {})
         self.J = float(np.linalg.eigvalsh(tensor(loop.loop.craft.inertia))[-1])
         slow = sqrt(self.stiffness / self.J)
         self.scales = {f"w{k}": slow for k in (1, 2, 3)} | {f"q{k}": 1.0 for k in (1, 2, 3)}

@@ -31,6 +31,8 @@ def points(claim: Claim) -> Proof:
     an error, |error| <= error; it is told the attitude turned by error.attitude at most, the rate off by error.rate, and
     the target's rate and acceleration off by error.target.rate and error.target.acceleration;
     torques from outside that it is not told are no more than `outside`. Both may grow by `.per.rate` times the body's rate.
+    The torque that it is told may turn over at once; with told.change it is that at the attitude that it is told, and
+    changes no faster than that and told.change.per.rate times the body's rate.
     With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
     noise.attitude and noise.rate beside."""
     loop = AttitudeLoop(claim)
@@ -117,7 +119,8 @@ def points(claim: Claim) -> Proof:
     )
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
     assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
-    assumed += ["bounded-outside-torque"] * loop.outside + ["bounded-target" if loop.moving else "target-at-rest"]
+    assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
+    assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", "sign-at-once" if signs else "quaternion-as-fed"]
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
     return Statement(text + said, tuple(dict.fromkeys(assumed)), "pointing", within=tuple(within))

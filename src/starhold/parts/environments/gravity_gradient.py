@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import Any
+
+import numpy as np
 
 from starhold.algebra.quaternion import to_body
 from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, gyroscopic_torque, scale
-from starhold.parts.contract import Card, NoParams
-from starhold.parts.craft import Craft, total_inertia
+from starhold.parts.contract import Card, Envelope, NoParams, Push
+from starhold.parts.craft import Craft, tensor, total_inertia
 from starhold.parts.environments.two_body import attraction
 
 CARD = Card(
@@ -34,6 +37,17 @@ def gravity_gradient(position: Vector, strength: Scalar, craft: Craft) -> Vector
     """Gravity-gradient torque (N m) for the position in body axes (m) and strength 3 mu/r5 (1/(m2 s2))."""
     # R x J R has the form of a gyroscopic torque.
     return scale(strength, gyroscopic_torque(total_inertia(craft), position))
+
+
+def torque_change(params: NoParams, craft: Craft, envelope: Envelope) -> Push:
+    """The direction n turns in the body's axes by the body's rate and by v across over r, and n x Jn by no more than
+    (greatest - least moment) |n'|; 3 mu/r3 changes by no more than 3 v along/r of itself, and |n x Jn| is half of these at
+    most."""
+    moments = np.linalg.eigvalsh(tensor(total_inertia(craft)))
+    # A part more, for floats tell the moments.
+    spread = float(moments[-1] - moments[0] + 1e-14 * moments[-1])
+    strength = 3.0 * craft.gravity / envelope.distance**3 * spread
+    return Push(strength * hypot(1.0, 1.5) * envelope.speed / envelope.distance, strength)
 
 
 def examples() -> list[NoParams]:
