@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
-from itertools import takewhile
 from math import degrees, inf, isfinite, pi, radians, sin, sqrt
 from typing import Any, TypeAlias
 
@@ -18,11 +17,12 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio, smallest
-from starhold.certification.evidence.finding import NotFoundError, evidence, floats, read
+from starhold.certification.evidence.finding import floats, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.responses import concluded, find_response
 from starhold.certification.evidence.squares import rounded
+from starhold.certification.evidence.starts import POINTS, begins, start_rate
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes
@@ -32,16 +32,13 @@ from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
 from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, image, periods, points
+from starhold.kernel.theorems.pointing import ROUNDS, image, periods
 from starhold.kernel.theorems.response import first_of, responds
-from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import make_step
 from starhold.parts.craft import tensor
 
 linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
 
-POINTS = "points"
 ANGLES = (175, 150, 120, 90, 75, 60, 45, 35, 30, 25, 20, 15, 10)
 """The initial rotations (deg) from which convergence is attempted."""
 RATES = (5, 3, 2, 1, 0.5)
@@ -63,6 +60,7 @@ examined.
 
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
+Beginning: TypeAlias = tuple[list[float], float, dict[str, float], list[float]]
 
 
 @dataclass
@@ -249,8 +247,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         bounds = pushes(loop.loop, loop.known.envelope(noisy))
         against = bounds._replace(outside=bounds.outside + float(loop.known.disturbance))
         try:
-            pushed = Pushed(loop, against, noisy)
-            if any(pushed.find_largest(*one) for one in tried):
+            if any(pushed.find_largest(*one) for pushed in ways(loop, against, noisy, tried[0]) for one in tried):
                 return True
         except (RefusedError, ArithmeticError, ValueError, np.linalg.LinAlgError) as reason:
             # Floats may be too far apart in size, or too large.
@@ -258,17 +255,17 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     return False
 
 
-def start_rate(loop: ClosedLoop) -> float:
-    """Return the rate (rad/s), relative to its target, at which a loop starts."""
-    loop = loop.without("sensor", "estimator")
-    shown = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
-    return float(np.linalg.norm(shown.rate))
+def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pushed]:
+    """Return the searches by the law's own even V and by another, that of the larger start first."""
+    first = Pushed(loop, against, noisy)
+    both = [first, Pushed(loop, against, noisy, own=False)] if first.even else [first]
+    return sorted(both, key=lambda one: one.start(*begin), reverse=True) if len(both) > 1 else both
 
 
 class Pushed:
     """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
-    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False) -> None:
+    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False, own: bool = True) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
         if OUTSIDE in loop.words and loop.is_told("measurement.external_torque"):
             words.append(OUTSIDE)
@@ -281,7 +278,7 @@ class Pushed:
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         law = loop.loop.law
         # The law's own potential has no force beside the law's, however far from the target.
-        self.even = law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
+        self.even = own and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
         self.largest = (0.0, 0.0, "")
@@ -316,15 +313,27 @@ class Pushed:
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
         """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
         a start that moves; both are in decreasing order."""
-        # A start within a smaller set is also within the larger one.
-        first = bisect_left(angles, True, key=lambda angle: self.kept(self.begun, angle, rate, limits))
         faster = [one for one in beyond if one > rate > 0.0]
-        for angle in angles[first:]:
-            place = bisect_left(faster, True, key=lambda one: self.kept(self.begun, angle, one, limits))
+        for angle in angles[self.first(angles, rate, limits) :]:
+            place = self.first_rate(angle, faster, limits)
             if any(self.kept(self.find, angle, one, limits) for one in (*faster[place : place + 1], rate)):
                 self.loop.failed |= {POINTS: self.largest[-1]} if self.largest[-1] else {}
                 return True
         return False
+
+    def first(self, angles: list[float], rate: float, limits: dict[str, float]) -> int:
+        """Return the place of the largest rotation to begin from. A start in a smaller set is also in the larger one."""
+        return bisect_left(angles, True, key=lambda angle: self.kept(self.begun, angle, rate, limits))
+
+    def first_rate(self, angle: float, rates: list[float], limits: dict[str, float]) -> int:
+        """Return the place of the largest rate to begin from there."""
+        return bisect_left(rates, True, key=lambda rate: self.kept(self.begun, angle, rate, limits))
+
+    def start(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> tuple[float, float]:
+        """Return the largest start of `find_largest`, zeros where there is none."""
+        faster = [one for one in beyond if one > rate > 0.0]
+        angle = [*angles, 0.0][self.first(angles, rate, limits)]
+        return angle, [*faster, rate][self.first_rate(angle, faster, limits)] if angle else 0.0
 
     def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
         """Return whether a start is taken, and keep why the largest is not."""
@@ -380,19 +389,6 @@ class Pushed:
             return False
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
         return loop.try_to_show(claim, self.scales)
-
-
-def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
-    """Return whether the set of a claim without levels is sound, and the torque keeps its limits on it."""
-    try:
-        shown = points(read(claim | {"numbers": claim["numbers"] | {"highest": "0"}}, loop.by_digest))
-        wanted = dict(takewhile(lambda one: one[0] != "V between samples", shown))
-        for name in wanted:
-            evidence(name, wanted, scales)
-    except (NotFoundError, RefusedError) as reason:
-        loop.failed[POINTS] = str(reason)
-        return False
-    return True
 
 
 def feedback(loop: AttitudeLoop) -> float:

@@ -1,0 +1,35 @@
+"""From where a claim about the loop that flies is sought: the rate of the loop's start, and sets that are sound."""
+
+from itertools import takewhile
+from typing import Any
+
+import numpy as np
+
+from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.finding import NotFoundError, evidence, read
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.theorems.pointing import points
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.loop.kernels import make_step
+
+POINTS = "points"
+
+
+def start_rate(loop: ClosedLoop) -> float:
+    """Return the rate (rad/s), relative to its target, at which a loop starts."""
+    loop = loop.without("sensor", "estimator")
+    shown = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
+    return float(np.linalg.norm(shown.rate))
+
+
+def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
+    """Return whether the set of a claim without levels is sound, and the torque keeps its limits on it."""
+    try:
+        shown = points(read(claim | {"numbers": claim["numbers"] | {"highest": "0"}}, loop.by_digest))
+        wanted = dict(takewhile(lambda one: one[0] != "V between samples", shown))
+        for name in wanted:
+            evidence(name, wanted, scales)
+    except (NotFoundError, RefusedError) as reason:
+        loop.failed[POINTS] = str(reason)
+        return False
+    return True
