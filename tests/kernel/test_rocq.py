@@ -7,10 +7,11 @@ import subprocess
 from dataclasses import replace
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from starhold.certification.invariant import builtin_names, certify, load, write
-from starhold.certification.rocq import printed
+from starhold.certification.rocq import _taken, printed
 from starhold.kernel.check import check
 from starhold.kernel.reading import Told
 from starhold.kernel.rules import Persists
@@ -47,6 +48,19 @@ def test_every_obligation_is_a_lemma_under_its_name(small):
         assert f"\n(* {name} *)\nLemma " in lemmas
     assert lemmas.count("\nLemma claim0_") >= len(proved.shown)
     assert not re.search(r"Admitted|Axiom|Parameter|admit", lemmas)
+
+
+def test_short_squares_leave_little_of_a_positive_matrix_and_none_are_of_another():
+    rng = np.random.default_rng(0)
+    half = rng.integers(-(2**40), 2**40, size=(12, 15)).astype(object)
+    gram = half @ half.T
+    m, error, taken = _taken([[Fraction(x) for x in row] for row in gram])
+    u = np.array(taken, dtype=object)
+    rest = gram - m * (u.T @ u)
+    assert np.abs(u).max() < 2**40
+    assert np.abs(rest[np.triu_indices(12, 1)]).max() <= error < rest.diagonal().min() / 11
+    gram[5, 5] = gram[4, 4] = abs(gram[4, 5]) - 1
+    assert _taken([[Fraction(x) for x in row] for row in gram]) == (0, 0, [])
 
 
 @pytest.mark.slow
