@@ -18,8 +18,8 @@ from starhold.kernel.rules import Persists
 from tests.kernel.certificates import LAWS, contents, text
 from tests.kernel.stations import flown, proof
 
-SECONDS = 300
-"""What a lemma may take by the clock: the longest take about 45 s of a processor that others may use as well."""
+SECONDS = 100
+"""What a lemma may take by the clock: the longest take about 2 s of a processor that others may use as well."""
 FLOWN = [
     ("l2-circle", "smooth"), ("l2-circle", "relay"), ("l2-deficit", "deficit 5"), ("l2-nonlinear", "full model"),
     ("l2-equilibrium", None),
