@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from tests.kernel.driven import Driven
-from tests.kernel.flights import Fleet, Surroundings, cross, turn
+from tests.kernel.flights import Fleet, Surroundings, cross, rates, stepped, turn
 from tests.kernel.programs import number, run
 
 STEP = 1e-6
@@ -350,4 +350,27 @@ class Oracle(Driven):
             math.sin(min(n["end.angle"], 3.0) / 2) > size / k and n["end.rate"] > size * (1 + np.linalg.norm(K, 2) / k)
         ):
             return False
+        if "end.angle" in n and not self.ends():
+            return False
         return "level" not in n or 2 * n["level"] < moments[0] * k * k
+
+    def ends(self):
+        """Whether motions end as near the target as told, while torques from outside change sides now and then."""
+        n, inverse, zero = self.numbers, np.linalg.inv(self.J), np.zeros((3, 16))
+        damping, stiffness = self.linear()
+        fast = np.abs(np.linalg.eigvals(inverse @ damping)).max()
+        slow = np.abs(np.linalg.eigvals(np.linalg.solve(damping, stiffness))).min() / 2
+        corners = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, 8) * [[n[f"outside.{k}"]] for k in range(3)]
+        (q, w), h = (np.tile(np.eye(4)[0], (16, 1)).T, zero), 1 / fast
+        steps = min(int(4 / slow / h), 2000)
+        for k in range(3 * steps):
+            # The first half of them changes sides.
+            e = corners[:, np.arange(16) % 8] * np.where(np.arange(16) < 8, (-1) ** (k // steps), 1)
+
+            def slope(q, w, e=e):
+                return rates(self.J, inverse, q, w, e + run(self.programs["law"], self.inputs(q, w, *[zero] * 4)[0]))
+
+            q, w = stepped(slope, (q, w), h)
+            if k > steps and ((turn(q) > n["end.angle"]).any() or (np.linalg.norm(w, axis=0) > n["end.rate"]).any()):
+                return False
+        return True

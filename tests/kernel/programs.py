@@ -15,10 +15,10 @@ PLAIN = {
     "sqrt": math.sqrt,
     "less": lambda a, b: a < b,
     "less_equal": lambda a, b: a <= b,
-    "select": lambda t, a, b: a if t else b,
-    "both": lambda a, b: a and b,
-    "either": lambda a, b: a or b,
-    "opposite": lambda a: not a,
+    "select": lambda t, a, b: np.where(t, a, b) if np.ndim(t) else a if t else b,
+    "both": lambda a, b: a & b,
+    "either": lambda a, b: a | b,
+    "opposite": lambda a: a ^ True,
 }
 
 

@@ -7,18 +7,19 @@ import subprocess
 from dataclasses import replace
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from starhold.certification.invariant import builtin_names, certify, load, write
-from starhold.certification.rocq import printed
+from starhold.certification.rocq import _taken, printed
 from starhold.kernel.check import check
 from starhold.kernel.reading import Told
 from starhold.kernel.rules import Persists
 from tests.kernel.certificates import LAWS, contents, text
 from tests.kernel.stations import flown, proof
 
-SECONDS = 300
-"""What a lemma may take by the clock: the longest take about 45 s of a processor that others may use as well."""
+SECONDS = 100
+"""What a lemma may take by the clock: the longest take about 2 s of a processor that others may use as well."""
 FLOWN = [
     ("l2-circle", "smooth"), ("l2-circle", "relay"), ("l2-deficit", "deficit 5"), ("l2-nonlinear", "full model"),
     ("l2-equilibrium", None),
@@ -47,6 +48,19 @@ def test_every_obligation_is_a_lemma_under_its_name(small):
         assert f"\n(* {name} *)\nLemma " in lemmas
     assert lemmas.count("\nLemma claim0_") >= len(proved.shown)
     assert not re.search(r"Admitted|Axiom|Parameter|admit", lemmas)
+
+
+def test_short_squares_leave_little_of_a_positive_matrix_and_none_are_of_another():
+    rng = np.random.default_rng(0)
+    half = rng.integers(-(2**40), 2**40, size=(12, 15)).astype(object)
+    gram = half @ half.T
+    m, error, taken = _taken([[Fraction(x) for x in row] for row in gram])
+    u = np.array(taken, dtype=object)
+    rest = gram - m * (u.T @ u)
+    assert np.abs(u).max() < 2**40
+    assert np.abs(rest[np.triu_indices(12, 1)]).max() <= error < rest.diagonal().min() / 11
+    gram[5, 5] = gram[4, 4] = abs(gram[4, 5]) - 1
+    assert _taken([[Fraction(x) for x in row] for row in gram]) == (0, 0, [])
 
 
 @pytest.mark.slow

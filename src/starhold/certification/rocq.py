@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import reduce
 from importlib import resources
 from itertools import chain
-from math import lcm, prod
+from math import isqrt, lcm, prod
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -210,8 +210,10 @@ class Writer:
         """Write a part of a sum, times K, for the rules."""
         gram = [[K * x for x in row] for row in part.gram]
         rows = (f"[{'; '.join(map(_number, row[i:]))}]" for i, row in enumerate(gram))
-        long, less = _shorter(gram)
-        return f"Build_part {self.list(known)} {self.list(part.z)} [{'; '.join(rows)}]%Z {_number(long)} {less}"
+        size, error, taken = _taken(gram)
+        shares = "; ".join(f"[{'; '.join(map(_number, u))}]" for u in taken)
+        of = f"{self.list(known)} {self.list(part.z)} [{'; '.join(rows)}]%Z"
+        return f"Build_part {of} {_number(size)} {_number(error)} [{shares}]%Z"
 
 
 def _number(x: Fraction | int) -> str:
@@ -219,15 +221,33 @@ def _number(x: Fraction | int) -> str:
     return f"({int(x)})" if abs(x) < 10**30 else f"({int(x):#x})"
 
 
-def _shorter(gram: Rows) -> tuple[int, int]:
-    """Return the largest power m of two, and d, such that the matrix divided by m, in whole numbers, less d on its diagonal,
-    is nowhere negative still; zeros where there is none, or numbers are short."""
-    bits, d = max((int(x).bit_length() for row in gram for x in row), default=0), len(gram) - 1
-    for s in range(bits - 30, 30, -30):
-        short = [[Fraction(x // 2**s - d * (i == k)) for k, x in enumerate(row)] for i, row in enumerate(gram)]
-        if definite(short, False):
-            return 2**s, d
-    return 0, 0
+def _taken(gram: Rows) -> tuple[int, int, list[list[int]]]:
+    """Return m, e and short u such that a matrix less the sum of m uu' has entries of at most e off its diagonal, and count
+    times e on it; no u where there are none."""
+    G, count = [[int(x) for x in row] for row in gram], len(gram)
+    bits = max((row[k].bit_length() for k, row in enumerate(G)), default=0)
+    for s in range(bits - 40, -1, -20):
+        # Entries of u are rounded, so that those of m uu' are off by m times the largest at most.
+        error = 2 ** ((s + bits) // 2 + 1)
+        taken = _factored([[x - count * error * (i == k) for k, x in enumerate(row)] for i, row in enumerate(G)], 2**s)
+        if taken:
+            return 2**s, error, taken
+    return 0, 0, []
+
+
+def _factored(rest: list[list[int]], m: int) -> list[list[int]]:
+    """Return the rows of U such that m U'U is a matrix, but for what is rounded, or none where it is not positive."""
+    taken = list[list[int]]()
+    for k in range(len(rest)):
+        pivot = isqrt(max(rest[k][k], 0) // m)
+        if not pivot:
+            return []
+        u = [0] * k + [pivot] + [(2 * x + m * pivot) // (2 * m * pivot) for x in rest[k][k + 1 :]]
+        for i in range(k, len(rest)):
+            for j in range(k, len(rest)):
+                rest[i][j] -= m * u[i] * u[j]
+        taken.append(u)
+    return taken
 
 
 def _all(proofs: Iterable[str]) -> str:

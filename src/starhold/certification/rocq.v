@@ -127,9 +127,8 @@ Proof.
     pose proof (Rmult_le_pos _ _ (Rlt_le _ _ C) IH). nra.
 Qed.
 
-(* Sooner of long numbers: G = m H + R with short numbers in H, and R whose diagonal outweighs the rest of its rows. *)
-Definition quotients m d (G : list (list Z)) :=
-  map (fun r => match r with nil => nil | a :: g => (a / m - d)%Z :: map (fun y => (y / m)%Z) g end) G.
+(* Sooner: G less multiples of squares (u.z)^2 of short numbers u leaves a matrix whose diagonal outweighs its rows. *)
+Fixpoint outer u := match u with nil => nil | a :: v => map (Z.mul a) u :: outer v end.
 Definition row_less m (r s : list Z) := map (fun t => (fst t - m * snd t)%Z) (combine r s).
 Definition remainders m (G H : list (list Z)) := map (fun t => row_less m (fst t) (snd t)) (combine G H).
 Fixpoint alike (G H : list (list Z)) := match G, H with
@@ -137,10 +136,11 @@ Fixpoint alike (G H : list (list Z)) := match G, H with
 Fixpoint outweighs k m (R : list (list Z)) := match R with
   | nil => true | nil :: _ => false
   | (a :: g) :: R => (Z.leb (m * (k + Z.of_nat (length g)))%Z a && forallb (fun y => Z.leb (Z.abs y) m) g && outweighs (k + 1)%Z m R)%bool end.
-Definition semidefinite m d (G : list (list Z)) :=
-  if Z.eqb m 0 then nowhere_negative (length G) 1 G
-  else let H := quotients m d G in let R := remainders m G H in
-    (Z.ltb 0 m && alike G H && nowhere_negative (length G) 1 H && outweighs 0 m R)%bool.
+Fixpoint positive m e U (G : list (list Z)) := match U with
+  | nil => (Z.leb 0 e && outweighs 0 e G)%bool
+  | u :: U => let H := outer u in (alike G H && positive m e U (remainders m G H))%bool end.
+Definition semidefinite m e U (G : list (list Z)) :=
+  match U with nil => nowhere_negative (length G) 1 G | _ => (Z.leb 0 m && positive m e U G)%bool end.
 
 Lemma row_less_is m r : forall s z, length r = length s -> along (row_less m r s) z = along r z - IZR m * along s z.
 Proof.
@@ -184,16 +184,26 @@ Proof.
     simpl in *. assert (L' : (length z <= length R)%nat) by lia. specialize (IH L').
     pose proof (Rle_0_sqr u). unfold Rsqr in *. nra.
 Qed.
-Lemma semidefinite_is m d G z : semidefinite m d G = true -> length z = length G -> 0 <= form G z.
+Lemma scaled_is a g : forall z, along (map (Z.mul a) g) z = IZR a * along g z.
+Proof. induction g; destruct z; simpl; try ring. rewrite IHg, mult_IZR. ring. Qed.
+Lemma outer_is u : forall z, form (outer u) z = along u z * along u z.
+Proof. induction u; destruct z; simpl; try ring. rewrite scaled_is, IHu, mult_IZR. ring. Qed.
+Lemma alike_is G : forall H, alike G H = true -> length H = length G.
+Proof. induction G; destruct H; simpl; try discriminate; trivial. intro E. apply andb_prop in E. f_equal. apply IHG, E. Qed.
+Lemma positive_is m e U : forall G z, 0 <= IZR m -> positive m e U G = true -> length z = length G -> 0 <= form G z.
 Proof.
-  unfold semidefinite. destruct (Z.eqb m 0); intros H L.
+  induction U as [| u U IH]; simpl; intros G z M H L; apply andb_prop in H; destruct H as [H K].
+  - apply Z.leb_le, IZR_le in H. pose proof (outweighs_is e G 0 z H K). rewrite L in *. specialize (H0 (le_n _)). lra.
+  - rewrite (remainders_is m G (outer u) z H), outer_is. pose proof (Rle_0_sqr (along u z)). unfold Rsqr in *.
+    assert (0 <= form (remainders m G (outer u)) z).
+    { apply IH; trivial. unfold remainders. rewrite map_length, combine_length, (alike_is _ _ H). lia. }
+    pose proof (Rmult_le_pos _ _ M H0). lra.
+Qed.
+Lemma semidefinite_is m e U G z : semidefinite m e U G = true -> length z = length G -> 0 <= form G z.
+Proof.
+  unfold semidefinite. destruct U as [| u U]; intros H L.
   - apply nowhere_negative_is with (1 := H). lra.
-  - repeat (apply andb_prop in H; destruct H as [H ?]). apply Z.ltb_lt, IZR_lt in H.
-    rewrite (remainders_is m G (quotients m d G)); trivial.
-    assert (0 <= form (quotients m d G) z) by (eapply nowhere_negative_is; [eassumption | lra]).
-    assert (IZR 0 * IZR m * squares z <= form (remainders m G (quotients m d G)) z).
-    { apply outweighs_is; trivial; [lra |]. unfold remainders, quotients. rewrite map_length, combine_length, map_length. lia. }
-    nra.
+  - apply andb_prop in H. destruct H as [H K]. apply Z.leb_le, IZR_le in H. apply positive_is with (2 := K); trivial.
 Qed.
 
 (* z'Gz as a polynomial. *)
@@ -209,10 +219,10 @@ Proof.
 Qed.
 
 (* k (p - low) = cofactors . zeros + the sum of parts: products of what is not negative, each times z'Gz. *)
-Record part := { known : list poly; forms : list poly; gram : list (list Z); long : Z; less_on_diagonal : Z }.
+Record part := { known : list poly; forms : list poly; gram : list (list Z); size : Z; error : Z; taken : list (list Z) }.
 Definition part_poly t := fold_right mul (form_poly (gram t) (forms t)) (known t).
 Definition definite t :=
-  (Nat.eqb (length (forms t)) (length (gram t)) && semidefinite (long t) (less_on_diagonal t) (gram t))%bool.
+  (Nat.eqb (length (forms t)) (length (gram t)) && semidefinite (size t) (error t) (taken t) (gram t))%bool.
 Definition less p q := add p (scale (-1) q).
 Definition holds k p low cofactors zeros (parts : list part) :=
   (Z.ltb 0 k && forallb definite parts &&
