@@ -168,10 +168,11 @@ def half_told(role, **equations):
         (half_told("effector", reaction=NO, bound=PUSH), True),
         (half_told("environment", torque=NO, bound=PUSH), True),
         (half_told("environment", torque=NO, bound=PUSH, acceleration=NO), False),
+        (half_told("environment", torque=NO, bound=PUSH, MODELLED=True), False),
     ],
 )
 def test_a_part_that_tells_half_of_what_it_does_is_left_out(own, enters):
-    """An effector's reaction without its bound, a force that moves the orbit."""
+    """An effector's reaction without its bound, a force that moves the orbit, a torque that the law is told."""
     claim = certified("pd-0", disturbance=1e-4).claim("pointing")
     (told,) = named([claim], textbook()["pd-0"].with_parts(own), 1.0)
     assert (f"without:{own.part.role} of-ones-own" in told.assumptions) != enters

@@ -220,6 +220,8 @@ def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | Non
     """
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
+    # A torque that laws are told is bounded by the claim's numbers, which are about the gravity gradient alone.
+    acts = acts and (is_read(fitted) or not part.flag("MODELLED"))
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
     declared = [None if tell is None else tell(fitted.params, envelope) for tell in tells]
     torque, error = (push if push is None or is_read(fitted) or all(map(isfinite, push)) else None for push in declared)
