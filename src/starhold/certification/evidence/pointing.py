@@ -258,14 +258,14 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
 def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pushed]:
     """Return the searches by the law's own even V and by another, that of the larger start first."""
     first = Pushed(loop, against, noisy)
-    both = [first, Pushed(loop, against, noisy, own=False)] if first.even else [first]
+    both = [first, Pushed(loop, against, noisy, given=False)] if first.even else [first]
     return sorted(both, key=lambda one: one.start(*begin), reverse=True) if len(both) > 1 else both
 
 
 class Pushed:
     """A loop under unmodelled torques and errors. RefusedError for a law outside the theorem."""
 
-    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False, own: bool = True) -> None:
+    def __init__(self, loop: Loop, against: Pushes, noisy: bool = False, given: bool = True) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
         if OUTSIDE in loop.words and loop.is_told("measurement.external_torque"):
             words.append(OUTSIDE)
@@ -278,7 +278,7 @@ class Pushed:
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         law = loop.loop.law
         # The law's own potential has no force beside the law's, however far from the target.
-        self.even = own and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
+        self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
         self.largest = (0.0, 0.0, "")
