@@ -16,7 +16,7 @@ from starhold.scenario.units import LONGEST, to_number
 from starhold.scenario.values import locate
 from tests.refusals import rows
 
-REGISTRY = pint.UnitRegistry(cache_folder=":auto:")
+REGISTRY = pint.UnitRegistry()
 NAMES = ["m", "km", "cm", "s", "ms", "min", "h", "N", "mN", "kg", "rad", "deg", "rpm", "arcsec"]
 
 factors = st.lists(
