@@ -4,7 +4,7 @@ bound."""
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from importlib import import_module
@@ -22,13 +22,12 @@ from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.responses import concluded, find_response
 from starhold.certification.evidence.squares import rounded
-from starhold.certification.evidence.starts import POINTS, begins, start_rate
+from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.evidence.terms import valued
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
-from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
 from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
@@ -281,7 +280,7 @@ class Pushed:
         self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
-        self.largest = (0.0, 0.0, "")
+        self.largest, self.refused = (0.0, 0.0, ""), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
@@ -313,27 +312,36 @@ class Pushed:
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
         """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
         a start that moves; both are in decreasing order."""
-        faster = [one for one in beyond if one > rate > 0.0]
-        for angle in angles[self.first(angles, rate, limits) :]:
-            place = self.first_rate(angle, faster, limits)
-            if any(self.kept(self.find, angle, one, limits) for one in (*faster[place : place + 1], rate)):
+        for angle, rates in self.starts(angles, rate, limits, beyond):
+            if any(self.kept(self.find, angle, one, limits) for one in rates):
                 self.loop.failed |= {POINTS: self.largest[-1]} if self.largest[-1] else {}
                 return True
         return False
 
-    def first(self, angles: list[float], rate: float, limits: dict[str, float]) -> int:
-        """Return the place of the largest rotation to begin from. A start in a smaller set is also in the larger one."""
-        return bisect_left(angles, True, key=lambda angle: self.kept(self.begun, angle, rate, limits))
-
-    def first_rate(self, angle: float, rates: list[float], limits: dict[str, float]) -> int:
-        """Return the place of the largest rate to begin from there."""
-        return bisect_left(rates, True, key=lambda rate: self.kept(self.begun, angle, rate, limits))
-
-    def start(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> tuple[float, float]:
-        """Return the largest start of `find_largest`, zeros where there is none."""
+    def starts(
+        self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]
+    ) -> Iterator[tuple[float, tuple[float, ...]]]:
+        """Yield the rotations to begin from, the largest first, each with the rates to begin at there."""
+        # A start within a smaller set is also within the larger one.
+        first = bisect_left(angles, True, key=lambda angle: self.kept(self.may_begin, angle, rate, limits))
         faster = [one for one in beyond if one > rate > 0.0]
-        angle = [*angles, 0.0][self.first(angles, rate, limits)]
-        return angle, [*faster, rate][self.first_rate(angle, faster, limits)] if angle else 0.0
+        for angle in angles[first:]:
+            place = bisect_left(faster, True, key=lambda one: self.kept(self.may_begin, angle, one, limits))
+            yield angle, (*faster[place : place + 1], rate)
+
+    def start(self, *begin: Any) -> tuple[float, float]:
+        """Return the largest of the starts, zeros where there is none."""
+        angle, rates = next(self.starts(*begin), (0.0, (0.0,)))
+        return angle, rates[0]
+
+    def may_begin(self, angle: float, rate: float, limits: dict[str, float]) -> bool:
+        """Return whether there is a start set, which is looked for once."""
+        key = angle, rate, *limits.items()
+        if key not in self.refused:
+            self.refused[key] = "" if self.begun(angle, rate, limits) is not None else self.loop.failed[POINTS]
+        if self.refused[key]:
+            self.loop.failed[POINTS] = self.refused[key]
+        return not self.refused[key]
 
     def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
         """Return whether a start is taken, and keep why the largest is not."""
@@ -389,8 +397,3 @@ class Pushed:
             return False
         claim = self.claim(chain.V, numbers, levels=chain.levels, ellipsoids=chain.ellipsoids, **chain.response)
         return loop.try_to_show(claim, self.scales)
-
-
-def feedback(loop: AttitudeLoop) -> float:
-    """Return the stiffness of the law near rest, a third of its trace."""
-    return -float(sum(row[3 + k] for k, row in enumerate(near_target(loop, Fraction(0)).torque))) / 3.0

@@ -1,5 +1,6 @@
-"""From where a claim about the loop that flies is sought: the rate of the loop's start, and sets that are sound."""
+"""From where a claim about the loop that flies is sought: the rate of the loop's start, its stiffness, and sound sets."""
 
+from fractions import Fraction
 from itertools import takewhile
 from typing import Any
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, read
+from starhold.kernel.loops import AttitudeLoop
+from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.theorems.pointing import points
 from starhold.loop.closed_loop import ClosedLoop
@@ -33,3 +36,8 @@ def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
         loop.failed[POINTS] = str(reason)
         return False
     return True
+
+
+def feedback(loop: AttitudeLoop) -> float:
+    """Return the stiffness of the law near rest, a third of its trace."""
+    return -float(sum(row[3 + k] for k, row in enumerate(near_target(loop, Fraction(0)).torque))) / 3.0
