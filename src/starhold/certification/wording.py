@@ -105,7 +105,7 @@ def enumerated(names: Sequence[str]) -> str:
 
 def listed(words: Sequence[str]) -> str:
     """List items for a sentence."""
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
 
 
 def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from starhold.certification.certify import Wanted, certify
+from starhold.certification.hand_over import flown_ends
+from starhold.certification.subject import above, make_subject
+from starhold.certification.wording import listed
 from starhold.studies.body import Issued
 from starhold.studies.modes import RELEASED, STORED, HandOver, fresh_momentum, hand_overs, left_momentum
 
 if TYPE_CHECKING:
     from starhold.certification.certificate import Certificate, Claim
-    from starhold.certification.certify import Wanted
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
 
@@ -85,8 +88,6 @@ def links_of(loop: ClosedLoop, name: str, certificates: Mapping[str, Certificate
 def widened(loop: ClosedLoop, name: str, issued: Sequence[Issued], wanted: Wanted) -> list[Issued]:
     """Return the certificates of a law's modes, with a further claim, in the certificate of the switch, of each mode as it
     flies that a switch begins with more momentum than its claim is about: from the same start, with that momentum."""
-    from starhold.certification.certify import certify
-
     every, tried = list(issued), set[str]()
     switches = {one.name: one for one in hand_overs(loop, name) if one.key == "until"}
 
@@ -153,11 +154,6 @@ def chains(scenario: Scenario, certificates: list[Certificate], law: str | None 
     return {entry.name: links for entry in entries if (links := built(entry))}
 
 
-def listed(clauses: Sequence[str]) -> str:
-    """List clauses for a sentence."""
-    return " and ".join(filter(None, (", ".join(clauses[:-1]), *clauses[-1:])))
-
-
 def _flown(certificate: Certificate | None) -> Claim | None:
     claim = None if certificate is None else certificate.claim("pointing")
     return claim if claim is not None and claim.outcome == "proved" else None
@@ -166,8 +162,6 @@ def _flown(certificate: Certificate | None) -> Claim | None:
 def _link(one: HandOver, before: str, after: str, last: Claim | None, claim: Claim | None, begun: float) -> Link:
     """Return the link of a switch. last, claim: of the mode before and the next one; begun: the momentum with which the mode
     before begins (N m s)."""
-    from starhold.certification.hand_over import flown_ends
-
     early = _is_early(one, begun)
     rate, angle = flown_ends(one.levels, one.before, one.after, None if early else last, claim)
     momentum = _momentum(one, last, rate)
@@ -192,8 +186,6 @@ def _is_early(one: HandOver, begun: float) -> bool:
 
 def _unending(one: HandOver, before: str, last: Claim) -> list[str]:
     """Return what must be assumed for a mode to end that has settled; nothing of one that is as good if it does not."""
-    from starhold.certification.subject import above, make_subject
-
     n = last.numbers
     rate = n["rate"] + n["rate_error"]
     settled = {"angle_below": n["angle"] + n["attitude_error"], "rate_below": rate, STORED: -inf}
@@ -208,8 +200,6 @@ def _momentum(one: HandOver, last: Claim | None, rate: float) -> float:
     """Return the largest momentum with which a mode begins (N m s): that of the claim about the mode before, or that at
     which the switch happens; or that of the rotors at the start, which they keep in a mode in which wheels are inactive, and
     the body's."""
-    from starhold.certification.subject import above, make_subject
-
     # The rate is relative to the target.
     fastest = rate + above(make_subject(one.after).target_rate)
     fresh = fresh_momentum(one, fastest)

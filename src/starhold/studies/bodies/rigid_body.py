@@ -16,7 +16,6 @@ from starhold.parts.part import same_numbers
 from starhold.scenario.bodies.rigid_body.start import date_of_axes
 from starhold.simulation.lane import fly
 from starhold.studies.body import NO_CONES, BodyStudy, Cones, Issued
-from starhold.studies.chain import widened
 from starhold.studies.modes import (
     begins_asked,
     certify_modes,
@@ -153,6 +152,8 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing:
 
     wanted = wanted_of(scenario, pointing)
     if mode_laws(loop.law, loop.gains):
+        from starhold.studies.chain import widened
+
         issued = certify_modes(loop, entry.name, wanted)
         return widened(loop, entry.name, issued, wanted) if pointing else issued
     return [Issued(certify(now, name, wanted), now, step) for name, now, step in _named(scenario, entry, loop)]
