@@ -73,13 +73,10 @@ def fly_claims(loop: ClosedLoop, certificate: Certificate, flights: int = FLIGHT
     top = _highest(height)
     # Where every rate is allowed, up to the V of a body that spins with three times the V of a half turn.
     level = min(4.0 * top, math.inf if level is None else level)
-    drawn = draw(flights, height, level, random)
-    if claim.kind == "pointing":
-        # A set of a V that does not depend on the sign of q0 has q0 > 0.
-        upper = drawn.copy()
-        upper[ROWS.attitude.start] = np.abs(drawn[ROWS.attitude.start])
-        drawn = np.where(height(upper) == height(drawn), upper, drawn)
-    free, states = _paced(free, certificate, drawn, random)
+    # A set about the target alone, of a V that is the same at the other quaternion, has q0 > 0.
+    one_sided = claim.kind == "pointing" and not height(_at_rest(-np.eye(4)[:, :1])).any()
+    most = math.pi if one_sided else 2.0 * math.pi
+    free, states = _paced(free, certificate, draw(flights, height, level, random, most), random)
     highest, torque = 0.0, 0.0
     for batch, share in falling(free, certificate, claim, states, _value(free, programs), 1e-15 * top):
         highest = max(highest, share)
