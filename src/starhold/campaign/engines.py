@@ -28,6 +28,7 @@ from starhold.campaign.chunk import Chunk
 from starhold.campaign.extras import extra
 from starhold.campaign.workers import Team
 from starhold.errors import InputError
+from starhold.simulation.device import Pool
 from starhold.simulation.lanes import ThreadPool
 from starhold.trace.device import Device, DeviceError
 from starhold.version import __version__
@@ -48,7 +49,7 @@ class Job(Protocol):
     """Begins to fly a block, and returns a function that waits for its results; pickled for other processes, which keep it
     between blocks."""
 
-    def __call__(self, law: str, first: int, count: int, pool: ThreadPool | Device, /) -> Callable[[], Chunk]: ...
+    def __call__(self, law: str, first: int, count: int, pool: Pool, /) -> Callable[[], Chunk]: ...
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ def _fly_there(job: Job, blocks: list[Block], device: Device) -> Iterator[tuple[
         raise InputError("campaign", "gpu", str(error), f"a GPU that works; {_KEPT}") from None
 
 
-def _fly_here(job: Job, blocks: list[Block], pool: ThreadPool | Device) -> Iterator[Chunk]:
+def _fly_here(job: Job, blocks: list[Block], pool: Pool) -> Iterator[Chunk]:
     begun = deque[Callable[[], Chunk]]()
     for block in blocks:
         begun.append(job(*block, pool))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +25,11 @@ from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
 from starhold.scenario.requirement import RequirementTable
 from starhold.simulation.batched import begin_metered
-from starhold.simulation.device import begin_on_device
+from starhold.simulation.device import Pool, begin_on_device
 from starhold.simulation.lane import Progress
-from starhold.simulation.lanes import ThreadPool
 from starhold.studies.body import study_of
 from starhold.studies.requirements import Requirement, cones_of, extras_of, orbit_of, read_requirements, tables_of
 from starhold.trace.device import Device
-
-Pool: TypeAlias = ThreadPool | Device
-"""What flies: threads of this process, or a GPU."""
 
 
 @dataclass(frozen=True)

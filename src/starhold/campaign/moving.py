@@ -4,6 +4,7 @@ own formulas, lane by lane where there is no way at once: a law's gains, and wha
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import repeat
 from typing import Any, TypeAlias, cast
 
@@ -79,8 +80,7 @@ class Moving:
                 parts[fitted.called] = put(parts.get(fitted.called, fitted.params), path[2:], _rows(every[key]))
         if parts:
             fitted = [replace(one, params=parts.get(one.called, one.params)) for one in self.scenario.parts]
-            tables = read_toml(self.scenario.text, self.scenario.where)["part"]
-            parts = {one.called: one.params for one in with_assumed(fitted, tables) if _differ(one.params)}
+            parts = {one.called: one.params for one in with_assumed(fitted, self._tables) if _differ(one.params)}
         for one in self.base.loop.parts:
             if one.name in parts and self._is_apart(replace(one, params=parts[one.name])):
                 lanes = _each(parts[one.name], len(next(iter(columns.values()))))
@@ -88,15 +88,18 @@ class Moving:
         self._names = tuple(true), tuple(supposed), tuple(parts), tuple(ready)
         return tuple(true.values()), tuple(supposed.values()), tuple(parts.values()), tuple(ready.values())
 
+    @cached_property
+    def _tables(self) -> Any:
+        """The parts' tables as they are written."""
+        return read_toml(self.scenario.text, self.scenario.where)["part"]
+
     def _is_apart(self, fitted: Fitted) -> bool:
         """Return whether no equation records what a part prepares from parameters with arrays (lanes,)."""
         if fitted.name not in self._apart:
             count = sum(isinstance(leaf, np.ndarray) for leaf in leaves(fitted.params))
 
             def equation(*given: Any) -> Any:
-                values = iter(given)
-                params = mapped(fitted.params, lambda leaf: next(values) if isinstance(leaf, np.ndarray) else leaf)
-                return replace(fitted, params=params).prepared(self.base.loop.period)
+                return replace(fitted, params=_filled(fitted.params, given)).prepared(self.base.loop.period)
 
             try:
                 record_call(equation, (0.0,) * count)
@@ -110,8 +113,7 @@ class Moving:
             names = list[str]()
 
             def equation(*given: Any) -> tuple[Any, ...]:
-                values = iter(given)
-                bound = mapped(arguments, lambda leaf: next(values) if isinstance(leaf, np.ndarray) else leaf)
+                bound = _filled(arguments, given)
                 by_name = (dict(zip(*pair, strict=True)) for pair in zip(self._names, bound, strict=True))
                 pairs = [pair for pair in self._named(*by_name) if isinstance(pair[1], Handle)]
                 names[:] = [name for name, _ in pairs]
@@ -151,6 +153,12 @@ class Moving:
             for gains, (craft, _) in zip(every, cases, strict=True):
                 law.check(gains, craft)
         return dict(named(_joined(every), "gains"))
+
+
+def _filled(structure: Any, values: Iterable[Any]) -> Any:
+    """Return a structure with these values in place of its arrays (lanes,)."""
+    rest = iter(values)
+    return mapped(structure, lambda leaf: next(rest) if isinstance(leaf, np.ndarray) else leaf)
 
 
 def _differ(value: Any) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,12 @@ from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Arguments, Numbers, Observer, make_program
 from starhold.loop.programs import CHUNK, many
 from starhold.simulation.batched import Metered, windows_of
+from starhold.simulation.lanes import ThreadPool, numbered
 from starhold.trace.device import Device, Rows
 
 Array = NDArray[np.float64]
+Pool: TypeAlias = ThreadPool | Device
+"""A pool flies blocks of runs: threads of this process, or a GPU."""
 
 
 class DeviceBatch:
@@ -25,8 +28,7 @@ class DeviceBatch:
         self, device: Device, loop: ClosedLoop, carries: Array, first_run: int | NDArray[np.int64], noted: Array
     ) -> None:
         self.device, self.loop, self.lanes = device, loop, carries.shape[1]
-        along = isinstance(first_run, int)
-        self.first_run, self.runs = (first_run, ()) if along else (0, np.asarray(first_run, dtype=float))
+        self.first_run, self.runs = numbered(first_run)
         self.carry, self.noted = device.rows(carries), device.rows(noted)
         self._ready: dict[tuple[int, int], Any] = {}
 

@@ -122,8 +122,7 @@ class RunningBatch:
         noted: NDArray[np.float64] | None = None,
     ) -> None:
         self.loop, self.width, self.observer = loop, width, observer
-        along = isinstance(first_run, int)
-        self.first_run, self.runs = (first_run, ()) if along else (0, np.asarray(first_run, dtype=float))
+        self.first_run, self.runs = numbered(first_run)
         self.lanes = carries.shape[1]
         self.count = -(-self.lanes // width)
         self.like = loop.carry()
@@ -233,6 +232,11 @@ class RunningBatch:
             return phase._replace(craft=mapped(craft, cut), before=mapped(before, cut)).rate_from(rates)
 
         return turn
+
+
+def numbered(first_run: int | NDArray[np.int64]) -> tuple[int, NDArray[np.float64] | tuple[()]]:
+    """Return the run number of lane 0 where those of the others follow it, or 0 and those of all lanes."""
+    return (first_run, ()) if isinstance(first_run, int) else (0, np.asarray(first_run, dtype=float))
 
 
 def carry_columns(loop: ClosedLoop, start: NDArray[np.float64], phase: Any = None) -> NDArray[np.float64]:
