@@ -64,11 +64,11 @@ class RigidBodyStudy(BodyStudy):
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         attrs = run.attrs
-        metrics = measure(run, attrs["settling_attitude_tolerance"], attrs["settling_rate_tolerance"])
+        tolerances = attrs["settling_attitude_tolerance"], attrs["settling_rate_tolerance"]
         if "transient_angle_end" not in attrs:
-            return metrics
-        rate, acceleration, angle_end, rate_end = (attrs[f"transient_{name}"] for name in TRANSIENT)
-        return metrics | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, metrics["cut_off"])
+            return measure(run, *tolerances)
+        rate, acceleration, *ends = (attrs[f"transient_{name}"] for name in TRANSIENT)
+        return against_limits(run, Limits(rate, acceleration), measure(run, *tolerances, transient=(ends[0], ends[1])))
 
     def measure_required(self, run: Recording, cones: Cones) -> dict[str, Any]:
         attrs = run.attrs
