@@ -170,7 +170,7 @@ def make_meter(
         0.0,
         modal,
         validity_notes.begun(estimated),
-        transient_notes.begun(bool(transient)),
+        transient_notes.Watched() if transient else (),
     )
     first, tail = Noted(*begun), tail_start(steps)
     angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2

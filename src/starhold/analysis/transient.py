@@ -14,7 +14,7 @@ from starhold.algebra.structure import unflatten
 from starhold.algebra.vector import dot, subtract
 from starhold.algebra.words import number_of
 from starhold.analysis.rigid_body import acceleration
-from starhold.analysis.transient_notes import NOTHING, Ends, Watched, watched
+from starhold.analysis.transient_notes import Ends, Watched, noted
 from starhold.loop.closed_loop import ClosedLoop, Composition
 from starhold.loop.kernels import Observer
 from starhold.simulation.lane import Recording
@@ -34,8 +34,8 @@ def watch(parts: Composition) -> Any:
         goal = target.module.goal(setup.target, s, step + 1, carry.memories.followed, *mode)
         error = relative(goal.attitude, s.attitude)
         left = subtract(s.rate, to_body(error, goal.rate))
-        moved, then = subtract(s.rate, decided.state.rate), number_of(step)
-        return watched(seen, error, left, s.rate, moved, then, number_of(step + 1), ends)
+        quantities = {"attitude_error": error, "rate_error": left, "rate": s.rate}
+        return noted(seen, quantities, number_of(step + 1), ends)
 
     return note
 
@@ -151,8 +151,8 @@ class Watcher:
             raise ValueError("transients are noted only for a target at rest")
         error, none = relative(self.loop.first_attitude(), state.attitude), np.zeros(starts.shape[1])
         angle, square = self.ends.angle * dot(error[1:], error[1:]), dot(state.rate, state.rate)
-        noted = np.array([angle, self.ends.rate * square, none, none, square, none, none, none])
-        observer = Observer(watch(self.loop.composition()), NOTHING, self.ends)
+        noted = np.array([angle, self.ends.rate * square, none, none, square, none, none, none, *state.rate])
+        observer = Observer(watch(self.loop.composition()), Watched(), self.ends)
         (phase,) = self.loop.phases(max(steps, 1))
         phase = phase._replace(last=steps, gains=gains)
         carries = carry_columns(self.loop, starts, phase)

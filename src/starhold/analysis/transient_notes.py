@@ -1,4 +1,4 @@
-"""Notes on the end of a slew and on its peaks, of samples of a recording and of many lanes step by step."""
+"""Notes on the end of a slew and on its peaks, of samples of a recording or of many lanes step by step."""
 
 from __future__ import annotations
 
@@ -28,75 +28,42 @@ class Ends(NamedTuple):
 class Watched(NamedTuple):
     """The notes of a transient: squares of the sine of half the error angle and of the relative rate, both over their ends,
     at the last instant; the instant, with its fraction, at which each was last above 1; the largest square of the body's
-    rate (rad2/s2), and for each of its components the largest mean rate of change from instant to instant (rad/s2)."""
+    rate (rad2/s2); for each of its components the largest mean rate of change from instant to instant (rad/s2); and the
+    last rate (rad/s)."""
 
-    angle: float
-    rate: float
-    angle_step: float
-    rate_step: float
-    peak_rate: float
-    peak_acceleration: Vector
-
-
-class Sampled(NamedTuple):
-    """Notes on samples of a recording, and the body's rate (rad/s) at the last one."""
-
-    watched: Watched
-    rate: Vector
-
-
-NOTHING = Watched(0.0, 0.0, 0.0, 0.0, 0.0, ZERO)
-"""The notes before a flight."""
-
-
-def watched(
-    seen: Watched, error: Any, left: Vector, rate: Vector, moved: Vector, then: Any, now: Any, ends: Ends
-) -> Watched:
-    """Return the notes at the instant `now`: error, left: attitude and rate relative to the target; rate: the body's;
-    moved: its change since the instant `then`, one earlier."""
-
-    def last_above(last: Any, square: Any, before: Any) -> Any:
-        # A fraction of the previous step, by linear interpolation of the two squares.
-        crossing = then + (before - 1.0) / (before - square)
-        return where(less(1.0, square), now, where(less(1.0, before), crossing, last))
-
-    angle = ends.angle * (error[1] * error[1] + error[2] * error[2] + error[3] * error[3])
-    square, most = ends.rate * dot(left, left), seen.peak_acceleration
-    return Watched(
-        angle,
-        square,
-        last_above(seen.angle_step, angle, seen.angle),
-        last_above(seen.rate_step, square, seen.rate),
-        maximum(seen.peak_rate, dot(rate, rate)),
-        (
-            maximum(most[0], absolute(moved[0]) / ends.period),
-            maximum(most[1], absolute(moved[1]) / ends.period),
-            maximum(most[2], absolute(moved[2]) / ends.period),
-        ),
-    )
-
-
-def begun(wanted: bool) -> Any:
-    """Return the notes of samples before the first; none where no transient is asked for."""
-    return Sampled(NOTHING, ZERO) if wanted else ()
+    angle: Any = 0.0
+    off_rate: Any = 0.0
+    angle_step: Any = 0.0
+    rate_step: Any = 0.0
+    peak_rate: Any = 0.0
+    peak_acceleration: Vector = ZERO
+    rate: Vector = ZERO
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], now: Any, ends: Any) -> Any:
-    """Return the notes after a sample."""
+    """Return the notes after an instant; nothing where no transient is asked for."""
     if not seen:
         return seen
-    error, left, rate = (quantities[name] for name in ("attitude_error", "rate_error", "rate"))
-    moved = chosen(less(now, 0.5), ZERO, subtract(rate, seen.rate))
-    return Sampled(watched(seen.watched, error, left, rate, moved, now - 1.0, now, ends), rate)
+    q, left, rate = (quantities[name] for name in ("attitude_error", "rate_error", "rate"))
+
+    def last_above(last: Any, square: Any, before: Any) -> Any:
+        # A fraction of the previous step, by linear interpolation of the two squares.
+        crossing = now - 1.0 + (before - 1.0) / (before - square)
+        return where(less(1.0, square), now, where(less(1.0, before), crossing, last))
+
+    angle, off = ends.angle * (q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), ends.rate * dot(left, left)
+    moved: Any = chosen(less(now, 0.5), ZERO, subtract(rate, seen.rate))
+    peaks: Any = tuple(
+        maximum(most, absolute(change) / ends.period) for most, change in zip(seen.peak_acceleration, moved, strict=True)
+    )
+    steps = last_above(seen.angle_step, angle, seen.angle), last_above(seen.rate_step, off, seen.off_rate)
+    return Watched(angle, off, *steps, maximum(seen.peak_rate, dot(rate, rate)), peaks, rate)
 
 
-def table(rows: Any, period: float, every: int) -> dict[str, Metric]:
+def table(seen: Any, period: float, every: int) -> dict[str, Metric]:
     """Return the metrics of notes at these rows, of samples every so many control periods (s)."""
-    if not rows:
+    if not seen:
         return {}
-    seen = rows.watched
-    return {
-        "transient_time": Metric("s", CROSSING, seen[:4], (float(every), period)),
-        "peak_rate": Metric("rad/s", "root", (seen.peak_rate,)),
-        "peak_acceleration": Metric("rad/s^2", "most", seen.peak_acceleration),
-    }
+    peaks = Metric("rad/s", "root", (seen.peak_rate,)), Metric("rad/s^2", "most", seen.peak_acceleration)
+    time = Metric("s", CROSSING, seen[:4], (float(every), period))
+    return {"transient_time": time, "peak_rate": peaks[0], "peak_acceleration": peaks[1]}
