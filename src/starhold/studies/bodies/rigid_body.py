@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
     from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
-    from starhold.analysis.trial import Trial
     from starhold.certification.certify import Wanted
     from starhold.certification.hand_over import Ends
     from starhold.loop.closed_loop import ClosedLoop, Event
@@ -45,6 +44,7 @@ class RigidBodyStudy(BodyStudy):
     """Everything is in SI. Laws with wheels are certified again after faults that they know of."""
 
     EXTRAS = EXTRAS
+    CLAIMS, TRIALS = "starhold.analysis.departure", "starhold.analysis.trial"
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         settling, transient = scenario.table.settling, scenario.table.transient
@@ -119,15 +119,8 @@ class RigidBodyStudy(BodyStudy):
         last = min((step for step, event in latest.items() if _differs(event, issued)), default=None)
         return departures(issued.certificate, issued.loop, run, issued.step, last)
 
-    def fly_claims(self, issued: Issued) -> Trial | None:
-        from starhold.analysis.trial import fly_claims
-
-        return fly_claims(issued.loop, issued.certificate)
-
     def start_inside(self, issued: Issued) -> dict[str, bool]:
-        from starhold.analysis.departure import start_inside
-
-        return start_inside(issued.certificate, issued.loop) if issued.mode in (None, 1) and issued.before is None else {}
+        return super().start_inside(issued) if issued.mode in (None, 1) and issued.before is None else {}
 
 
 STUDY = RigidBodyStudy()
