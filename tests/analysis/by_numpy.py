@@ -6,8 +6,13 @@ import numpy as np
 
 from starhold.analysis.any_body import COMMAND
 from starhold.analysis.libration_point import YEAR, CircleGoal
-from starhold.analysis.meter import ALMOST, LAST, on_limit, stays_within, too_late
+from starhold.analysis.meter import ALMOST, KEPT, LAST, on_limit, stays_within
 from starhold.analysis.rigid_body import DECADES, error_angle
+
+
+def too_late(index: float, count: int, kept: float = KEPT) -> bool:
+    """Whether the sample of this index, of so many, lies within the last share of a run."""
+    return index > (1.0 - kept) * (count - 1)
 
 
 def of_rigid_body(run, attitude_tolerance, rate_tolerance):

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.structure import flatten, unflatten
-from starhold.analysis.rigid_body import acceleration
+from starhold.analysis.rigid_body import acceleration, measure
 from starhold.analysis.roots import PUBLISHED, SlewProblem, TwoPieceFit, fit, search, unmet
-from starhold.analysis.transient import Limits, Transient, Watcher, of_run
+from starhold.analysis.transient import Limits, Transient, Watcher
 from starhold.laws.catalogue import catalogue
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies.rigid_body import State
@@ -29,6 +29,19 @@ def problem(inertia=(2.0, 3.0, 4.0), axis=(1.0, -2.0, 0.5), rate=(0.1, 0.2, -0.1
     start = State((1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO, ZERO)
     loop = ClosedLoop(make_craft(inertia, np.inf), LAW, LAW.examples()[0], start, 0.01, limit="none", **options)
     return SlewProblem(loop, STEPS, axis, rate, END, END, -0.01)
+
+
+def of_run(run, angle_end, rate_end):
+    """The transient of a recorded run, however late it ends."""
+    count = len(run["time"])
+    arrays = {"torque": np.zeros((count, 3)), "command": np.zeros((count, 3))} | run.arrays
+    # A run that stays as it ends for long enough has nothing that is too late to count.
+    held = {name: np.concatenate([values, np.repeat(values[-1:], 10 * count, axis=0)]) for name, values in arrays.items()}
+    run = Recording(held, {"limit": "none", "torque_limit": math.inf} | run.attrs)
+    found = measure(run, 1.0, 1.0, transient=(angle_end, rate_end))
+    peaks = np.abs(acceleration(run)).max(axis=0).tolist()
+    assert found["peak_acceleration"] == max(peaks)
+    return Transient(found["transient_time"], found["peak_rate"], tuple(peaks))
 
 
 def flown(made, angle, root):

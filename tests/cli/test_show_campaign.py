@@ -10,6 +10,7 @@ from rich.console import Console
 
 from starhold.campaign.verdicts import percent
 from starhold.campaign.worst import Sought
+from starhold.cli import console as printing
 from starhold.cli import show, show_campaign
 from starhold.cli.show_campaign import flying_campaign, print_campaign
 from starhold.errors import InputError
@@ -23,7 +24,7 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def to_text(work: Any, width: int = 160, terminal: bool = False) -> str:
         console = Console(file=io.StringIO(), width=width, record=True, force_terminal=terminal, legacy_windows=False)
-        for module in (show, show_campaign):
+        for module in (printing, show, show_campaign):
             monkeypatch.setattr(module, "console", console)
         work()
         return console.export_text()

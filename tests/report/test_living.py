@@ -287,7 +287,6 @@ def test_what_flies_in_node_is_what_python_flies(name: str) -> None:
                     "early": None,
                     "factor": 1,
                     "frames": [],
-                    "transient": data["transient"],
                     "limit": moves.get("spacecraft.torque_limit", limit["size"]),
                 }
                 jobs.append((law, asked))
@@ -316,7 +315,7 @@ def test_a_move_takes_less_than_a_sixtieth_of_a_second() -> None:
         values = [x for key in law["follows"] for x in np.ravel(reflight(scenario).dials[key]).tolist()]
         limit = data["ranking"]["rows"][int(number)]["limit"]
         asked = {"number": 1, "values": values, "plots": panels, "early": None, "factor": 27}
-        asked |= {"frames": list(range(0, 20000, 111)), "transient": None, "limit": limit["size"]}
+        asked |= {"frames": list(range(0, 20000, 111)), "limit": limit["size"]}
         # Each law has a worker of its own. The least of many, for a machine that does other things too.
         (found,) = on_node([(law, asked)], data["every"], repeats=40)
         assert found["ms"] < 1000.0 / 60.0, (law["name"], found["ms"])

@@ -97,6 +97,11 @@ def rows(state: Any) -> Any:
     return rebuild(state, [slice(first, last) for first, last in zip([0, *ends], ends, strict=False)])
 
 
+def floats(value: Any) -> list[float]:
+    """Return the floats among the leaves of a nested value in order."""
+    return [leaf for leaf in leaves(value) if isinstance(leaf, float)]
+
+
 def buffers(state: Any) -> list[Buffer]:
     """Return the buffers of a state in order."""
     return [leaf for leaf in leaves(state) if isinstance(leaf, Buffer)]

@@ -42,11 +42,6 @@ def stays_within(values: Any, bound: float) -> int | None:
     return first if first < len(values) else None
 
 
-def too_late(index: float, count: int, kept: float = KEPT) -> bool:
-    """Return whether the sample of this index, of so many, lies within the last share of a run."""
-    return index > (1.0 - kept) * (count - 1)
-
-
 def on_limit(u: NDArray[np.float64], limit: float, kind: str) -> NDArray[np.bool_]:
     """Return which samples (n, components) are on their limit; none where there is no limit."""
     if kind == "none" or not np.isfinite(limit):
@@ -98,7 +93,9 @@ class Metric(NamedTuple):
     kept: float = KEPT
 
 
-INSTANT = "instant"
+INSTANT, CROSSING = "instant", "crossing"
+TIMES = (INSTANT, CROSSING)
+"""Kinds of times from which something holds, counted in instants."""
 KINDS: Mapping[str, Callable[..., Array]] = {
     "number": lambda x: x,
     "root": np.sqrt,
@@ -112,6 +109,9 @@ KINDS: Mapping[str, Callable[..., Array]] = {
     "overshoot": lambda a, b, c, x: np.where(a**2 + b**2 + c**2 < 1e-18, 0.0, np.maximum(x, 0.0)),
     # The time from which values stay within their bounds, from the last instants outside (-1: never).
     INSTANT: lambda *x: np.maximum.reduce(x) + 1.0,
+    # The same between instants, from two numbers that are at most 1 within their ends, and when each last came to its end.
+    CROSSING: lambda a, b, *x: np.where((a > 1.0) | (b > 1.0), np.inf, np.maximum.reduce(x)),
+    "most": lambda *x: np.maximum.reduce(x),
 }
 """Functions from notes (lanes,) to a metric. `report/assets/flight.js` does the same for one flight."""
 
@@ -158,7 +158,7 @@ class Meter:
         metrics = {"diverged_at": np.where(kept, np.nan, lost * self.instant)}
         for name, metric in self.table.items():
             values = self._values(metric, noted, windows, self.cuts())
-            if metric.kind == INSTANT:
+            if metric.kind in TIMES:
                 values = np.where((values <= self.steps) & ~self._late(metric, values), values, np.nan)
             metrics[name] = np.where(kept, self._scaled(metric, values), np.nan)
         return metrics
@@ -171,14 +171,14 @@ class Meter:
         metrics: dict[str, Any] = {"diverged_at": lost, "cut_off": []}
         for name, metric in self.table.items():
             values = self._values(metric, noted, windows, ends)
-            there = lost is None or not (metric.final or metric.kind == INSTANT)
-            if there and metric.kind == INSTANT:
+            there = lost is None or not (metric.final or metric.kind in TIMES)
+            if there and metric.kind in TIMES:
                 there = bool(values[0] <= self.steps)
                 if there and self._late(metric, values)[0]:
                     metrics["cut_off"].append(name)
                     there = False
             value = float(self._scaled(metric, values)[0])
-            value = int(value) if there and metric.kind == INSTANT and metric.unit == "1" else value
+            value = int(value) if there and metric.kind in TIMES and metric.unit == "1" else value
             metrics[name] = value if there and not math.isnan(value) else None
         return metrics
 

@@ -15,7 +15,7 @@ from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
 from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
-from starhold.analysis import mode_notes, validity_notes
+from starhold.analysis import mode_notes, transient_notes, validity_notes
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.mode_notes import PEAKS, Modal, Span, Wanted
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
@@ -81,6 +81,7 @@ class Bounds(NamedTuple):
     last: float
     cones: tuple[Cone, ...]
     modal: Wanted
+    transient: transient_notes.Ends | tuple[()]
 
 
 class Turning(NamedTuple):
@@ -119,6 +120,7 @@ class Noted(NamedTuple):
     window_torque: float
     modal: Modal | tuple[()]
     validity: Any
+    transient: Any
 
 
 def make_meter(
@@ -136,6 +138,7 @@ def make_meter(
     begins: Mapping[str, int] = MappingProxyType({}),
     fault: tuple[float, ...] = (),
     spans: Mapping[str, tuple[str, Span]] = MappingProxyType({}),
+    transient: tuple[float, float] | tuple[()] = (),
 ) -> Meter:
     """The meter of flights of so many steps of a period (s), or of samples at such intervals.
 
@@ -143,7 +146,8 @@ def make_meter(
     that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
     rest; wheels: the body has some; estimated: an estimator says whether it is valid; begins: modes whose first begin is
     noted, counted from 1, by the names of their metrics; fault: the instant of the first fault, as `Wanted` has it; spans:
-    parts of a flight in which one of PEAKS is noted, by the names of their metrics."""
+    parts of a flight in which one of PEAKS is noted, by the names of their metrics; transient: the angle (rad) and the rate
+    (rad/s) at which one ends, () for none."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
@@ -166,10 +170,12 @@ def make_meter(
         0.0,
         modal,
         validity_notes.begun(estimated),
+        transient_notes.Watched() if transient else (),
     )
     first, tail = Noted(*begun), tail_start(steps)
     angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2
-    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()), wanted)
+    ends = transient_notes.Ends.of(*transient, period) if transient else ()
+    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()), wanted, ends)
     rows: Any = places(first)
     windows = {
         "attitude_error": Window(rows.window_angle, KINDS["angle"], "angle to the target", "rad"),
@@ -226,27 +232,34 @@ def recorded_meter(
     cones: Mapping[str, Cone] | None = None,
     wheels: bool = False,
     estimated: bool = False,
+    transient: tuple[float, float] | tuple[()] = (),
 ) -> Meter:
     """Return the meter of a recording of so many samples less one, at intervals of `every` control periods (s); with cones,
     even an empty mapping, the meter for requirements."""
     tolerances = attitude_tolerance, rate_tolerance
-    there: Any = {"every": every, "wheels": wheels, "estimated": estimated}
+    there: Any = {"every": every, "wheels": wheels, "estimated": estimated, "transient": transient}
     meter = make_meter(steps, period * every, limit, tolerances, EXTRAS, cones or {}, **there)
     table = {name: metric for name, metric in meter.table.items() if cones is not None or name not in OF_CAMPAIGNS}
+    table |= transient_notes.table(places(meter.first).transient, period, every)
     # Notes of the last quarter are not read before it, so one kernel serves all samples.
     return replace(meter, table=table, notes=(meter.notes[1],) * 2)
 
 
 def measure(
-    run: Recording, attitude_tolerance: float, rate_tolerance: float, cones: Mapping[str, Cone] | None = None
+    run: Recording,
+    attitude_tolerance: float,
+    rate_tolerance: float,
+    cones: Mapping[str, Cone] | None = None,
+    transient: tuple[float, float] | tuple[()] = (),
 ) -> dict[str, Any]:
     """Return the metrics of a run from `label`. Times that are never reached are None, as are all final values and times of
     a run that diverged, and times within the last tenth of the run, whose names `cut_off` lists; `diverged_at` (s) is None
-    for a run that did not diverge. cones: those of requirements, whose metrics are added; None: no requirement."""
+    for a run that did not diverge. cones: those of requirements, whose metrics are added; None: no requirement. transient:
+    the angle (rad) and the rate (rad/s) at which one ends, whose metrics are added."""
     attrs = run.attrs
     given = attrs["control_period"], int(attrs["record_every"]), attrs["limit"]
     more = cones, "wheel_momentum" in run.arrays, validity_notes.column_of(run.arrays, run.attrs) is not None
-    meter = recorded_meter(len(run["time"]) - 1, *given, attitude_tolerance, rate_tolerance, *more)
+    meter = recorded_meter(len(run["time"]) - 1, *given, attitude_tolerance, rate_tolerance, *more, transient)
     return meter.of_recording(run, float(attrs["torque_limit"]))
 
 
@@ -296,6 +309,7 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             maximum(seen.window_torque, torque_square),
             mode_notes.noted(seen.modal, quantities, now, bounds.modal, angle_square, rate_square),
             validity_notes.noted(seen.validity, quantities, now, bounds.last),
+            transient_notes.noted(seen.transient, quantities, now, bounds.transient),
         )
 
     return note

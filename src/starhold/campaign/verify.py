@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from starhold.campaign.campaign import Options, begin, fly_campaign, with_campaign
 from starhold.campaign.job import Job, Source
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 
 Notice = Callable[[int, int, str], None]
 SILENT: Notice = lambda done, total, what: None  # noqa: E731
+Known = TypeVar("Known")
 OTHER_BODY = "it is known of attitudes alone"
 
 
@@ -74,20 +75,19 @@ class Evidence:
     @cached_property
     def linear(self) -> Linear | str:
         """The linear loop."""
-        if self.scenario.body != "rigid-body":
-            return OTHER_BODY
-        try:
-            return linear_of(self.scenario, self.entry)
-        except InputError as error:
-            return error.given
+        return self._by(linear_of)
 
     @cached_property
     def budget(self) -> Budget | str:
         """The pointing budget."""
+        return self._by(budgets.study)
+
+    def _by(self, study: Callable[[Scenario, LawEntry], Known]) -> Known | str:
+        """Return what a study of attitudes gives, or why it gives nothing."""
         if self.scenario.body != "rigid-body":
             return OTHER_BODY
         try:
-            return budgets.study(self.scenario, self.entry)
+            return study(self.scenario, self.entry)
         except InputError as error:
             return error.given
 

@@ -130,14 +130,19 @@ class Team:
 
 def _serve(pipe: Any, work: Callable[..., Any], begun: tuple[Any, ...]) -> None:
     """Work on blocks from a pipe until it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    follow_parent()
     try:
         pipe.send(None)
         while True:
             pipe.send(work(*begun, *pipe.recv()))
     except (EOFError, OSError):
         return
+
+
+def follow_parent() -> None:
+    """Leave keyboard interrupts to the parent of this process, and end with it, however that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:

@@ -1,9 +1,23 @@
-"""Commands print here."""
+"""Commands print here, and show their progress."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from rich.console import Console
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn
 
 WIDE = 120
 console = Console(highlight=False)
 if not console.is_terminal:
     # A file or a pipe has no width limit.
     console = Console(width=WIDE, highlight=False)
+
+
+def bars_with(*columns: ProgressColumn | str) -> Progress:
+    """Return progress bars: what is done, how far, how much of it, and these further columns."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress
+
+    return Progress("{task.description}", BarColumn(), MofNCompleteColumn(), *columns, console=console)

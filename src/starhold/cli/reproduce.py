@@ -46,16 +46,15 @@ def _make(letters: list[str], folder: Path, processes: int | None) -> list[Repro
     from multiprocessing import get_context
     from threading import Thread
 
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeElapsedColumn
 
-    from starhold.cli.console import console
+    from starhold.cli.console import bars_with
 
     context = get_context("spawn")
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     count = min(processes or os.cpu_count() or 1, len(letters))
     queue: Any = context.SimpleQueue()
     with (
-        Progress(*columns, console=console) as bars,
+        bars_with(TimeElapsedColumn()) as bars,
         ProcessPoolExecutor(count, context, initializer=_begin, initargs=(queue,)) as pool,
     ):
         tasks = {letter: bars.add_task(letter, total=None) for letter in letters}

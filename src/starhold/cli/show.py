@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import TaskID, TimeRemainingColumn
 from rich.table import Table
 
-from starhold.cli.console import WIDE, console
+from starhold.cli.console import WIDE, bars_with, console
 from starhold.report.commands import Block, Heading
 from starhold.report.commands import Table as Rows
 
@@ -28,14 +28,7 @@ COLUMN = 9
 @contextmanager
 def flying(entries: Sequence[LawEntry], steps: int) -> Iterator[Callable[[str, int, int], None]]:
     """Show progress bars, one for each law; yield the function that the simulation calls."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("steps"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console) as bars:
+    with bars_with("steps", TimeRemainingColumn()) as bars:
         tasks: dict[str, TaskID] = {}
 
         def notice(name: str, done: int, total: int) -> None:

@@ -7,11 +7,11 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
+from rich.progress import ProgressColumn, Task, TaskID
 from rich.progress import TimeRemainingColumn as TimeLeft
 from rich.text import Text
 
-from starhold.cli.console import console
+from starhold.cli.console import bars_with, console
 from starhold.cli.show import print_rows, printable
 from starhold.errors import InputError
 from starhold.report.campaign_tables import Section, again, brackets, drivers, indices, metrics, verdicts
@@ -40,11 +40,10 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
     """Show a bar for each law, of so many runs, and for each search for a worst case, with the rate and the time left; yield
     the function to call with a law and how many more of its runs are done, or also with what is `Sought`, from any thread.
     If an error comes before the first run, the bars disappear. drawn: whether runs differ in more than their noise."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("runs"), Rate(), TimeLeft())
     titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]
     if not drawn:
         titles[0] += "; nothing is dispersed, so runs differ in their noise alone, if they have any"
-    bars = Progress(*columns, console=console)
+    bars = bars_with("runs", Rate(), TimeLeft())
     tasks: dict[Any, TaskID] = {}
     for law in laws:
         tasks[law] = bars.add_task(f"{escape(printable(law))} (compiling)", total=runs)

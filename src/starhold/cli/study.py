@@ -167,10 +167,8 @@ def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
     if declared.doing is None:
         yield lambda done, total, what: None
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from starhold.cli.console import bars_with
 
-    from starhold.cli.console import console
-
-    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), console=console) as bars:
+    with bars_with() as bars:
         task = bars.add_task("compiling", total=None)
         yield lambda done, total, what: bars.update(task, completed=done, total=total, description=what)

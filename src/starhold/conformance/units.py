@@ -20,15 +20,10 @@ def rescaled(
     """The arguments of a law in a system of units where 1 kg, 1 m and 1 s are `factors` units, and the factor that takes
     the torque it gives back to N m."""
 
-    def scaled(values: Any, units: Any) -> list[Any]:
-        return [times(value, _factor(unit, factors)) for value, unit in zip(values, units, strict=True)]
-
-    gain_units = [None if item.gain.choices or item.gain.whole else item.gain.unit for item in law.fields()]
-    other = [v if unit is None else times(v, _factor(unit, factors)) for v, unit in zip(gains, gain_units, strict=True)]
     return (
-        Measurement(*scaled(measurement, _units(Measurement))),
-        law.gains(*other),
-        Craft(*scaled(craft, _units(Craft))),
+        rescale(measurement, _units(Measurement), factors),
+        rescale_params(law, gains, factors),
+        rescale(craft, _units(Craft), factors),
         1.0 / _factor("N m", factors),
     )
 

@@ -6,8 +6,7 @@ from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quantity import Quantity, quantities
-from starhold.algebra.structure import buffers, leaves, rebuild
-from starhold.algebra.structured import Buffer
+from starhold.algebra.structure import buffers, floats, leaves, rebuild
 from starhold.algebra.vector import ZERO
 from starhold.errors import InputError
 from starhold.export.recording import Copies
@@ -281,5 +280,4 @@ def _no_form(name: str, allowed: str) -> InputError:
 
 def numbers(value: Any) -> list[float]:
     """Return the numbers of a value as C has them: its floats, then those of its buffers."""
-    floats = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
-    return floats + [leaf[k] for leaf in leaves(value) if isinstance(leaf, Buffer) for k in range(leaf.size)]
+    return floats(value) + [leaf[k] for leaf in buffers(value) for k in range(leaf.size)]

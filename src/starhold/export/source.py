@@ -7,8 +7,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from starhold.algebra.operations import NUMBER
-from starhold.algebra.structure import leaves
-from starhold.algebra.structured import Buffer
+from starhold.algebra.structure import buffers
 from starhold.certification.assumptions import texts as assumption_texts
 from starhold.certification.certificate import FILE, Certificate
 from starhold.certification.wording import HEADINGS, evidence, recheck, sentence, unclaimed
@@ -288,8 +287,7 @@ def _literal(code: Code, kind: Type, value: Any) -> str:
 def _init(code: Code) -> Iterator[str]:
     """Yield the lines that set the state to its start."""
     name, printed, start = code.name, code.printed, code.flight.start
-    buffers = [leaf for leaf in leaves(start) if isinstance(leaf, Buffer)]
-    firsts = {memory: _trimmed(buffer.row(0, buffer.size)) for memory, buffer in zip(code.buffers, buffers, strict=True)}
+    firsts = {memory: _trimmed(one.row(0, one.size)) for memory, one in zip(code.buffers, buffers(start), strict=True)}
     for memory, first in firsts.items():
         if first:
             yield f"/* What {memory} begin with; the rest are zeros. */"

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.algebra.structure import flatten, leaves, mapped, places
+from starhold.algebra.structure import flatten, floats, leaves, mapped, places
 from starhold.algebra.structured import Buffer
 from starhold.export.code import Code
 from starhold.export.law import numbers
@@ -57,7 +57,7 @@ def random_columns(
         pairs = []
     if pairs:
         return np.vstack([np.empty((0, count)), *(random_columns(rng, part, count, edges, field) for field, part in pairs)])
-    flat = [leaf for leaf in leaves(value) if isinstance(leaf, float)]
+    flat = floats(value)
     shape = (len(flat), count)
     if name in ("attitude", "followed") and len(flat) == 4:
         values = rng.normal(size=shape)

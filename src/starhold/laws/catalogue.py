@@ -28,11 +28,6 @@ class Law(Part):
         return "law"
 
     @property
-    def card(self) -> Card:
-        """Title, formula, assumptions and the stability that it claims."""
-        return self.module.CARD
-
-    @property
     def body(self) -> str:
         """The name of the body that it controls: that of its file, or the one whose command it gives."""
         return getattr(self.module, "BODY", None) or next(
@@ -68,10 +63,6 @@ class Law(Part):
         """The gains in order, or the inputs of a design form."""
         listed = self.hook("fields") if form is None else None
         return fields(self.gains if form is None else self.forms[form]) if listed is None else listed()
-
-    def examples(self) -> list[Any]:
-        """Gains that tests, docs and benchmarks run."""
-        return self.module.examples()
 
     def complete(self, spec: Any, start: Callable[[], Start]) -> Any:
         """The inputs of a design form, completed from the scenario's start."""

@@ -1,11 +1,9 @@
 """Writes a reproduction: a page and a folder of scenario files a publication, an index and `summary.json`."""
 
 import json
-from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,7 @@ from starhold.publications.paper import FigureItem, Paper, Section
 from starhold.publications.reproduction import Judged, Reproduction, reproduce
 from starhold.publications.verdicts import PLAIN, VERDICTS
 from starhold.report.commands import Column, Table
-from starhold.report.figures import DPI, plain
+from starhold.report.figures import DPI, address, plain, png
 from starhold.report.page_parts import fold, plain_document
 from starhold.report.plots import colour
 from starhold.report.results import INDEX, SUMMARY
@@ -115,12 +113,11 @@ def _section(section: Section, made: Reproduction, pictures: Mapping[str, bytes]
 
 def _figure(item: FigureItem, picture: bytes) -> str:
     title = f"Figure {item.number}" if item.number else "Added here"
-    source = f"data:image/png;base64,{b64encode(picture).decode('ascii')}"
     seen = f'<p class="note">{escape(item.seen)}</p>' if item.seen else ""
     caption = f"<figcaption><b>{escape(title)}.</b> {escape(item.caption)}</figcaption>"
     return (
         f'<figure class="plot" id="{escape(item.name)}">{caption}'
-        f'<img src="{source}" alt="{escape(item.caption)}" loading="lazy">{seen}</figure>'
+        f'<img src="{address(picture)}" alt="{escape(item.caption)}" loading="lazy">{seen}</figure>'
     )
 
 
@@ -226,10 +223,7 @@ def draw(figure: Figure) -> bytes:
             axis.locator_params(axis="x", nbins=4)
     for axis in axes[len(figure.panels) :]:
         axis.set_visible(False)
-    file = BytesIO()
-    # No software entry, lest equal figures differ between releases.
-    canvas.savefig(file, metadata={"Software": None}, pil_kwargs={"compress_level": 6})
-    return file.getvalue()
+    return png(canvas)
 
 
 def _height(figure: Figure, columns: int) -> float:

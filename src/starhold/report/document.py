@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from html import escape
-from io import BytesIO
 from typing import Any, NamedTuple, TypeAlias
 
 from starhold.report.commands import Block, Cell, Heading, Table
@@ -38,24 +36,18 @@ class Section(NamedTuple):
 
 def pages_of(title: str, sections: Sequence[Section], footer: str) -> tuple[str, str]:
     """Render a document as self-contained HTML and as Markdown; sections and figures are numbered."""
+    from starhold.report.figures import address, png
+
     heads = {one.name: f"{number} {one.name}" for number, one in enumerate(sections, 1)}
     anchors = {name: re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for name, head in heads.items()}
     figures = [piece for one in sections for piece in one.pieces if isinstance(piece, Figure)]
-    drawn = {id(one): (f"Figure {n}", f"{one.caption}.", _data(one)) for n, one in enumerate(figures, 1)}
+    drawn = {id(one): (f"Figure {n}", f"{one.caption}.", address(png(one.draw()))) for n, one in enumerate(figures, 1)}
     return _html(title, sections, footer, heads, anchors, drawn), _markdown(title, sections, footer, heads, anchors, drawn)
 
 
 Drawn: TypeAlias = Mapping[int, tuple[str, str, str]]
 """Return the number, the caption and the address of each figure."""
 Names: TypeAlias = Mapping[str, str]
-
-
-def _data(figure: Figure) -> str:
-    """Return a figure as a data address."""
-    file = BytesIO()
-    # No software entry, lest equal figures differ between releases.
-    figure.draw().savefig(file, format="png", metadata={"Software": None})
-    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
 # --- HTML -------------------------------------------------------------------------------------------------------------

@@ -1,8 +1,10 @@
 """Figures as PNG files, every law in every figure, and the helpers that draw them."""
 
 import warnings
+from base64 import b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -204,9 +206,21 @@ def framed(
     return figure, axes
 
 
+def png(figure: Any, level: int = 6) -> bytes:
+    """Return a figure as a PNG file, compressed so much. It names no software, so that releases make equal files."""
+    file = BytesIO()
+    figure.savefig(file, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": level})
+    return file.getvalue()
+
+
+def address(picture: bytes) -> str:
+    """Return a PNG file as a data address."""
+    return f"data:image/png;base64,{b64encode(picture).decode()}"
+
+
 def save(figure: Any, path: Path) -> Path:
     """Write a figure to `path`, in a folder that exists, and return the path."""
-    # Fast compression: the files are small either way. No software entry, so that releases write equal files.
     with atomic_write(path) as hidden:
-        figure.savefig(hidden, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
+        # Fast compression: the files are small either way.
+        hidden.write_bytes(png(figure, 3))
     return path

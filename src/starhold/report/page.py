@@ -71,7 +71,6 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
     if not any(law.follows for law in laws):
         return "; ".join(sorted({*made.grounded.values(), *(why for law in laws for why in law.unfollowed.values())}))
     table = scenario.table
-    transient = getattr(table, "transient", None)
     keys = [key for key in made.dials if key not in made.gains or key.partition(".")[2].rpartition(".")[0] in numbers]
     return {
         "dials": [_dial(made, key) for key in keys],
@@ -88,7 +87,6 @@ def living_data(scenario: Scenario, flights: Sequence[Flight], sampling: Samplin
         "every": table.simulation.record_every,
         "factor": sampling.factor,
         "early": None if sampling.early is None else dict(zip(("samples", "factor"), sampling.early, strict=True)),
-        "transient": None if transient is None else {"angle_end": transient.angle_end, "rate_end": transient.rate_end},
         "claims": _claims(flights, {law.name: law for law in laws}),
         "ranking": _ranking(flights),
     }
@@ -149,7 +147,8 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
         (settling.attitude_tolerance, settling.rate_tolerance),
         column_of(run.arrays, run.attrs) is not None,
     )
-    meter = recorded_meter(0, law.period, every, limit, *tolerances, estimated=estimated)
+    transient = () if table.transient is None else (table.transient.angle_end, table.transient.rate_end)
+    meter = recorded_meter(0, law.period, every, limit, *tolerances, estimated=estimated, transient=transient)
     program = meter.program(tuple((name, run[name].shape[1:]) for name, _ in law.columns), 0.0)
     known = {
         "memories": [memory.name for memory in program.memories],

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.algebra.structure import runge_kutta
 from starhold.analysis.libration_point import DAY, YEAR, CircleGoal, EquilibriumGoal, goal_of
 from starhold.parts.bodies.libration_point import EARTH_DIAMETER, Sample
 from starhold.report.plane_plots import Guide, Line, Plane, PlanePlot, ring
@@ -50,22 +51,17 @@ class _Axis:
         self.saddle = entry.options.limit / self.s**2
         self.k_x, self.k_v = gains.k_x / self.s**2, gains.k_velocity[0] / self.s
 
-    def slope(self, state: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slope(self, state: Any) -> Any:
         x, w = state
-        push = np.clip(-self.k_x * x - self.k_v * w, -self.saddle, self.saddle)
-        return np.stack([w, x + push])
+        return w, x + np.clip(-self.k_x * x - self.k_v * w, -self.saddle, self.saddle)
 
     def path(self, start: Any, step: float) -> NDArray[np.float64]:
         """Return the paths (2, n, steps) from starts (2, n), by the classical Runge-Kutta method; they stop far away."""
-        state, states = np.array(start, dtype=float), []
+        state, states, advance = np.array(start, dtype=float), list[Any](), runge_kutta(self.slope)
         for _ in range(STEPS):
             states.append(state)
-            a = self.slope(state)
-            b = self.slope(state + 0.5 * step * a)
-            c = self.slope(state + 0.5 * step * b)
-            d = self.slope(state + step * c)
             near = np.abs(state).max(axis=0) < 3.0 * WINDOW * self.saddle
-            state = state + np.where(near, step / 6.0, 0.0) * (a + 2.0 * b + 2.0 * c + d)
+            state = np.where(near, advance(tuple(state), step), state)
         return np.stack(states, axis=-1)
 
     def separatrix(self, side: float) -> tuple[Curve, Curve]:

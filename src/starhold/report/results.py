@@ -216,7 +216,6 @@ def write_proofs(certificates: Sequence[Certificate], name: str, folder: Path) -
 
 
 def _write_kernel(folder: Path) -> None:
-
     with atomic_write(folder / KERNEL) as hidden:
         hidden.write_bytes(kernel_bundle())
 

@@ -91,7 +91,7 @@ def sections_of(review: Review) -> tuple[list[Section], Points]:
     sections = [Section(name, [*make(review)], name in fresh) for name, make in makers.items()]
     sections.append(Section(CREDIBILITY, [*_credibility(review)]))
     points = [(one.name, str(piece)) for one in sections for piece in one.pieces if isinstance(piece, Open)]
-    rows = [[str(number), Cell(name, "section", detail=name), _safe(text)] for number, (name, text) in enumerate(points, 1)]
+    rows = [[str(number), Cell(name, "section", detail=name), escape(text)] for number, (name, text) in enumerate(points, 1)]
     columns = [Column("no."), Column("from"), Column("what is open")]
     sections.append(Section(OPEN, [Table(columns, rows) if rows else "No point is open."]))
     scenario = review.evidence.scenario
@@ -100,14 +100,8 @@ def sections_of(review: Review) -> tuple[list[Section], Points]:
     return [Section("Outcome", [*_outcome(review, len(points))]), *shown], points
 
 
-def _safe(text: str) -> str:
-    """Return text without style marks."""
-
-    return escape(text)
-
-
 def _safe_rows(rows: Iterable[Sequence[Any]]) -> list[list[Any]]:
-    return [[_safe(value) if type(value) is str else value for value in row] for row in rows]
+    return [[escape(value) if type(value) is str else value for value in row] for row in rows]
 
 
 def _table(names: str, rows: Iterable[Sequence[Any]], title: str = "") -> Table:
@@ -132,7 +126,6 @@ def _outcome(review: Review, points: int) -> Iterator[Piece]:
 
 
 def _mission(review: Review) -> Iterator[Piece]:
-
     evidence = review.evidence
     scenario, entry, flight = evidence.scenario, evidence.entry, evidence.flight
     rows = [
@@ -175,7 +168,6 @@ def _assumptions(review: Review) -> Iterator[Piece]:
 
 
 def _requirements(review: Review) -> Iterator[Piece]:
-
     if not review.verdicts:
         yield Open("Nothing is required: the scenario has no [[requirement]] table.")
         return
@@ -199,7 +191,6 @@ def _requirements(review: Review) -> Iterator[Piece]:
 
 
 def _pointing(review: Review) -> Iterator[Piece]:
-
     evidence = review.evidence
     scenario, flight = evidence.scenario, evidence.flight
     known, row = flight.metric_set, flight.metrics
@@ -218,7 +209,6 @@ def _pointing(review: Review) -> Iterator[Piece]:
 
 
 def _budget(review: Review) -> Iterator[Piece]:
-
     evidence = review.evidence
     if not review.has_budget:
         yield Open("There is no pointing budget: the scenario has no [budget] table.")
@@ -279,7 +269,6 @@ def _margins(review: Review) -> Iterator[Piece]:
 
 
 def _campaign(review: Review) -> Iterator[Piece]:
-
     if not review.has_campaign:
         yield Open("No campaign is flown, so nothing is known for other parameters: the scenario has no [campaign] table.")
         return

@@ -23,7 +23,6 @@ MANY = 9
 
 def settings(scenario: Scenario) -> str:
     """Return all tables of a scenario, those of its parts included."""
-
     parts: list[str] = []
     written = read_toml(scenario.text, scenario.where)
     shared = {key: scenario.table.shared[key] for key in _taken(scenario)}
@@ -53,7 +52,6 @@ def _taken(scenario: Scenario) -> set[str]:
 def _table(name: str, table: Any, shared: Mapping[str, Any], written: Any) -> str:
     """Show one table of the scenario with the descriptions of its schema, and numbers with units as in the file; keys
     without a value are left out, unless parts supply a default."""
-
     properties = type(table).model_json_schema()["properties"]
     rows: list[tuple[str, ...]] = []
     for key in type(table).model_fields:

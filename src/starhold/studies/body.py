@@ -47,6 +47,8 @@ class BodyStudy:
 
     EXTRAS: tuple[str, ...] = ()
     """Metrics that are measured only on request."""
+    CLAIMS = TRIALS = ""
+    """The modules whose functions compare claims with starts, and try them by flights; "" for a body without claims."""
 
     def name_samples(self, scenario: Scenario, loop: Any, samples: Any, carry: Any) -> Recording:
         """Name the samples of `fly`; the attributes hold the numbers that metrics need."""
@@ -99,11 +101,11 @@ class BodyStudy:
 
     def fly_claims(self, issued: Issued) -> Trial | None:
         """Test a certificate by flights; None where it claims nothing that can be flown. Raises `BrokenClaimError`."""
-        return None
+        return import_module(self.TRIALS).fly_claims(issued.loop, issued.certificate) if self.TRIALS else None
 
     def start_inside(self, issued: Issued) -> dict[str, bool]:
         """Return, for each kind of proved claim about a set, whether the loop starts inside it."""
-        return {}
+        return import_module(self.CLAIMS).start_inside(issued.certificate, issued.loop) if self.CLAIMS else {}
 
 
 def study_of(body: str) -> BodyStudy:

@@ -58,7 +58,6 @@ def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight, pointing: b
 
 def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress | None = None) -> Flight:
     """Return the flight with the change of its metrics under half the integration step."""
-
     finer = record(scenario, halved(loop), progress)
     errors = step_error(flight.recording, finer, study_of(scenario.body).state_names(finer))
     return replace(flight, metrics=flight.metrics | {"step_error": errors})

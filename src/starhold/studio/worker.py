@@ -1,7 +1,6 @@
 """Does one thing that the studio was asked for, in a process of its own: tells its progress and its result, and leaves its
 files in a folder."""
 
-import base64
 import shutil
 import time
 import traceback
@@ -62,6 +61,7 @@ def _certify(scenario: Scenario, folder: Path, tell: Tell) -> str:
 def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     """A page of a study: its picture, what it shows, and its files."""
     from starhold.report.document import block_html
+    from starhold.report.figures import address
     from starhold.report.results import write_result
     from starhold.report.tables import pill
 
@@ -71,8 +71,7 @@ def _studied(name: str, scenario: Scenario, folder: Path, tell: Tell) -> str:
     files = write_result(result, name, scenario.name, folder) if command.suffix else {}
     parts = [f"<h2>{escape(result.title)}</h2>", *map(block_html, result.blocks)]
     if "Picture" in files:
-        drawn = base64.b64encode(files["Picture"].read_bytes()).decode()
-        source = f"data:image/png;base64,{drawn}"
+        source = address(files["Picture"].read_bytes())
         parts.append(f'<p><img src="{source}" alt="{escape(result.title)}" style="max-width:100%"></p>')
     links = (f'{what}: <a href="{path.name}" download>{path.name}</a>' for what, path in files.items())
     parts += [f"<p>{'. '.join(links)}.</p>"] if files else []

@@ -13,7 +13,7 @@ import numpy as np
 
 from starhold.algebra.quaternion import Quaternion, renormalise, vector_part
 from starhold.algebra.scalar import Scalar, either, less, maximum, where
-from starhold.algebra.structure import leaves, runge_kutta
+from starhold.algebra.structure import floats, runge_kutta
 from starhold.algebra.structured import repeat
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale, subtract
 from starhold.algebra.words import number_of
@@ -76,7 +76,7 @@ class Search:
     @cached_property
     def numbers(self) -> tuple[list[float], list[float]]:
         """The numbers of a slew between the gains and the step, and after that."""
-        return _numbers((self.craft, self.begun)), [*self.ends]
+        return floats((self.craft, self.begun)), [*self.ends]
 
 
 Found = TypeVar("Found")
@@ -192,7 +192,7 @@ def fly(torque: Callable[..., Any], trials: Sequence[tuple[Search, float, float]
         if len(slews) == 1:
             flown = [flight(gains, search.craft, search.begun, step, search.ends)]
         else:
-            rows = [[*_numbers(k), *one.numbers[0], step, *one.numbers[1]] for _, one, k, step in slews]
+            rows = [[*floats(k), *one.numbers[0], step, *one.numbers[1]] for _, one, k, step in slews]
             flown = flight.over(np.array(rows).T).T.tolist()
         for (place, _, _, step), (last, most, momentum) in zip(slews, flown, strict=True):
             time = math.inf if not last < count else (last + 1.0) * step
@@ -207,10 +207,6 @@ def _steps(rate: float, spec: Any, horizon: float) -> int:
     if many is None:
         raise ValueError("the loop is too fast beside the time it is to settle in")
     return STEPS * many
-
-
-def _numbers(value: Any) -> list[float]:
-    return [leaf for leaf in leaves(value) if isinstance(leaf, float)]
 
 
 class _Like:

@@ -137,6 +137,8 @@ const kinds = {
   angle: (x) => 2 * asin(sqrt(min(x, 1))),
   overshoot: (a, b, c, x) => (a * a + b * b + c * c < 1e-18 ? 0 : max(x, 0)),
   instant: (...last) => max(...last) + 1,
+  crossing: (a, b, ...last) => (a > 1 || b > 1 ? Infinity : max(...last)),
+  most: max,
 };
 
 // What is noted of the first samples, and of those of the last quarter with windows begun anew.
@@ -159,7 +161,7 @@ function metrics(n, lost, asked) {
   const found = { diverged_at: lost < 0 ? null : lost * law.period, cut_off: [] };
   for (const [name, { kind, rows, times, over, since, final }] of Object.entries(law.meter.table)) {
     let value = kinds[kind](...rows.map((row) => (since === "start" ? max(before[row], after[row]) : after[row])));
-    const instant = kind === "instant";
+    const instant = kind === "instant" || kind === "crossing";
     const late = instant && value > (1 - KEPT) * (n - 1);
     if ((lost >= 0 && (final || instant)) || late) {
       if (lost < 0 && value < n) found.cut_off.push(name);
@@ -170,33 +172,7 @@ function metrics(n, lost, asked) {
     if (over) value /= counts[over[0]] * over[1];
     found[name] = Number.isNaN(value) ? null : value;
   }
-  return asked.transient ? { ...found, ...againstLimits(n, lost < 0, asked.transient, found.cut_off) } : found;
-}
-
-function againstLimits(n, whole, table, cut) {
-  const ends = [1 / (Math.sin(0.5 * table.angle_end) * Math.sin(0.5 * table.angle_end)), 1 / (table.rate_end * table.rate_end)];
-  const places = [at("attitude_error", 1), at("rate_error")];
-  const times = ends.map((scale, which) => {
-    const value = (k) => scale * square3(k * width + places[which]);
-    let last = n - 1;
-    while (last >= 0 && value(last) <= 1) last--;
-    if (last < 0) return 0;
-    if (last + 1 === n) return null;
-    return last + (value(last) - 1) / (value(last) - value(last + 1));
-  });
-  let square = 0;
-  const rate = at("rate");
-  const peaks = [0, 0, 0];
-  for (let k = 0; k < n; k++) {
-    square = max(square, square3(k * width + rate));
-    peaks.forEach((peak, i) => { peaks[i] = max(peak, abs(accelerationOf(k, n, i))); });
-  }
-  const time = whole && !times.includes(null) ? max(...times) * every * law.period : null;
-  const late = time !== null && time / tick > (1 - KEPT) * (n - 1);
-  return {
-    cut_off: late ? [...cut, "transient_time"] : cut, transient_time: late ? null : time, peak_rate: sqrt(square),
-    peak_acceleration: max(...peaks), peak_accelerations: peaks,
-  };
+  return found;
 }
 
 // What the page asks for at a move: values, plots by name with what their panels are made of, thinned, frames, metrics.

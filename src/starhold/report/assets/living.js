@@ -66,7 +66,7 @@ function request(number) {
     number: ++state.asked, values: flatten(law.follows.map(valueOf)),
     plots: Object.fromEntries(sight.map((chart) => [chart.plot.name, chart.plot.panels.map((panel) => panel.source)])),
     early: early ? living.early.samples : null, factor: early ? living.early.factor : living.factor,
-    frames: report.scene.places, transient: living.transient,
+    frames: report.scene.places,
     limit: moved.has("spacecraft.torque_limit") ? moved.get("spacecraft.torque_limit") : rows.limit.size,
   };
 }

@@ -151,8 +151,7 @@ function place(slider) {
   const value = slider.read(valueOf(keyOf(slider.dial)));
   slider.box.classList.remove("bad");
   slider.box.querySelector(".why").hidden = true;
-  if (document.activeElement !== slider.field || slider.slide === document.activeElement) slider.field.value = String(value);
-  else slider.field.value = String(value);
+  slider.field.value = String(value);
   const t = slider.scale.from(value);
   if (document.activeElement !== slider.slide || Math.abs(Number(slider.slide.value) - t) > 2e-3) slider.slide.value = Number.isFinite(t) ? Math.max(0, Math.min(1, t)) : 0;
   slider.box.classList.toggle("off", isMoved(keyOf(slider.dial)) && value !== slider.base);

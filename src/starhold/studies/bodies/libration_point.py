@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
     from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
-    from starhold.analysis.trial import Trial
     from starhold.loop.closed_loop import ClosedLoop
     from starhold.scenario.reading import LawEntry, Scenario
     from starhold.simulation.lane import Recording
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
 class LibrationPointStudy(BodyStudy):
     """Runs are scaled, their units in SI among the attributes; metrics are in SI. Calls are not timed, because control
     surfaces move within hours."""
+
+    CLAIMS = TRIALS = "starhold.analysis.libration_point_claims"
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         units, goal = scenario.table.libration.units, goal_of(loop.gains)
@@ -67,16 +68,6 @@ class LibrationPointStudy(BodyStudy):
         from starhold.analysis.libration_point_claims import departures
 
         return departures(issued.certificate, loop, run, float(run.attrs["time_unit_s"]))
-
-    def fly_claims(self, issued: Issued) -> Trial | None:
-        from starhold.analysis.libration_point_claims import fly_claims
-
-        return fly_claims(issued.loop, issued.certificate)
-
-    def start_inside(self, issued: Issued) -> dict[str, bool]:
-        from starhold.analysis.libration_point_claims import start_inside
-
-        return start_inside(issued.certificate, issued.loop)
 
 
 STUDY = LibrationPointStudy()

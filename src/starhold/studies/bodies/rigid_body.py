@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from starhold.analysis.departure import Departure
     from starhold.analysis.meter import Meter
     from starhold.analysis.ranking import MetricSet
-    from starhold.analysis.trial import Trial
     from starhold.certification.certify import Wanted
     from starhold.certification.hand_over import Ends
     from starhold.loop.closed_loop import ClosedLoop, Event
@@ -45,6 +44,7 @@ class RigidBodyStudy(BodyStudy):
     """Everything is in SI. Laws with wheels are certified again after faults that they know of."""
 
     EXTRAS = EXTRAS
+    CLAIMS, TRIALS = "starhold.analysis.departure", "starhold.analysis.trial"
 
     def name_samples(self, scenario: Scenario, loop: ClosedLoop, samples: Any, carry: Any) -> Recording:
         settling, transient = scenario.table.settling, scenario.table.transient
@@ -64,11 +64,11 @@ class RigidBodyStudy(BodyStudy):
 
     def metrics_of(self, run: Recording) -> dict[str, Any]:
         attrs = run.attrs
-        metrics = measure(run, attrs["settling_attitude_tolerance"], attrs["settling_rate_tolerance"])
+        tolerances = attrs["settling_attitude_tolerance"], attrs["settling_rate_tolerance"]
         if "transient_angle_end" not in attrs:
-            return metrics
-        rate, acceleration, angle_end, rate_end = (attrs[f"transient_{name}"] for name in TRANSIENT)
-        return metrics | against_limits(run, Limits(rate, acceleration), angle_end, rate_end, metrics["cut_off"])
+            return measure(run, *tolerances)
+        rate, acceleration, *ends = (attrs[f"transient_{name}"] for name in TRANSIENT)
+        return against_limits(run, Limits(rate, acceleration), measure(run, *tolerances, transient=(ends[0], ends[1])))
 
     def measure_required(self, run: Recording, cones: Cones) -> dict[str, Any]:
         attrs = run.attrs
@@ -119,15 +119,8 @@ class RigidBodyStudy(BodyStudy):
         last = min((step for step, event in latest.items() if _differs(event, issued)), default=None)
         return departures(issued.certificate, issued.loop, run, issued.step, last)
 
-    def fly_claims(self, issued: Issued) -> Trial | None:
-        from starhold.analysis.trial import fly_claims
-
-        return fly_claims(issued.loop, issued.certificate)
-
     def start_inside(self, issued: Issued) -> dict[str, bool]:
-        from starhold.analysis.departure import start_inside
-
-        return start_inside(issued.certificate, issued.loop) if issued.mode in (None, 1) and issued.before is None else {}
+        return super().start_inside(issued) if issued.mode in (None, 1) and issued.before is None else {}
 
 
 STUDY = RigidBodyStudy()
