@@ -97,6 +97,11 @@ class BodyStudy:
         """Describe how a run leaves the proved claims of a certificate, by their kinds."""
         return {}
 
+    def ends(self, issued: Issued, loop: Any, time: float) -> int | None:
+        """Return the control step at which a flight of this duration (s) has another loop than a certificate is about; None
+        where it keeps it."""
+        return None
+
     def fly_claims(self, issued: Issued) -> Trial | None:
         """Test a certificate by flights; None where it claims nothing that can be flown. Raises `BrokenClaimError`."""
         return None
