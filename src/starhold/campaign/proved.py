@@ -52,8 +52,8 @@ OUTSIDE, OTHER, MOVED = "do not come into its set", "fly another loop", "have mo
 
 class Looked(NamedTuple):
     """Flights (lanes,) are looked at for this: from which control step on they are in the claim's set with an estimate that
-    has settled, -1 for never; whether their momentum is within its bound from then on; whether the law is told more wrongly than
-    is assumed; whether they fly the claim's loop; and their metrics from then on."""
+    has settled, -1 for never; whether their momentum is within its bound from then on; whether the law is told more wrongly
+    than is assumed; whether they fly the claim's loop; and their metrics from then on."""
 
     begun: Array
     kept: NDArray[np.bool_]
@@ -160,7 +160,7 @@ def _take(
     rows = [window.value(windows[:, k]) for k, window in enumerate(meter.windows.values())]
     shown: dict[str, Array] = dict(zip(meter.windows, rows, strict=True))
     more = 1.0 + SLACK
-    told = (shown["told_attitude"] <= n["attitude_error"] * more) & (shown["told_rate"] <= n["rate_error"] * more)
+    right = (shown["told_attitude"] <= n["attitude_error"] * more) & (shown["told_rate"] <= n["rate_error"] * more)
     light = shown["momentum"] <= n.get("momentum", math.inf) * more
     inside = about.holds(shown)
     alike = np.ones(inside.shape[1], dtype=bool)
@@ -169,7 +169,7 @@ def _take(
         inside[0] |= starts
     elif not about.issued.step:
         inside[0] |= _starts_inside(about, lot)
-    enters = told & inside & (begins >= about.issued.step)[:, None]
+    enters = right & inside & (begins >= about.issued.step)[:, None]
     within = enters & light
     first = np.where(within.any(axis=0), within.argmax(axis=0), enters.argmax(axis=0))
     begun = np.where(enters.any(axis=0), begins[first], -1)
@@ -181,7 +181,7 @@ def _take(
     }
     lost = ~np.isnan(metrics["diverged_at"])
     values = {name: np.where(lost, np.nan, x) for name, x in values.items()}
-    seen.append(Looked(begun, (light | ~later).all(axis=0), (later & ~told).any(axis=0), alike, values))
+    seen.append(Looked(begun, (light | ~later).all(axis=0), (later & ~right).any(axis=0), alike, values))
 
 
 def _starts_inside(about: Subject, lot: Lot) -> NDArray[np.bool_]:

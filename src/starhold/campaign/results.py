@@ -88,8 +88,8 @@ class Bracket:
 @dataclass(frozen=True)
 class Within:
     """A metric of the flights that keep the premises of a claim, from when they do, lies between the worst flown and the
-    bound proved. covered: how many these flights are; beyond: those beyond the bound by more than the integration's error, or
-    without a value."""
+    bound proved. covered: how many these flights are; beyond: those beyond the bound by more than the integration's error,
+    or without a value."""
 
     metric: str
     unit: str
