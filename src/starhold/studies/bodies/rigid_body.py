@@ -122,6 +122,14 @@ class RigidBodyStudy(BodyStudy):
             return mode_departures(issued, run, min(begun, default=None))
         return departures(issued.certificate, issued.loop, run, issued.step, self.ends(issued, loop, time))
 
+    def covered(self, issued: Issued, loop: ClosedLoop, run: Recording) -> tuple[float, float] | None:
+        from starhold.analysis.departure import covered
+
+        if issued.mode is not None:
+            return None
+        last = self.ends(issued, loop, float(run["time"][-1]))
+        return covered(issued.certificate, issued.loop, run, issued.step, last)
+
     def ends(self, issued: Issued, loop: ClosedLoop, time: float) -> int | None:
         # A certificate ends where the loop changes next; the last of several events at one step decides.
         latest = {event.step: event for event in loop.events if event.step * loop.period <= time}
