@@ -196,3 +196,32 @@ def test_the_notes_on_premises_are_what_recordings_show():
                     value = window.value(windows[number, row, run])
                     assert value == pytest.approx(expected[name][begin:end].max(), rel=1e-9, abs=1e-14), name
             begin = end
+
+
+WIDE = {
+    "initial.angles": uniform(["-60 deg"] * 3, ["60 deg"] * 3),
+    "initial.rate": {"distribution": "shell", "high": "3 deg/s"},
+}
+SLOW = WIDE | {"initial.rate": {"distribution": "shell", "high": "0.6 deg/s"}}
+ATTACKED = {
+    "three-laws lyapunov": (None, {}, 3000),
+    "wheels-orbital wheel": (WIDE, {"certify.momentum": 0.2}, 1500),
+    "wheels-orbital uncompensated": (SLOW, {"certify.momentum": 0.1, "simulation.duration": 4000}, 1500),
+    "cubesat-nadir lyapunov": (WIDE, {"fault": None, "certify.momentum": 0.006}, 1500),
+    "cubesat-nadir wheel": (WIDE, {}, 1500),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ATTACKED)
+def test_no_more_flights_than_the_share_are_beyond_what_is_proved(name):
+    """From inside and outside of the claims' sets, before faults and after."""
+    (scenario, law), (over, changes, runs) = name.split(), ATTACKED[name]
+    attacked = sh.load(scenario).with_({"requirement": None} | changes)
+    found = sh.campaign(attacked, runs=runs, over=over, law=law, search=False, proof=True)
+    (claim,) = [one.claim for one in found.laws]
+    assert claim.covered > runs / 10
+    assert not found.contradicted
+    assert [one.beyond for one in claim.within] == [0] * len(claim.within)
+    assert len(claim.within) >= 2
+    assert not claim.misled
