@@ -169,11 +169,14 @@ def _take(
         inside[0] |= starts
     elif not about.issued.step:
         inside[0] |= _starts_inside(about, lot)
-    enters = right & inside & (begins >= about.issued.step)[:, None]
+    # An estimate may be right before it has settled, for which it has half of the flight.
+    place, starts_by = np.arange(len(begins))[:, None], begins[:, None]
+    settles = np.where(~right & (starts_by < about.steps / 2.0), place, -1).max(axis=0)
+    enters = right & inside & (starts_by >= about.issued.step) & (place > settles)
     within = enters & light
     first = np.where(within.any(axis=0), within.argmax(axis=0), enters.argmax(axis=0))
     begun = np.where(enters.any(axis=0), begins[first], -1)
-    later = np.arange(len(begins))[:, None] >= first
+    later = place >= first
     values = {name: metrics[name] for name in ("final_attitude_error", "final_rate_error", "limit_share")}
     values |= {
         name: np.where(later, shown[row], 0.0).max(axis=0)
