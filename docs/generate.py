@@ -23,6 +23,7 @@ PAGES = {
 }
 FILLED = (
     "../README.md",
+    "certificates.md",
     "index.md",
     "invariant-sets.md",
     "kernel.md",

@@ -16,7 +16,9 @@ import typer
 
 from generators.kernel import files_table
 from generators.laws import POINT
+from generators.proved import beside_table, costs_table
 from generators.sets import sets_table
+from generators.sharpness import sharpness_table
 from generators.tables import fields_table, first_sentence, signature, table
 from starhold.algebra import cosines, elementary, quaternion, rotation, scalar, several, structured
 from starhold.algebra import vector as vectors
@@ -209,6 +211,9 @@ TABLES = {
     "kernel files": files_table,
     "invariant sets": sets_table,
     "dice": lambda: methods_table(Dice),
+    "proved and measured": beside_table,
+    "costs of sources": lambda: costs_table("cubesat-nadir"),
+    "sharpness": sharpness_table,
 }
 MARK = re.compile(r"(<!-- written by docs/generate.py: (.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 

@@ -134,6 +134,7 @@ def campaign(
     force: bool = False,
     until_decided: bool = False,
     search: bool = True,
+    proof: bool = False,
     progress: Callable[[str, int], None] | None = None,
 ) -> CampaignResult:
     """Fly many runs of a scenario with numbers drawn from distributions, and judge what is required of them.
@@ -144,7 +145,8 @@ def campaign(
     of what the scenario's [campaign] table has. law: one law, else all. Results are kept in `folder`, or in one that goes
     with this process; `resume` flies there what is missing. threads, workers (processes), scheduler (the address of a Dask
     cluster), gpu: who flies; results are the same bits. until_decided: end as soon as every requirement is met or missed,
-    `runs` at the most. search: look for the worst, too. progress: called with a law and how many more of its runs were
+    `runs` at the most. search: look for the worst, too. proof: compare flights with what is proved of the loop as it flies,
+    too, which takes seconds a law: `claim` of each law. progress: called with a law and how many more of its runs were
     flown.
 
     InputError for whatever is wrong, what was flown until then being kept."""
@@ -158,7 +160,7 @@ def campaign(
         key: list(value) if key in ("metrics", "requirement") and not isinstance(value, str | Mapping | None) else value
         for key, value in changes.items()
     }
-    options = Options(engine_of(threads, workers, scheduler, gpu), resume, force, until_decided, search)
+    options = Options(engine_of(threads, workers, scheduler, gpu), resume, force, until_decided, search, proof)
     place = Path(passing_folder("campaign") if folder is None else folder)
     return fly_campaign(with_campaign(reading.open_scenario(scenario), plain), place, law, options, progress)
 

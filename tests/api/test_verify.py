@@ -141,11 +141,19 @@ def test_a_proof_is_met_or_not_decided_and_never_missed():
     assert "only this bound is proved" in tight.evidence
 
 
+def test_what_is_proved_before_the_ultimate_bound_decides_earlier_times():
+    later, sooner = verdict(PROOF), verdict(PROOF | {"after": "1 min", "at_most": 3})
+    assert sooner.number > later.number
+    assert (sooner.verdict, "from 60 s on" in sooner.evidence) == ("met", True)
+    flight = verdict(PROOF | {"after": "1 min", "at_most": 3, "method": "flight"})
+    assert flight.number <= sooner.number
+    assert verdict(PROOF | {"after": "1 min", "at_most": 0.99 * sooner.number}).verdict == "not decided"
+
+
 @pytest.mark.parametrize(
     ("asked", "changes", "why"),
     leading(
         [
-            ({"after": "1 min"}, {}, "not by 60 s"),
             ({"metric": "final_rate_error", "after": 0, "at_most": 1}, {}, "not by 300 s"),
             ({}, {"initial": {"angles": [3.1, 0, 0], "rate": [0.5, 0, 0]}}, "begins outside of the set"),
             ({}, {"nominal": {"spacecraft": {"inertia": [2, 3, 3.9]}}}, "nominal model is not the craft"),

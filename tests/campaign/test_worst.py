@@ -96,7 +96,7 @@ def test_the_search_tells_how_many_of_its_flights_are_done(brief):
     job, name, asked = job_of(short(), over)
     heard = []
     found = worst.search(job, name, asked, 1, notice=lambda *given: heard.append(given))
-    sought = worst.Sought(asked.name, 32 + 3 * 16)
+    sought = worst.Sought(f"worst {asked.name}", 32 + 3 * 16)
     assert {(law, what) for law, _, what in heard} == {(name, sought)}
     assert sum(more for _, more, _ in heard) == sought.flights >= found.evaluations
     assert len(heard) > 4

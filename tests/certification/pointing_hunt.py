@@ -129,8 +129,9 @@ def parts_of(random, some, size, numbers, orbit, wheels, k, w, period):
 class Attack(Oracle):
     """Flights against a pointing claim: one half begins on the border of its set, one half on target."""
 
-    def __init__(self, content, claim, seed):
+    def __init__(self, content, claim, seed, lanes=LANES):
         super().__init__(content, claim, seed)
+        self.lanes = lanes
         _, stiffness = self.linear()
         self.slow = math.sqrt(np.linalg.eigvals(np.linalg.solve(self.J, stiffness)).real.min() / 2)
 
@@ -141,30 +142,34 @@ class Attack(Oracle):
             given = self.inputs(q, w, *(around or [np.zeros(w.shape)] * 4))[0]
             return run(self.programs["law"], given)
 
-        found = Fleet(self.J, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), LANES)
+        found = Fleet(
+            self.J, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
+        )
         found.growing = n.get("outside.per.rate", 0.0), n.get("error.per.rate", 0.0)
         found.around = Surroundings(
             [n.get(f"outside.{k}", 0.0) for k in range(3)], n.get("target.rate", 0.0), n.get("target.acceleration", 0.0),
             n.get("momentum") if "wheels" in self.words else None,
             *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
-            self.noise(LANES, self.rng) if "share" in n else None,
+            self.noise(self.lanes, self.rng) if "share" in n else None,
             (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
         )  # fmt: skip
         return found
 
+    def step(self):
+        """What the state (w, q) and a torque held for a period are of the state after it, near rest."""
+        h, inverse, zero = self.numbers["period"], np.linalg.inv(self.J), np.zeros((3, 3))
+        B = np.vstack([h * inverse, h * h / 4 * inverse])
+        return np.block([[np.eye(3), zero], [h / 2 * np.eye(3), np.eye(3)]]) - B @ np.hstack(self.linear()), B
+
     def extremal(self, periods):
         """Unit vectors that take the linear loop as far as it goes at an instant, in a direction of its own each lane: those
         of the adjoint, which begins anew after it."""
-        C, K = self.linear()
-        h, zero = self.numbers["period"], np.zeros((3, 3))
-        inverse = np.linalg.inv(self.J)
-        B = np.vstack([h * inverse, h * h / 4 * inverse])
-        A = np.block([[np.eye(3), zero], [h / 2 * np.eye(3), np.eye(3)]]) - B @ np.hstack([C, K])
+        (A, B), h = self.step(), self.numbers["period"]
         last = int(min(periods, max(50, 12 / (self.slow * h))))
-        ends = self.rng.normal(size=(6, LANES))
+        ends = self.rng.normal(size=(6, self.lanes))
         # Of the angle, but for some.
-        ends[:3, self.rng.uniform(size=LANES) < 0.8] = 0.0
-        ends[3:, : LANES // 8] = np.eye(3)[:, self.rng.integers(3, size=LANES // 8)]
+        ends[:3, self.rng.uniform(size=self.lanes) < 0.8] = 0.0
+        ends[3:, : self.lanes // 8] = np.eye(3)[:, self.rng.integers(3, size=self.lanes // 8)]
         ways = [ends]
         for _ in range(last - 1):
             ways.append(A.T @ ways[-1])
@@ -174,11 +179,11 @@ class Attack(Oracle):
         """What contradicts the claim, or "", and the largest angle and rate in the end as shares of the claimed ones."""
         n, h = self.numbers, self.numbers["period"]
         V0 = self.lyapunov(np.eye(4)[0], np.zeros(3))
-        fleet, half = self.fleet(), LANES // 2
+        fleet, half = self.fleet(), self.lanes // 2
         states = [self.border(V0, n["level"] * self.rng.uniform() * (k % 3 > 0)) for k in range(half)]
         begin = (np.concatenate([np.array(part).T, np.tile(rest[:, None], half)], axis=1) for part, rest in zip(
             zip(*states, strict=True), (np.eye(4)[0], np.zeros(3)), strict=True))  # fmt: skip
-        near = np.arange(LANES) >= half
+        near = np.arange(self.lanes) >= half
         periods = int(min(n["settling"] / h + 300, PERIODS))
         extremal, usual = self.extremal(periods), fleet.push
 

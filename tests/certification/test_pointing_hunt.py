@@ -1,8 +1,16 @@
 """Flights that are steered against pointing claims of random loops; `pointing_hunt` flies more of them by hand."""
 
+import json
+
 import numpy as np
 import pytest
 
+import starhold as sh
+from starhold.certification.certificate import FILE
+from starhold.certification.certify import Wanted, certify
+from starhold.report.results import write_proofs
+from starhold.scenario.building import build
+from tests.certification.extremal import reached
 from tests.certification.pointing_hunt import flown, hunted, proved_loop
 from tests.tiers import leading
 
@@ -33,3 +41,14 @@ def test_flights_of_the_loop_itself_end_as_near_as_is_proved(seed, tmp_path):
     loop, _, claim = proved_loop(seed, tmp_path)
     assert not [name for name in claim.assumptions if name.startswith("without")]
     assert 0.01 < flown(loop, claim, np.random.default_rng(seed)) <= 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "least"), [("lyapunov", 0.67), ("wheel", 0.67)])
+def test_extremal_flights_of_the_cubesat_end_near_its_bound(law, least, tmp_path):
+    """What is proved is less than one and a half times what is flown."""
+    scenario = sh.load("cubesat-nadir").with_({"fault": None})
+    certificate = certify(build(scenario, scenario.pick(law)), law, Wanted(pointing=True, alone=True))
+    content = json.loads(write_proofs([certificate], "nadir", tmp_path).read_text(encoding="utf-8"))
+    assert (tmp_path / FILE).exists()
+    assert least < reached(content, content["claims"][0], 5000, 128) <= 1.0

@@ -104,7 +104,7 @@ def test_bars_count_runs_and_tell_rate_and_time_left(printed: Any) -> None:
                 worker.join()
             notice("[b]pd", 600)
             notice("[b]pd", 150)
-            sought = Sought("peak [b]", 300)
+            sought = Sought("worst peak [b]", 300)
             notice("[b]pd", 100, sought)
             notice("[b]pd", 50, sought)
 

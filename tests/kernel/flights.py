@@ -177,6 +177,7 @@ class Fleet:
         self.inverse, self.rng, self.lanes = np.linalg.inv(self.J), np.random.default_rng(seed), lanes
         # `growing`: what torque and error are more (N m s) times the body's rate, where there are surroundings.
         self.push, self.around, self.growing = pushes(self.rng, lanes, h, slow), None, (0.0, 0.0)
+        self.surroundings = Around
 
     def directions(self):
         return along(self.rng.normal(size=(3, self.lanes)))
@@ -187,7 +188,7 @@ class Fleet:
 
     def fly(self, q, w, periods, parts=2):
         """Yield the states between and at samples."""
-        around = self.around and Around(self.around, self.J, self.inverse, self.rng, self.lanes)
+        around = self.around and self.surroundings(self.around, self.J, self.inverse, self.rng, self.lanes)
         for n in range(periods):
             unit = self.push(n, q, w)
             if around:

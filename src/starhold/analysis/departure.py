@@ -176,15 +176,42 @@ def _away(claim: Claim, span: Span) -> list[Departure]:
 def _misled(claim: Claim, span: Span) -> list[Departure]:
     """Return when the estimation error exceeds the bound claimed for a share of flights, as it does before the estimator
     settles."""
+    how = "the estimation error exceeds the stated bound"
+    return [one for far in _misreadings(claim, span) for one in span.first(far, how)]
+
+
+def _misreadings(claim: Claim, span: Span) -> list[Array]:
+    """Return for each estimate at which samples its error exceeds the bound claimed for a share of flights."""
     if not claim.numbers.get("share"):
         return []
-    misled = list[Departure]()
+    misread = list[Array]()
     for name in (fitted.called.replace("-", "_") for fitted in span.loop.used("estimator")):
         turned: Any = relative(tuple(span["attitude"].T), tuple(span[f"{name}_attitude"].T))
         off = np.linalg.norm(span[f"{name}_rate"] - span["rate"], axis=1)
         far = error_angle(np.transpose(turned)) > claim.numbers["attitude_error"]
-        misled += span.first(far | (off > claim.numbers["rate_error"]), "the estimation error exceeds the stated bound")
-    return misled
+        misread.append(far | (off > claim.numbers["rate_error"]))
+    return misread
+
+
+def covered(
+    certificate: Certificate, loop: ClosedLoop, run: Recording, first: int = 0, last: int | None = None
+) -> tuple[float, float] | None:
+    """Return the times (s) between which the claim about the loop as it flies covers a run: it begins once the estimate has
+    settled and the motion is in its set. None where it is not proved, or never covers the run. loop, first, last: as in
+    `departures`."""
+    claim, span = certificate.claim("pointing"), Span(loop, run, first, last)
+    if claim is None or claim.outcome != "proved" or not len(span["time"]):
+        return None
+    inside = value_of(claim.programs, loop, span.shown) <= claim.numbers["start"]
+    wrong = [np.flatnonzero(far) for far in _misreadings(claim, span)]
+    settled = max((int(far[-1]) + 1 for far in wrong if len(far)), default=0)
+    begins = np.flatnonzero(inside[settled:])
+    if not len(begins):
+        return None
+    begin = float(span["time"][settled + begins[0]])
+    left = departures(certificate, loop, run, round(begin / loop.period), last).get("pointing", ())
+    end = min((one.time for one in left), default=float(run["time"][-1]))
+    return (begin, end) if end > begin else None
 
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:

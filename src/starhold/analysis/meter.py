@@ -19,13 +19,15 @@ from starhold.algebra.scalar import less, less_equal, sqrt, where
 from starhold.algebra.structure import flatten
 from starhold.algebra.vector import dot, most
 from starhold.algebra.words import number_of
-from starhold.loop.closed_loop import ClosedLoop, Composition
+from starhold.loop.closed_loop import ClosedLoop, Composition, is_recorded
 from starhold.loop.kernels import Arguments, Kernel, Observer, form, make_step
 from starhold.loop.programs import over_samples
 from starhold.parts.contract import IS_VALID
 from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
 
+TOLD = "told."
+"""Begins the names of the quantities that the law is told, as sensors or its estimator tell them."""
 LAST = 0.25
 """The share of the run over which chatter and the final error are measured."""
 ALMOST = 1.0 - 1e-9
@@ -255,13 +257,22 @@ def _observing(note: Note, parts: Composition) -> Callable[..., Any]:
 
 def sampled(parts: Composition) -> Callable[..., dict[str, Any]]:
     """Return the function that reads the recorded quantities of a control instant, of the body and of effectors, by name,
-    and whether the estimate is valid: read(decided, step, setup)."""
+    what the law is told, and whether the estimate is valid: read(decided, step, setup)."""
 
     def read(decided: Any, step: Any, setup: Any) -> dict[str, Any]:
         read = {name: value for part in _recorded(parts, decided, step, setup) for name, value in part._asdict().items()}
+        read |= {f"{TOLD}{name}": value for name, value in _told(parts, decided.memories).items()}
         return read | ({IS_VALID: decided.memories.estimate.is_valid} if says_valid(parts) else {})
 
     return read
+
+
+def _told(parts: Composition, memories: Any) -> dict[str, Any]:
+    """Return the estimate, or without one the first recorded reading of each name."""
+    if parts.estimator is not None:
+        return memories.estimate._asdict()
+    recorded = zip(filter(is_recorded, parts.sensors), memories.readings, strict=False)
+    return {name: value for _, reading in reversed([*recorded]) for name, value in reading._asdict().items()}
 
 
 def says_valid(parts: Composition) -> bool:

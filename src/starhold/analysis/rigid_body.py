@@ -15,7 +15,7 @@ from starhold.algebra.rotation import rotation_vector
 from starhold.algebra.scalar import absolute, both, either, less, less_equal, maximum, minimum, sqrt, where
 from starhold.algebra.structure import chosen, places
 from starhold.algebra.vector import ZERO, Vector, dot, most, scale, subtract
-from starhold.analysis import mode_notes, transient_notes, validity_notes
+from starhold.analysis import mode_notes, premise_notes, transient_notes, validity_notes
 from starhold.analysis.meter import ALMOST, INSTANT, KINDS, Meter, Metric, Window, is_on_limit, outside, tail_start
 from starhold.analysis.mode_notes import PEAKS, Modal, Span, Wanted
 from starhold.analysis.ranking import COSTS, Measure, MetricSet
@@ -73,7 +73,7 @@ class Cone(NamedTuple):
 
 class Bounds(NamedTuple):
     """The numbers of the notes: squares of the sine of half the attitude tolerance and of the rate tolerance ((rad/s)^2);
-    the instant at which the last quarter begins, and the last; cones; what is asked about modes."""
+    the instant at which the last quarter begins, and the last; cones; what is asked about modes; what premises need."""
 
     angle: float
     rate: float
@@ -82,6 +82,7 @@ class Bounds(NamedTuple):
     cones: tuple[Cone, ...]
     modal: Wanted
     transient: transient_notes.Ends | tuple[()]
+    masses: Any = ()
 
 
 class Turning(NamedTuple):
@@ -98,7 +99,7 @@ class Noted(NamedTuple):
     momentum; sums of the torque's norm, of instants on the limit and, in the last quarter, of changes of torque; there the
     first and the last error, and the last torque; squares of the least distances of axes from the middles of cones; what
     extras need; of a window the largest squares of half the angle's sine, of the rate error and of the torque; and notes on
-    modes, and on whether the estimate is valid."""
+    modes, on whether the estimate is valid, and on premises of claims."""
 
     attitude_outside: float
     rate_outside: float
@@ -121,6 +122,7 @@ class Noted(NamedTuple):
     modal: Modal | tuple[()]
     validity: Any
     transient: Any
+    premises: Any = ()
 
 
 def make_meter(
@@ -139,6 +141,7 @@ def make_meter(
     fault: tuple[float, ...] = (),
     spans: Mapping[str, tuple[str, Span]] = MappingProxyType({}),
     transient: tuple[float, float] | tuple[()] = (),
+    masses: premise_notes.Masses | None = None,
 ) -> Meter:
     """The meter of flights of so many steps of a period (s), or of samples at such intervals.
 
@@ -147,7 +150,7 @@ def make_meter(
     rest; wheels: the body has some; estimated: an estimator says whether it is valid; begins: modes whose first begin is
     noted, counted from 1, by the names of their metrics; fault: the instant of the first fault, as `Wanted` has it; spans:
     parts of a flight in which one of PEAKS is noted, by the names of their metrics; transient: the angle (rad) and the rate
-    (rad/s) at which one ends, () for none."""
+    (rad/s) at which one ends, () for none; masses: for windows of what claims presuppose."""
     iterations, turns = "iterations" in extras, "overshoot" in extras
     levels = (-1.0,) * len(DECADES) if iterations else ()
     turning = Turning(ZERO, 0.0, 0.0) if turns else ()
@@ -171,16 +174,19 @@ def make_meter(
         modal,
         validity_notes.begun(estimated),
         transient_notes.Watched() if transient else (),
+        premise_notes.begun(masses),
     )
     first, tail = Noted(*begun), tail_start(steps)
     angle = math.sin(0.5 * min(tolerances[0], math.pi)) ** 2
     ends = transient_notes.Ends.of(*transient, period) if transient else ()
-    bounds = Bounds(angle, tolerances[1] ** 2, float(tail), float(steps), tuple(cones.values()), wanted, ends)
+    limits = tolerances[1] ** 2, float(tail), float(steps)
+    bounds = Bounds(angle, *limits, tuple(cones.values()), wanted, ends, masses or ())
     rows: Any = places(first)
     windows = {
         "attitude_error": Window(rows.window_angle, KINDS["angle"], "angle to the target", "rad"),
         "rate_error": Window(rows.window_rate, np.sqrt, "rate relative to the target", "rad/s"),
         "torque": Window(rows.window_torque, np.sqrt, "norm of the torque applied", "N m"),
+        **premise_notes.windows(rows.premises),
     }
     early, late = (_note(limit, still, stage, turns, iterations) for stage in (False, True))
     table = (
@@ -310,6 +316,7 @@ def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool
             mode_notes.noted(seen.modal, quantities, now, bounds.modal, angle_square, rate_square),
             validity_notes.noted(seen.validity, quantities, now, bounds.last),
             transient_notes.noted(seen.transient, quantities, now, bounds.transient),
+            premise_notes.noted(seen.premises, quantities, bounds.masses),
         )
 
     return note

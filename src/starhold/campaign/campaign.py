@@ -19,6 +19,7 @@ from starhold.campaign.dispersions import Dispersion
 from starhold.campaign.engines import Block, Engine, Threads, Workers, flying
 from starhold.campaign.job import Job, Source
 from starhold.campaign.manifest import FILE, Manifest
+from starhold.campaign.proved import look
 from starhold.campaign.results import CampaignResult
 from starhold.campaign.store import Store
 from starhold.campaign.summary import summarise, verdicts_of
@@ -48,6 +49,8 @@ class Options:
     until_decided: bool = False
     search: bool = True
     """Whether the worst cases of required metrics are sought over the box of the dispersions."""
+    proof: bool = False
+    """Whether the flights are compared with what is proved of the loop as it flies, which takes seconds a law."""
 
 
 def with_campaign(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
@@ -145,6 +148,9 @@ def fly_campaign(
         threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
         taken = set[str]()
         results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken, notice)) for result in results)
+    if options.proof:
+        count = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
+        results = tuple(replace(result, claim=look(job, result.law, count, notice)) for result in results)
     sealed = digest(store, runs)
     totals = {
         "verdicts": {

@@ -59,11 +59,20 @@ class Job:
     table: CampaignTable
     progress: Callable[[str, int], None] | None = None
     """Called with a law and how many more of its runs were flown, as a block goes on; not from other processes."""
+    extras: tuple[str, ...] = ()
+    """What is measured beside what the campaign asks for."""
     _lanes: dict[str, Lanes] = field(default_factory=dict[str, Lanes])
     _meters: dict[str, Meter] = field(default_factory=dict[str, Meter])
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"source": self.source, "table": self.table, "progress": None, "_lanes": {}, "_meters": {}}
+        return {
+            "source": self.source,
+            "table": self.table,
+            "progress": None,
+            "extras": self.extras,
+            "_lanes": {},
+            "_meters": {},
+        }
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -103,7 +112,7 @@ class Job:
     def _meter_of(self, loop: ClosedLoop, gains: Any) -> Meter:
         """Return the meter of lanes of a loop; gains: with an array (lanes,) in place of each number that differs."""
         required = self.required.values()
-        extras, cones = extras_of(required, self.table.metrics), cones_of(required)
+        extras, cones = (*extras_of(required, self.table.metrics), *self.extras), cones_of(required)
         key = "requirement" if cones else "campaign.metrics"
         with input_at(self.source.where, key):
             return study_of(self.scenario.body).meter(self.scenario, loop, gains, extras, cones)
@@ -119,7 +128,7 @@ class Job:
         histogram: Any = 0
         extremes: list[Any] = []
 
-        def take(metrics: Metrics, windows: Any) -> None:
+        def take(metrics: Metrics, windows: Any, lot: Lot) -> None:
             nonlocal histogram
             kept = np.isnan(metrics["diverged_at"])
             bins, least, most = envelopes.count(windows if kept.all() else windows[:, :, kept])
@@ -149,22 +158,22 @@ class Job:
         columns: Mapping[str, NDArray[Any]],
         runs: NDArray[np.int64],
         pool: Pool,
-        take: Callable[[Metrics, Any], None] = lambda metrics, windows: None,
+        take: Callable[[Metrics, Any, Lot], None] = lambda metrics, windows, lot: None,
         progress: Progress | None = None,
         refused: NDArray[np.bool_] | None = None,
     ) -> Callable[[], Metrics]:
         """Begin to fly runs of a law; the function returned waits for their metrics and the numbers read back, (lanes,), by
         name. columns: the drawn values; runs: the runs' numbers, which also number their random draws; take: called with
-        metrics and windows of each lot; refused: as in `Lanes.lots`; lanes marked there have no numbers."""
+        metrics and windows of each lot, and the lot; refused: as in `Lanes.lots`; lanes marked there have no numbers."""
         under_way = [
-            (at, numbers, self._begin(lot, pool)) for lot, at, numbers in self.lanes(law).lots(columns, runs, refused)
+            (lot, at, numbers, self._begin(lot, pool)) for lot, at, numbers in self.lanes(law).lots(columns, runs, refused)
         ]
 
         def finish() -> Metrics:
             gathered: Metrics = {}
-            for at, numbers, flown in under_way:
+            for lot, at, numbers, flown in under_way:
                 metrics, windows = flown(progress)
-                take(metrics, windows)
+                take(metrics, windows, lot)
                 for name, values in (numbers | metrics).items():
                     gathered.setdefault(name, np.full(len(runs), np.nan))[at] = values
             return gathered

@@ -31,6 +31,10 @@ ROUNDING = 1e-12
 """The share of a bound by which rounding may take a flight beyond it."""
 
 
+CHANCE = 1e-6
+"""The probability with which as many flights as contradict a claim with a share would be beyond it by chance."""
+
+
 @dataclass(frozen=True)
 class Spread:
     """The distribution of a metric over the runs that have it. quantiles: those of QUANTILES, by linear interpolation, as
@@ -82,6 +86,55 @@ class Bracket:
 
 
 @dataclass(frozen=True)
+class Within:
+    """A metric of the flights that keep the premises of a claim, from when they do, lies between the worst flown and the
+    bound proved. covered: how many these flights are; beyond: those beyond the bound by more than the integration's error,
+    or without a value."""
+
+    metric: str
+    unit: str
+    flown: float
+    proved: float
+    covered: int
+    beyond: int
+
+
+@dataclass(frozen=True)
+class ByClaim:
+    """A claim about a law's loop as it flies stands beside its flights. text: the claim, or why nothing is claimed of them;
+    runs: flights that were looked at; left: how many have not its premises, by the reason; share: of flights of which the
+    claim holds, None for all; misled: in how many of the others the law was told more wrongly than the claim assumes for
+    this share, None where what it is told is not recorded; within: the metrics that it bounds."""
+
+    text: str
+    runs: int = 0
+    left: Mapping[str, int] = field(default_factory=dict[str, int])
+    share: float | None = None
+    misled: int | None = None
+    within: tuple[Within, ...] = ()
+
+    @property
+    def covered(self) -> int:
+        """The number of flights that have the premises of the claim."""
+        return self.runs - sum(self.left.values())
+
+    def is_rare(self, failures: int, runs: int) -> bool:
+        """Whether so many of the runs may be outside the share: the probability of as many is more than `CHANCE`. Each run
+        has its own noise, however the dispersions are drawn."""
+        if self.share is None or not failures:
+            return not failures
+        from starhold.campaign.verdicts import failure_bounds
+
+        return failure_bounds(failures, runs, 1.0 - CHANCE, sides=1).lower <= 1.0 - self.share
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether flights contradict the claim, or the share of them in which its assumption on noise holds."""
+        counts = [(self.misled or 0, self.covered), *((one.beyond, one.covered) for one in self.within)]
+        return not all(self.is_rare(*pair) for pair in counts)
+
+
+@dataclass(frozen=True)
 class LawResult:
     """The results of one law in a campaign."""
 
@@ -97,6 +150,8 @@ class LawResult:
     """Sensitivity of metrics, by their names, if the sampling was designed for it."""
     again: tuple[Again, ...] = ()
     brackets: tuple[Bracket, ...] = ()
+    claim: ByClaim | None = None
+    """What is proved, where a proof was requested."""
 
     def __repr__(self) -> str:
         judged = "".join(f"; {verdict.name} {verdict.outcome}" for verdict in self.verdicts)
@@ -129,7 +184,8 @@ class CampaignResult:
     @property
     def contradicted(self) -> bool:
         """Whether a flight contradicts a proof, which is a fault of starhold."""
-        return any(bracket.contradicted for law in self.laws for bracket in law.brackets)
+        every = (one for law in self.laws for one in (*law.brackets, law.claim) if one is not None)
+        return any(one.contradicted for one in every)
 
     def frame(self) -> DataFrame:
         """A row for each run of each law: `law`, `run`, drawn and flown values, metrics, margins."""

@@ -72,7 +72,7 @@ def box(job: Job) -> list[tuple[float, float]]:
 
 
 class Sought(NamedTuple):
-    """A search is for the worst case of the requirement of this name, and takes so many flights at most."""
+    """Flights beside those of the campaign are for this, and so many at most."""
 
     name: str
     flights: int
@@ -98,7 +98,7 @@ def search(
     sought = np.random.default_rng(seed)
     effort = MANY if job.lanes(law).at_once else FEW
     low, high = np.array(box(job)).T
-    sought_after, done = Sought(requirement.name, effort.spread + effort.rounds * effort.lanes), 0
+    sought_after, done = Sought(f"worst {requirement.name}", effort.spread + effort.rounds * effort.lanes), 0
 
     def tell(more: int) -> None:
         nonlocal done
@@ -222,8 +222,7 @@ _FOLLOWING = ("lag", "rate-limit")
 def proved_of(job: Job, law: str, requirement: Requirement) -> tuple[float | None, str]:
     """Return the bound of a metric that holds over all draws, and its basis; None where nothing is proved. The saturation
     limit of the command bounds the torque on the body, if no effector produces the torque, no actuator amplifies it, and no
-    draw changes the limit. The claims of certificates bound no metric: they are about ultimate bounds and continuous torque,
-    while flights end and hold their torque for a control period.
+    draw changes the limit. Claims of certificates are about flights that have their premises alone: `proved` has these.
     """
     lanes = job.lanes(law)
     loop = lanes.base.loop

@@ -89,6 +89,10 @@ class Claim:
         """The parts of the loop that it leaves out, each as role and name."""
         return [name.removeprefix(WITHOUT) for name in self.assumptions if name.startswith(WITHOUT)]
 
+    def angle_from(self, time: float) -> float:
+        """Return the angle (rad) that a claim about the loop as it flies bounds from this time (s) on."""
+        return min(most for begin, most in self.numbers["funnel"] if begin <= time)
+
     def refutation(self) -> Obligation | None:
         """The first obligation that is refuted."""
         return next((o for o in self.obligations if o.outcome == "refuted"), None)

@@ -36,6 +36,10 @@ def campaign(
         bool, typer.Option("--until-decided", help="stop once every requirement is decided; runs are the most")
     ] = False,
     search: Annotated[bool, typer.Option("--search/--no-search", help="search for worst cases of required metrics")] = True,
+    proof: Annotated[
+        bool,
+        typer.Option("--proof", help="also bound flights by what is proved of the loop; this takes seconds"),
+    ] = False,
     threads: Annotated[int | None, typer.Option(help="of this process; all cores by default")] = None,
     workers: Annotated[int | None, typer.Option(help="processes of this machine in place of threads")] = None,
     scheduler: Annotated[
@@ -61,7 +65,7 @@ def campaign(
     folder = output or Path("results") / f"{scenario.name}-campaign"
     table = scenario.table.campaign
     with flying_campaign(laws, table.runs, bool(table.over)) as notice:
-        options = Options(engine, resume, force, until_decided, search)
+        options = Options(engine, resume, force, until_decided, search, proof)
         result = fly_campaign(scenario, folder, law, options, notice)
     print_campaign(result, scenario.body)
     page = write_campaign(scenario, result)

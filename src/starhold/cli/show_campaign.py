@@ -14,7 +14,7 @@ from rich.text import Text
 from starhold.cli.console import bars_with, console
 from starhold.cli.show import print_rows, printable
 from starhold.errors import InputError
-from starhold.report.campaign_tables import Section, again, brackets, drivers, indices, metrics, verdicts
+from starhold.report.campaign_tables import Section, again, brackets, claims, drivers, indices, metrics, verdicts
 from starhold.report.campaign_units import Wording, counted, figure, headline, outcome_of
 from starhold.report.commands import Cell, coloured
 
@@ -57,7 +57,7 @@ def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Itera
             return
         key = law, sought.name
         if key not in tasks:
-            words = escape(printable(f"{law}: worst {sought.name}"))
+            words = escape(printable(f"{law}: {sought.name}"))
             tasks[key] = bars.add_task(words, total=sought.flights)
         bars.update(tasks[key], advance=more)
 
@@ -86,6 +86,7 @@ def print_campaign(result: CampaignResult, body: str) -> None:
     _print(verdicts(result, words), columns=7)
     _print(metrics(result, words, METRICS), with_note=False)
     _print(brackets(result, words), with_note=result.contradicted)
+    _print(claims(result, words))
     for section in indices(result, words):
         _print(section)
     for law in result.laws:

@@ -27,7 +27,7 @@ from starhold.cli.console import console
 from starhold.cli.show import print_rows, printable
 from starhold.report.commands import Column, coloured
 from starhold.report.commands import Table as Rows
-from starhold.report.text import unflown_text
+from starhold.report.text import covered_text, unflown_text
 from starhold.studies.chain import sentence, summary
 
 if TYPE_CHECKING:
@@ -131,7 +131,9 @@ def _summary(flight: Flight, place: int, certificate: Certificate) -> Iterator[t
     proved = [claim.kind for claim in strongest(claims) if claim.outcome == "proved"]
     departures = flight.departures[place] if flight.departures else {}
     begins = {kind: departures[kind] for kind in proved if kind in departures}
-    if begins and all(begins.values()):
+    if said := covered_text(flight, place):
+        yield "", "[dim]covers[/dim]", said
+    elif begins and all(begins.values()):
         last = max(begins, key=lambda kind: begins[kind][0].time)
         yield "", "[yellow]left[/yellow]", _uncovered(flight, begins[last])
 

@@ -11,7 +11,7 @@ from starhold.certification.wording import coverage, statement, strongest, uncla
 from starhold.report.commands import Cell, Column, Table
 from starhold.report.commands.verify import amount
 from starhold.report.tables import Markup, note, pill, swatch, table_html
-from starhold.report.text import lost_text, plain_measure, unflown_text, unknown_text
+from starhold.report.text import covered_text, lost_text, plain_measure, unflown_text, unknown_text
 from starhold.studies.requirements import LOST
 from starhold.studies.verification import verdicts_of_flight
 
@@ -184,8 +184,8 @@ def _strongest(flight: Flight, whose: str) -> str:
     certificate = flight.certificates[place]
     about = _about(certificate, flight)
     left = flight.left(place, claim.kind)
-    when = ""
-    if left and claim.outcome == "proved":
+    when = covered_text(flight, place) if claim.kind == "pointing" else ""
+    if left and claim.outcome == "proved" and not when:
         start = left[0].time
         when = f"this flight leaves it {'from the start' if start == 0.0 else f'at {flight.metric_set.moment(start, 4)}'}"
     more = "; ".join(filter(None, (coverage(claim, certificate.subject), when)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -141,8 +141,7 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
     degrees = 180.0 / np.pi
     angles = [thin(error_angle(flight.recording["attitude_error"]) * degrees, factor) for flight in flights]
     speeds = [thin(np.linalg.norm(flight.recording["rate_error"], axis=1) * degrees, factor) for flight in flights]
-    proved = [None if scenario.table.fault else funnel(flight) for flight in flights]
-    funnels = [(number, one[0], one[1] * degrees) for number, one in enumerate(proved) if one is not None]
+    funnels = [(number, time, most * degrees) for number, flight in enumerate(flights) for time, most in funnel(flight)]
     settling = scenario.table.settling
     within, slow = (settling.attitude_tolerance * degrees,), (settling.rate_tolerance * degrees,)
     panels = [
@@ -152,13 +151,16 @@ def _angle(flights: Sequence[Flight], factor: int, scenario: Scenario) -> Plot:
     return Plot("angle", "error angle and relative rate", panels, "tolerance, proved bound" if funnels else "tolerance")
 
 
-def funnel(flight: Flight) -> Curve | None:
-    """Return times (s) and the angles (rad) that the flight is proved not to exceed from then on, (2, n); None where no
-    proof covers the whole flight."""
-    if flight.modes or [left.get("pointing") for left in flight.departures] != [()]:
-        return None
-    claim = flight.certificates[0].claim("pointing")
-    return None if claim is None or claim.outcome != "proved" else np.array(claim.numbers["funnel"]).T
+def funnel(flight: Flight) -> Iterator[tuple[Curve, Curve]]:
+    """Yield for each certificate times (s) and the angles (rad) that the flight is proved not to exceed from then on, while
+    the claim covers the flight."""
+    for certificate, between in zip(flight.certificates, flight.covered, strict=True):
+        claim = certificate.claim("pointing")
+        if claim is not None and between is not None:
+            begin, end = between
+            times, most = np.array(claim.numbers["funnel"]).T
+            there = begin + times < end
+            yield np.append(begin + times[there], end), np.append(most[there], most[there][-1])
 
 
 def _roll_pitch_yaw(flights: Sequence[Flight], factor: int) -> Plot:

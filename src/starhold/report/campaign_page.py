@@ -209,6 +209,7 @@ def render(scenario: Scenario, result: CampaignResult) -> str:
         _folded(tables.metrics(result, words)),
         _folded(tables.again(result, MOST_AGAIN)),
         _folded(tables.brackets(result, words)),
+        _folded(tables.claims(result, words)),
         fold("What drives failures and metrics", "".join(_drivers(result, words))),
         fold("Sensitivity indices", "".join(_shown(section, fit=True) for section in indices(result, words))),
         _folded(tables.dispersions(result)),

@@ -26,7 +26,7 @@ from starhold.report.tables import table_html
 
 if TYPE_CHECKING:
     from starhold.campaign.drivers import Drivers, FailureDriver, MetricDriver, PairDriver
-    from starhold.campaign.results import CampaignResult
+    from starhold.campaign.results import ByClaim, CampaignResult
     from starhold.campaign.sensitivity import Morris, Sobol
     from starhold.campaign.verdicts import Verdict
     from starhold.report.campaign_units import Measure
@@ -176,6 +176,42 @@ def brackets(result: CampaignResult, words: Wording) -> Section | None:
     columns = [*map(Column, ("metric", "law")), *numbers("flown ≤ true ≤ proved")]
     columns += [*map(Column, ("proved by", "looked for by", "flown by"))]
     return Section("Worst cases: flown ≤ true ≤ proved", Table(columns, rows), " ".join([*faults, note]))
+
+
+def claims(result: CampaignResult, words: Wording) -> Section | None:
+    """Show the metrics that the claim about each loop as it flies bounds, for the flights that keep its premises; None where
+    no proof was requested."""
+    rows: list[list[Any]] = []
+    sentences: list[str] = []
+    for number, law in enumerate(result.laws):
+        claim = law.claim
+        if claim is None:
+            continue
+        sentences += [f"{law.law}: {CONTRADICTED}"] if claim.contradicted else []
+        sentences.append(f"{law.law}: {_claimed(claim)}")
+        for item in claim.within:
+            measure = words.measure(item.metric, item.unit)
+            text = f"{'no value' if math.isnan(item.flown) else with_unit(item.flown, measure)} ≤ "
+            beyond = f"{count_text(item.beyond)} of {count_text(item.covered)}"
+            rows.append([measure.heading, law_cell(result, number), text + with_unit(item.proved, measure), beyond])
+    if not sentences:
+        return None
+    columns = [*map(Column, ("metric", "law")), *numbers("worst flown ≤ proved", "flights beyond")]
+    return Section("Proved of the loop as it flies", Table(columns, rows), " ".join(sentences))
+
+
+def _claimed(claim: ByClaim) -> str:
+    """State a claim, how many flights have its premises, and how often its assumption on noise holds."""
+    if not claim.runs:
+        return f"nothing is proved: {claim.text}."
+    left = "".join(f", {count_text(count)} {why}" for why, count in claim.left.items())
+    said = f"{claim.text}. Of {counted(claim.runs, 'flight')} {count_text(claim.covered)} have its premises{left}."
+    if claim.share is None:
+        return said
+    share = f"{said} It holds for at least {percent(claim.share)} of flights of this duration"
+    if claim.misled is None:
+        return f"{share}; what the law is told is not recorded."
+    return f"{share}, and the law is told more wrongly than it assumes in {count_text(claim.misled)} of these."
 
 
 def dispersions(result: CampaignResult) -> Section | None:

@@ -54,7 +54,8 @@ class Panel:
     factor), ("angle", factor), ("turn", 0 roll, 1 pitch, 2 yaw) or ("acceleration", component, factor); empty for curves
     that do not change."""
     bounds: tuple[tuple[int, Curve, Curve], ...] = ()
-    """Proved bounds by the indices of their flights: times, and the value not exceeded from then on; drawn dashed."""
+    """Proved bounds by the indices of their flights: times, and the value not exceeded from then on, until the last
+    time; drawn dashed."""
 
     def decades(self) -> float:
         """The number of decades that a logarithmic panel spans."""

@@ -53,6 +53,16 @@ def left_text(flight: Flight, certificate: int, kind: str) -> str:
     return "; ".join(f"{'from the start' if time == 0.0 else f'at {moment(time, 4)}'} {how}" for time, how in groups.items())
 
 
+def covered_text(flight: Flight, certificate: int) -> str:
+    """State between which times the claim of a certificate about the loop as it flies covers a flight, where it does not
+    cover it from the start; empty where it does, and where it covers nothing of it."""
+    between, moment = flight.covered[certificate] if flight.covered else None, flight.metric_set.moment
+    if between is None or not between[0]:
+        return ""
+    until = "" if between[1] >= float(flight.recording["time"][-1]) else f" to {moment(between[1], 4)}"
+    return f"it covers this flight from {moment(between[0], 4)}{until or ' on'}"
+
+
 def unflown_text(certificate: Certificate) -> tuple[str, str]:
     """Return, in a word and in a sentence, why no claim of a certificate is about the loop as it flies; both are empty where
     one is."""

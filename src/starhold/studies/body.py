@@ -99,6 +99,15 @@ class BodyStudy:
         """Describe how a run leaves the proved claims of a certificate, by their kinds."""
         return {}
 
+    def covered(self, issued: Issued, loop: Any, run: Recording) -> tuple[float, float] | None:
+        """Return the times (s) between which the claim about the loop as it flies covers a run; None where it never does."""
+        return None
+
+    def ends(self, issued: Issued, loop: Any, time: float) -> int | None:
+        """Return the control step at which a flight of this duration (s) has another loop than a certificate is about; None
+        where it keeps it."""
+        return None
+
     def fly_claims(self, issued: Issued) -> Trial | None:
         """Test a certificate by flights; None where it claims nothing that can be flown. Raises `BrokenClaimError`."""
         return import_module(self.TRIALS).fly_claims(issued.loop, issued.certificate) if self.TRIALS else None

@@ -53,7 +53,8 @@ def prove(scenario: Scenario, entry: Any, loop: Any, flight: Flight, pointing: b
     study = study_of(scenario.body)
     certified = [] if loop.nominal is not None else study.certify(scenario, entry, loop, pointing)
     left = tuple(study.departures(issued, loop, flight.recording) for issued in certified)
-    return replace(flight, certificates=tuple(issued.certificate for issued in certified), departures=left)
+    covered = tuple(study.covered(issued, loop, flight.recording) for issued in certified)
+    return replace(flight, certificates=tuple(issued.certificate for issued in certified), departures=left, covered=covered)
 
 
 def check_step(scenario: Scenario, loop: Any, flight: Flight, progress: Progress | None = None) -> Flight:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from starhold.analysis.departure import momentum_of, shown_at
 from starhold.analysis.margins import margins
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
-from starhold.certification.wording import enumerated, sentence
+from starhold.certification.wording import angle, enumerated, sentence
 from starhold.errors import InputError
 from starhold.scenario.checking import show
 from starhold.studies.body import study_of
@@ -142,7 +142,14 @@ def _proved(
         absent += [text for assumed, text in IDEAL.items() if assumed in claim.assumptions]
         number = claim.numbers.get(name)
         most = max((x for x in number if x is not None), default=None) if isinstance(number, list) else number
-        evidence = f"proved: {sentence(claim, one.certificate.subject)}"
+        said = sentence(claim, one.certificate.subject)
+        if (kind, name) == (POINTING, "angle"):
+            begin = _begin(scenario, key, table)
+            most = claim.angle_from(begin)
+            said = (
+                f"within {angle(most, up=True)} from {begin:g} s on; {said}" if begin < claim.numbers["settling"] else said
+            )
+        evidence = f"proved: {said}"
         verdict = compared(table, required, most, evidence, left_out=tuple(absent))
         verdicts.append(verdict if verdict.verdict == "met" else _open(table, required, verdict))
     return min(verdicts, key=lambda one: (one.verdict != "met", len(one.left_out)), default=None) or undecided(
@@ -183,16 +190,23 @@ def _grown(one: Issued, claim: Claim, until: float) -> str:
 def _late(scenario: Scenario, key: str, table: RequirementTable, claim: Claim) -> str:
     """Say why a claim of an ultimate bound does not cover the time, or the tolerances, of a requirement; empty where it
     does."""
-    settling, begin = claim.numbers["settling"], times_of(scenario, key, table).begin
-    tolerances = scenario.table.settling
+    settling, tolerances = claim.numbers["settling"], scenario.table.settling
     if table.metric == "settling_time":
         ends = claim.numbers["angle"] <= tolerances.attitude_tolerance and claim.numbers["rate"] <= tolerances.rate_tolerance
         return "" if ends else "the ultimate bound proved exceeds the tolerances of [settling]"
-    if str(table.metric).startswith("final"):
-        if table.in_mode is not None:
-            return "the last quarter of a mode is not known beforehand; use a peak after some time"
-        begin += 0.75 * (scenario.table.simulation.duration - begin)
-    return "" if settling <= begin else f"the ultimate bound is proved after {settling:.6g} s, not by {begin:g} s"
+    if str(table.metric).startswith("final") and table.in_mode is not None:
+        return "the last quarter of a mode is not known beforehand; use a peak after some time"
+    begin = _begin(scenario, key, table)
+    # Of the angle there is a bound at all times.
+    covered = settling <= begin or BOUNDS[str(table.metric)][2] == "angle"
+    return "" if covered else f"the ultimate bound is proved after {settling:.6g} s, not by {begin:g} s"
+
+
+def _begin(scenario: Scenario, key: str, table: RequirementTable) -> float:
+    """Return the time (s) from which a requirement is about the flight."""
+    begin = times_of(scenario, key, table).begin
+    late = str(table.metric).startswith("final")
+    return begin + 0.75 * (scenario.table.simulation.duration - begin) * late
 
 
 # --- by margins -------------------------------------------------------------------------------------------------------

@@ -50,6 +50,8 @@ class Flight:
     """All that is proved of the law on this spacecraft, initially and after faults."""
     departures: tuple[Mapping[str, tuple[Departure, ...]], ...] = ()
     """The departures of this flight from the proved claims of each certificate, by their kinds."""
+    covered: tuple[tuple[float, float] | None, ...] = ()
+    """The times (s) between which the claim of each certificate about the loop as it flies covers this flight."""
 
     modes: tuple[Begun, ...] = ()
     """The modes that flew, in order, for a law with modes."""

@@ -129,7 +129,7 @@ def _campaign(scenario: Scenario, folder: Path, tell: Tell) -> str:
     runs, done = scenario.table.campaign.runs * len(scenario.laws), Counter[str]()
 
     def notice(law: str, more: int, sought: Sought | None = None) -> None:
-        what, total = (f"{law} flies", runs) if sought is None else (f"worst {sought.name} of {law}", sought.flights)
+        what, total = (f"{law} flies", runs) if sought is None else (f"{sought.name} of {law}", sought.flights)
         key = "" if sought is None else what
         done[key] += more
         tell(done[key], total, what)

@@ -150,9 +150,9 @@ function guides(panel, plot, chart) {
     for (const [number, times, most] of chart.live ? [] : panel.bounds || []) {
       if (hidden.has(number)) continue;
       ctx.strokeStyle = report.laws[number].colour;
-      times.forEach((time, k) => {
-        const [from, until] = [time, times[k + 1] ?? x.max].map((t) => u.valToPos(t, "x", true));
-        const [high, next] = [most[k], most[k + 1] ?? most[k]].map((angle) => u.valToPos(angle, "y", true));
+      times.slice(0, -1).forEach((time, k) => {
+        const [from, until] = [time, times[k + 1]].map((t) => u.valToPos(t, "x", true));
+        const [high, next] = [most[k], most[k + 1]].map((angle) => u.valToPos(angle, "y", true));
         line([from, high], [until, high], [6, 4]);
         line([until, high], [until, next], [6, 4]);
       });

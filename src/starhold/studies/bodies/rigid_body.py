@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, final
 
 from starhold.algebra.quantity import Quantity
 from starhold.analysis.meter import recorded_of, says_valid
+from starhold.analysis.premise_notes import PREMISES, Masses
 from starhold.analysis.rigid_body import EXTRAS, METRICS, error_angle, make_meter, measure
 from starhold.analysis.transient import Limits, against_limits
 from starhold.laws.modes import mode_laws
@@ -77,8 +78,11 @@ class RigidBodyStudy(BodyStudy):
     def meter(
         self, scenario: Scenario, loop: ClosedLoop, gains: Any, extras: Sequence[str] = (), cones: Cones = NO_CONES
     ) -> Meter:
+        masses = None
+        if PREMISES in extras:
+            masses = Masses(loop.craft.inertia, () if loop.wheels is None else loop.wheels.axes)
         for extra in extras:
-            if extra not in EXTRAS:
+            if extra not in (*EXTRAS, PREMISES):
                 raise ValueError(f"{' or '.join(EXTRAS)}, not {extra}")
         settling = scenario.table.settling
         tolerances = settling.attitude_tolerance, settling.rate_tolerance
@@ -86,7 +90,7 @@ class RigidBodyStudy(BodyStudy):
         wheels = "wheel_momentum" in recorded_of(loop)
         more: Any = {"begins": begins_asked(scenario, loop.law), "fault": first_fault(scenario, loop)}
         more["estimated"] = says_valid(loop.composition())
-        more["spans"] = parts_asked(scenario, loop.law)
+        more |= {"spans": parts_asked(scenario, loop.law), "masses": masses}
         return make_meter(steps, loop.period, loop.limit, tolerances, extras, cones, still=still, wheels=wheels, **more)
 
     def metric_set(self, run: Recording) -> MetricSet:
@@ -112,12 +116,24 @@ class RigidBodyStudy(BodyStudy):
     def departures(self, issued: Issued, loop: ClosedLoop, run: Recording) -> dict[str, tuple[Departure, ...]]:
         from starhold.analysis.departure import departures
 
-        # A certificate ends where the loop changes next; the last of several events at one step decides.
-        latest = {event.step: event for event in loop.events if event.step * loop.period <= float(run["time"][-1])}
+        time = float(run["time"][-1])
         if issued.mode is not None:
-            return mode_departures(issued, run, min(latest, default=None))
-        last = min((step for step, event in latest.items() if _differs(event, issued)), default=None)
-        return departures(issued.certificate, issued.loop, run, issued.step, last)
+            begun = (event.step for event in loop.events if event.step * loop.period <= time)
+            return mode_departures(issued, run, min(begun, default=None))
+        return departures(issued.certificate, issued.loop, run, issued.step, self.ends(issued, loop, time))
+
+    def covered(self, issued: Issued, loop: ClosedLoop, run: Recording) -> tuple[float, float] | None:
+        from starhold.analysis.departure import covered
+
+        if issued.mode is not None:
+            return None
+        last = self.ends(issued, loop, float(run["time"][-1]))
+        return covered(issued.certificate, issued.loop, run, issued.step, last)
+
+    def ends(self, issued: Issued, loop: ClosedLoop, time: float) -> int | None:
+        # A certificate ends where the loop changes next; the last of several events at one step decides.
+        latest = {event.step: event for event in loop.events if event.step * loop.period <= time}
+        return min((step for step, event in latest.items() if _differs(event, issued)), default=None)
 
     def start_inside(self, issued: Issued) -> dict[str, bool]:
         return super().start_inside(issued) if issued.mode in (None, 1) and issued.before is None else {}

@@ -1,0 +1,79 @@
+"""Notes on the premises of a claim about a loop as it flies: how wrong what the law is told is, and how much momentum body
+and wheels have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from starhold.algebra.quaternion import relative
+from starhold.algebra.scalar import maximum
+from starhold.algebra.several import weighted
+from starhold.algebra.vector import Vector, add, apply, dot, subtract
+from starhold.analysis.meter import KINDS, TOLD, Window
+
+PREMISES = "premises"
+"""The name of these notes among the extras of a meter."""
+
+
+class Premises(NamedTuple):
+    """The largest of a window: the square of the sine of half the angle, and that of the rate, by which the attitude and the
+    rate that the law is told are off; the square of the momentum of body and wheels; a wheel's momentum; and how far q0 is
+    below zero."""
+
+    attitude: float
+    rate: float
+    momentum: float
+    wheel: float
+    other: float
+
+
+class Masses(NamedTuple):
+    """The inertia of the body (kg m2) and the axes of its wheels."""
+
+    inertia: Any
+    axes: tuple[Vector, ...]
+
+
+def begun(masses: Masses | None) -> Any:
+    """The notes before a flight; none where none are wanted."""
+    return () if masses is None else Premises(*(0.0,) * len(Premises._fields))
+
+
+def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
+    """The notes of an instant. What no part tells, the law is told exactly."""
+    if not seen:
+        return seen
+    attitude, rate = (quantities[name] for name in ("attitude", "rate"))
+    turned = relative(attitude, quantities.get(f"{TOLD}attitude", attitude))
+    off = subtract(quantities.get(f"{TOLD}rate", rate), rate)
+    total, rotors = apply(masses.inertia, rate), quantities.get("wheel_momentum", ())
+    total = add(total, weighted(rotors, masses.axes)) if rotors else total
+    return Premises(
+        maximum(seen.attitude, turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3]),
+        maximum(seen.rate, dot(off, off)),
+        maximum(seen.momentum, dot(total, total)),
+        _largest(seen.wheel, rotors),
+        maximum(seen.other, -quantities["attitude_error"][0]),
+    )
+
+
+def _largest(most: Any, rotors: Any) -> Any:
+    for momentum in rotors:
+        most = maximum(most, maximum(momentum, -momentum))
+    return most
+
+
+def windows(rows: Any) -> dict[str, Window]:
+    """The windows of notes that lie at these rows."""
+    if not rows:
+        return {}
+    return {
+        "told_attitude": Window(rows.attitude, KINDS["angle"], "error of the attitude that the law is told", "rad"),
+        "told_rate": Window(rows.rate, np.sqrt, "error of the rate that the law is told", "rad/s"),
+        "momentum": Window(rows.momentum, np.sqrt, "momentum of body and wheels", "N m s"),
+        "wheel_momentum": Window(rows.wheel, KINDS["number"], "momentum of a wheel", "N m s"),
+        "other_quaternion": Window(rows.other, KINDS["number"], "how far q0 is below zero", "1"),
+    }
