@@ -144,7 +144,7 @@ class _Flight:
         """Return arguments and kernel of a phase, made once for all its chunks."""
         if phase.first not in self._ready:
             numbers = Numbers.of(phase)
-            parts, more = self.loop.composition(), (self.like, numbers, self.loop.substeps)
+            parts, more = self.loop.composition(), (self.like, numbers, self.loop.substeps, True)
             kernel = make_kernel(one, parts, 1, *more, passes=self.passes)
             self._ready[phase.first] = Arguments(*numbers), kernel
         return self._ready[phase.first]

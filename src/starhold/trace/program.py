@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Any, NamedTuple, TypeAlias
 
-from starhold.algebra.operations import Operation
+from starhold.algebra.operations import NUMBER, Operation
 
 Value: TypeAlias = Any
 """The name of an earlier statement's result (a str), or a constant (a float, bool or int)."""
@@ -70,11 +70,13 @@ class Branch(NamedTuple):
 
 
 class Call(NamedTuple):
-    """The call sets refs = function(args)."""
+    """The call sets refs = function(args). Of several rows it is the function of each, all at once in short vectors: what a
+    parameter is in each row comes together in args, and what a result is in each in refs."""
 
     refs: tuple[tuple[str, str], ...]
     function: Function
     args: tuple[Value, ...]
+    rows: int = 1
 
 
 Block: TypeAlias = tuple[Any, ...]
@@ -129,6 +131,15 @@ def statements(block: Block) -> Iterator[Any]:
                 break
         else:
             blocks.pop()
+
+
+def results(s: Any) -> list[tuple[str, str]]:
+    """Return the names and kinds of what a statement makes."""
+    if isinstance(s, Op):
+        return [(s.ref, s.operation.gives)]
+    if isinstance(s, Load):
+        return [(s.ref, NUMBER)]
+    return [(slot.end, slot.kind) for slot in s.slots] if isinstance(s, Loop) else list(getattr(s, "refs", ()))
 
 
 def reads(block: Block) -> Iterator[Value]:
