@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from starhold.algebra.scalar import less, sqrt, where
-from starhold.algebra.several import each
+from starhold.algebra.several import each, folded
 from starhold.algebra.structured import Buffer, repeat
 from starhold.algebra.vector import multiply
 from starhold.algebra.words import bits_of, rotate_left, with_bits, word_and
@@ -94,6 +94,24 @@ def test_products_of_matrices_give_the_bits_of_plain_python():
 
     program = recorded(equation)
     assert [call.rows for call in calls(program)] == [3, 3]
+    both_give_the_bits(equation, program)
+
+
+def _first(a: Any, b: Any) -> Any:
+    return a * b, 2.0 * b
+
+
+def _next(pair: Any, a: Any, b: Any) -> Any:
+    return pair[0] + a * b, pair[1] - b
+
+
+def test_sums_of_rows_of_falling_length_give_the_bits_of_plain_python():
+    def equation(early, late):
+        rows = [[(early[m + j], late[m]) for j in range(5 - m)] for m in range(4)]
+        return (*(1e-9 * x for pair in folded(_first, _next, rows) for x in pair), *late[8:])
+
+    program = recorded(equation)
+    assert [call.rows for call in calls(program)] == [4, 4, 3, 2]
     both_give_the_bits(equation, program)
 
 

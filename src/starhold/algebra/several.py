@@ -6,7 +6,8 @@ processor flies one lane."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from starhold.algebra.scalar import Scalar
@@ -26,6 +27,19 @@ def each(function: Callable[..., _Value], columns: tuple[tuple[Any, ...], ...], 
     if recorder is not None and recorder.by_rows:
         return recorder.each(function, rows, shared)
     return tuple(function(*row, *shared) for row in rows)
+
+
+def folded(begin: Callable[..., Any], further: Callable[..., Any], rows: Sequence[Sequence[Any]]) -> Iterable[Any]:
+    """Return further(... further(begin(*row[0]), *row[1]) ..., *row[-1]) of every row, each as it is asked for, or all at
+    once. No row is longer than the one before."""
+    recorder = RECORDER.get()
+    if recorder is None or not recorder.by_rows:
+        return (reduce(lambda total, item: further(total, *item), row[1:], begin(*row[0])) for row in rows)
+    totals = each(begin, tuple(zip(*(row[0] for row in rows), strict=True)))
+    for place in range(1, len(rows[0])):
+        items = [row[place] for row in rows if len(row) > place]
+        totals = each(further, (totals[: len(items)], *zip(*items, strict=True))) + totals[len(items) :]
+    return totals
 
 
 def weighted(weights: tuple[Scalar, ...], vectors: tuple[Vector, ...]) -> Vector:

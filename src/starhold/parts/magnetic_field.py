@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 from starhold.algebra.circular import cosine_sine
 from starhold.algebra.scalar import Scalar, plus
 from starhold.algebra.scalar import sqrt as root
-from starhold.algebra.several import each
+from starhold.algebra.several import each, folded
 from starhold.algebra.vector import Vector, dot, scale
 from starhold.algebra.words import number_of
 from starhold.parts.epoch import Date, date_text, days_of, sidereal, spun, turned
@@ -180,22 +180,17 @@ def earth_fixed(position: Vector, params: Numbers) -> Vector:
         weights = params.cosines[0]
         return reduce(plus, (weights[j] * harmonics[j + 2 - order][order] for j in range(highest)))
 
-    # Sums over degrees of an order's weights times the harmonics of one degree more, of the next order, the last and it.
-    sums: tuple[Any, ...] = ()
-    for j in range(highest):
-        orders = range(1, highest + 1 - j)
-        columns = (
-            tuple(params.cosines[m][j] for m in orders),
-            tuple(params.sines[m][j] for m in orders),
-            *(tuple(harmonics[j + 1 - ahead][m + ahead] for m in orders) for ahead in (1, -1, 0)),
-        )
-        sums = each(_further, (sums[: len(orders)], *columns)) + sums[len(orders) :] if j else each(_begun, columns)
-    circles = tuple(powers[2:]), tuple(powers[:highest]), tuple(powers[1 : highest + 1])
-    first = along(1)
-    c, s = powers[1]
+    first, (c, s) = along(1), powers[1]
     east, north, up = first * c, first * s, along(0)
-    for of_order in zip(sums, *circles, strict=True):
-        terms = _gradient(*of_order)
+    orders = range(1, highest + 1)
+    weights = [[*zip(params.cosines[m], params.sines[m], strict=True)] for m in orders]
+    rows = [
+        [(g, h, harmonics[j][m + 1], harmonics[j + 2][m - 1], harmonics[j + 1][m]) for j, (g, h) in enumerate(pairs)]
+        for m, pairs in zip(orders, weights, strict=True)
+    ]
+    # Sums over degrees of an order's weights times the harmonics of one degree more, of the next order, the last and it.
+    for m, sums in zip(orders, folded(_begun, _further, rows), strict=True):
+        terms = _gradient(sums, powers[m + 1], powers[m - 1], powers[m])
         east, north, up = east + terms[0], north + terms[1], up + terms[2]
     return (east, north, up)
 

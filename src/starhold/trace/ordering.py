@@ -34,14 +34,19 @@ def _ordered(block: Block) -> Block:
     missing, ends = [0] * len(inner), [*range(len(inner))]
     last = -1
     for place, s in enumerate(inner):
-        before = {makers[name] for name in reads((s,)) if name in makers}
+        # Most statements are operations.
+        single = isinstance(s, Op)
+        before = {makers[name] for name in (s.args if single else reads((s,))) if name in makers}
         for other in before:
             ends[other] = place
-        if _touches(s):
-            # What reads and writes memory keeps its order.
-            before |= {last} - {-1}
-            last = place
-        makers |= {name: place for name, _ in results(s)}
+        if single:
+            makers[s.ref] = place
+        else:
+            makers.update((name, place) for name, _ in results(s))
+            if _touches(s):
+                # What reads and writes memory keeps its order.
+                before |= {last} - {-1}
+                last = place
         missing[place] = len(before)
         for other in before:
             users[other].append(place)

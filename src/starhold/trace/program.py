@@ -197,7 +197,10 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
     """Return the block with settled slots replaced by the values in `names`, which grows."""
     result: list[Any] = []
     for s in block:
-        if isinstance(s, Loop):
+        if isinstance(s, (Op, Call)):
+            if not names.keys().isdisjoint(s.args):
+                s = s._replace(args=tuple(renamed(x, names) for x in s.args))
+        elif isinstance(s, Loop):
             slots = [slot._replace(before=renamed(slot.before, names)) for slot in s.slots]
             for slot in slots:
                 if _settles(slot):
@@ -207,8 +210,6 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
             s = Loop(s.counter, renamed(s.most, names), kept, head, renamed(s.done, names), body)
         elif isinstance(s, Branch):
             s = Branch(renamed(s.truth, names), _settled(s.body, names))
-        elif isinstance(s, (Op, Call)):
-            s = s._replace(args=tuple(renamed(x, names) for x in s.args))
         elif isinstance(s, Load):
             s = s._replace(index=renamed(s.index, names))
         else:
