@@ -1,15 +1,20 @@
 """Operations on tuples of any length: an equation applied to every element, or a weighted sum.
 
 When recorded they are unrolled for the lengths of their arguments: a step with any number of wheels costs no more than
-one written by hand. The elements may differ in shape from one to the next."""
+one written by hand. The elements may differ in shape from one to the next; those of one shape fly in short vectors where a
+processor flies one lane."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable, Sequence
+from functools import reduce
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import Vector, add, scale
+from starhold.algebra.structured import RECORDER
+
+if TYPE_CHECKING:
+    from starhold.algebra.vector import Vector
 
 _Value = TypeVar("_Value")
 
@@ -18,12 +23,28 @@ def each(function: Callable[..., _Value], columns: tuple[tuple[Any, ...], ...], 
     """Return (function(c[0][0], c[1][0], ..., *shared), function(c[0][1], ...), ...): the equation applied to the first
     elements of all columns, to the second ones, and so on. The columns are of one length; `shared` goes to every call as it
     is."""
-    return tuple(function(*row, *shared) for row in zip(*columns, strict=True))
+    rows, recorder = [*zip(*columns, strict=True)], RECORDER.get()
+    if recorder is not None and recorder.by_rows:
+        return recorder.each(function, rows, shared)
+    return tuple(function(*row, *shared) for row in rows)
+
+
+def folded(begin: Callable[..., Any], further: Callable[..., Any], rows: Sequence[Sequence[Any]]) -> Iterable[Any]:
+    """Return further(... further(begin(*row[0]), *row[1]) ..., *row[-1]) of every row, each as it is asked for, or all at
+    once. No row is longer than the one before."""
+    recorder = RECORDER.get()
+    if recorder is None or not recorder.by_rows:
+        return (reduce(lambda total, item: further(total, *item), row[1:], begin(*row[0])) for row in rows)
+    totals = each(begin, tuple(zip(*(row[0] for row in rows), strict=True)))
+    for place in range(1, len(rows[0])):
+        items = [row[place] for row in rows if len(row) > place]
+        totals = each(further, (totals[: len(items)], *zip(*items, strict=True))) + totals[len(items) :]
+    return totals
 
 
 def weighted(weights: tuple[Scalar, ...], vectors: tuple[Vector, ...]) -> Vector:
     """Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one."""
-    total = scale(weights[0], vectors[0])
-    for weight, vector in zip(weights[1:], vectors[1:], strict=True):
-        total = add(total, scale(weight, vector))
-    return total
+    x, y, z = (weights[0] * component for component in vectors[0])
+    for weight, (a, b, c) in zip(weights[1:], vectors[1:], strict=True):
+        x, y, z = x + weight * a, y + weight * b, z + weight * c
+    return (x, y, z)

@@ -41,11 +41,13 @@ def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
 
 def leaves(value: Any) -> Iterator[Any]:
     """Yield the leaves of a nested value in order; None and () have none."""
-    if isinstance(value, tuple):
-        for part in cast(tuple[Any, ...], value):
-            yield from leaves(part)
-    elif value is not None:
-        yield value
+    left = [value]
+    while left:
+        part = left.pop()
+        if isinstance(part, tuple):
+            left += cast(tuple[Any, ...], part)[::-1]
+        elif part is not None:
+            yield part
 
 
 def mapped(value: Any, leaf: Callable[[Any], Any]) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 from starhold.algebra.scalar import Scalar, Truth, absolute, both, clip, divide, less, maximum, minimum, sign, sqrt, where
+from starhold.algebra.several import each
 
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
@@ -119,12 +120,22 @@ def transpose(m: Matrix) -> Matrix:
 
 def multiply(a: Matrix, b: Matrix) -> Matrix:
     """Return the matrix product a b."""
-    return (column(b, a[0]), column(b, a[1]), column(b, a[2]))
+    x, y, z = each(_by_row, (a,), b)
+    return (x, y, z)
+
+
+def _by_row(row: Vector, b: Matrix) -> Vector:
+    return column(b, row)
 
 
 def combine(c: Scalar, a: Matrix, d: Scalar, b: Matrix) -> Matrix:
     """Return the matrix c a + d b."""
-    return (add(scale(c, a[0]), scale(d, b[0])), add(scale(c, a[1]), scale(d, b[1])), add(scale(c, a[2]), scale(d, b[2])))
+    x, y, z = each(_combined, (a, b), c, d)
+    return (x, y, z)
+
+
+def _combined(a: Vector, b: Vector, c: Scalar, d: Scalar) -> Vector:
+    return add(scale(c, a), scale(d, b))
 
 
 def skew(a: Vector) -> Matrix:

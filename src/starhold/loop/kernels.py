@@ -63,6 +63,8 @@ def form(value: Any) -> Any:
 
 
 def _form(value: Any, known: dict[str, int]) -> Any:
+    if isinstance(value, float):
+        return "number"
     if isinstance(value, tuple):
         shared = _in_common(value)  # pyright: ignore
         equal = () if shared is None else (known.setdefault(shared, len(known)),)
@@ -71,7 +73,7 @@ def _form(value: Any, known: dict[str, int]) -> Any:
         return ("buffer", value.size)
     if isinstance(value, np.ndarray):
         return "lanes"
-    return "number" if isinstance(value, float) else (type(value), value)
+    return (type(value), value)
 
 
 def _in_common(value: tuple[Any, ...]) -> str | None:

@@ -17,6 +17,7 @@ from starhold.parts.part import Part
 from starhold.parts.random import Silent
 from starhold.trace.program import Loop, Program, Store
 from starhold.trace.recording import Cells, Recorder
+from starhold.trace.rows import RowRecorder
 from starhold.trace.sharing import differing, split
 
 _HALVES: dict[Any, tuple[tuple[Kernel, Kernel], tuple[int, ...]]] = {}
@@ -45,11 +46,12 @@ def _put(cells: Cells, base: Any, state: Any) -> None:
         cells[base + place] = number
 
 
-def one(step: Step, carry: Any, numbers: Numbers, substeps: int) -> Program:
+def one(step: Step, carry: Any, numbers: Numbers, substeps: int, by_rows: bool = False) -> Program:
     """The flight of one lane, or of a vector of lanes that draw the same random numbers, recorded: `groups` times
     `each` control steps from `first` on, with a sample of the step number `place` of every group, written from the row
-    `row` on. A lane stops when its motion diverges; its last carry stays in `carry`."""
-    recorder = Recorder()
+    `row` on. A lane stops when its motion diverges; its last carry stays in `carry`. by_rows: of one lane, with
+    `each` of several rows at once."""
+    recorder = RowRecorder() if by_rows else Recorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
         record = recorder.memory("record", lanes=True, writable=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import reduce
 from math import factorial, sqrt
 from typing import Any, NamedTuple, TypeAlias
 
 from starhold.algebra.circular import cosine_sine
-from starhold.algebra.scalar import Scalar
+from starhold.algebra.scalar import Scalar, plus
 from starhold.algebra.scalar import sqrt as root
+from starhold.algebra.several import each, folded
 from starhold.algebra.vector import Vector, dot, scale
 from starhold.algebra.words import number_of
 from starhold.parts.epoch import Date, date_text, days_of, sidereal, spun, turned
@@ -157,39 +159,64 @@ def earth_fixed(position: Vector, params: Numbers) -> Vector:
     square = RADIUS * RADIUS * inverse_square
     # Powers of x + i y, and the factors that go with them.
     powers: list[tuple[Scalar, Scalar]] = [(1.0, 0.0)]
-    for _ in range(highest + 1):
+    begins: list[Scalar] = [root(square)]
+    for m in range(highest + 1):
         c, s = powers[-1]
         powers.append((x * c - y * s, x * s + y * c))
-    columns: list[list[Scalar]] = []
-    begin = root(square)
-    for m in range(highest + 2):
-        column = [begin]
-        for n in range(m + 1, highest + 2):
-            higher = (2.0 * n - 1.0) * z * column[-1]
-            column.append(higher if n == m + 1 else higher - float((n + m - 1) * (n - m - 1)) * square * column[-2])
-        columns.append(column)
-        begin = (2.0 * m + 1.0) * begin
-    east = north = up = 0.0
-    for m, (g, h) in enumerate(zip(params.cosines, params.sines, strict=True)):
-        least = max(m, 1)
-
-        def total(weights: tuple[Scalar, ...], order: int, least: int = least) -> Scalar:
-            """The sum over degrees of the weights times the harmonics of one degree more, of an order."""
-            harmonics = columns[order][least + 1 - order :]
-            result = weights[0] * harmonics[0]
-            for weight, harmonic in zip(weights[1:], harmonics[1:], strict=False):
-                result = result + weight * harmonic
-            return result
-
-        c, s = powers[m + 1]
-        if m == 0:
-            outer = total(g, 1)
-            east, north, up = outer * c, outer * s, total(g, 0)
+        begins.append((2.0 * m + 1.0) * begins[-1])
+    # The harmonics of degree m + k and order m are the m-th of the k-th list.
+    harmonics: list[tuple[Scalar, ...]] = [tuple(begins)]
+    for k in range(1, highest + 2):
+        rising = tuple(2.0 * (m + k) - 1.0 for m in range(highest + 2 - k))
+        last = harmonics[-1][: len(rising)]
+        if k == 1:
+            harmonics.append(each(_first, (rising, last), z))
             continue
-        outer_g, outer_h, inner_g, inner_h = total(g, m + 1), total(h, m + 1), total(g, m - 1), total(h, m - 1)
-        below_c, below_s = powers[m - 1]
-        east = east + 0.5 * ((outer_g * c + outer_h * s) - (inner_g * below_c + inner_h * below_s))
-        north = north + 0.5 * ((outer_g * s - outer_h * c) + (inner_g * below_s - inner_h * below_c))
-        here_c, here_s = powers[m]
-        up = up + (total(g, m) * here_c + total(h, m) * here_s)
+        falling = tuple(float((2 * m + k - 1) * (k - 1)) for m in range(len(rising)))
+        harmonics.append(each(_higher, (rising, falling, last, harmonics[-2][: len(rising)]), z, square))
+
+    def along(order: int) -> Scalar:
+        """The sum over degrees of the weights of order 0 times the harmonics of one degree more, of an order."""
+        weights = params.cosines[0]
+        return reduce(plus, (weights[j] * harmonics[j + 2 - order][order] for j in range(highest)))
+
+    first, (c, s) = along(1), powers[1]
+    east, north, up = first * c, first * s, along(0)
+    orders = range(1, highest + 1)
+    weights = [[*zip(params.cosines[m], params.sines[m], strict=True)] for m in orders]
+    rows = [
+        [(g, h, harmonics[j][m + 1], harmonics[j + 2][m - 1], harmonics[j + 1][m]) for j, (g, h) in enumerate(pairs)]
+        for m, pairs in zip(orders, weights, strict=True)
+    ]
+    # Sums over degrees of an order's weights times the harmonics of one degree more, of the next order, the last and it.
+    for m, sums in zip(orders, folded(_begun, _further, rows), strict=True):
+        terms = _gradient(sums, powers[m + 1], powers[m - 1], powers[m])
+        east, north, up = east + terms[0], north + terms[1], up + terms[2]
     return (east, north, up)
+
+
+def _first(rising: Scalar, last: Scalar, z: Scalar) -> Scalar:
+    return rising * z * last
+
+
+def _higher(rising: Scalar, falling: Scalar, last: Scalar, before: Scalar, z: Scalar, square: Scalar) -> Scalar:
+    return rising * z * last - falling * square * before
+
+
+def _begun(g: Scalar, h: Scalar, *harmonics: Scalar) -> tuple[Scalar, ...]:
+    return tuple(weight * harmonic for harmonic in harmonics for weight in (g, h))
+
+
+def _further(sums: tuple[Scalar, ...], *columns: Scalar) -> tuple[Scalar, ...]:
+    return tuple(map(plus, sums, _begun(*columns)))
+
+
+def _gradient(sums: tuple[Scalar, ...], *circles: tuple[Scalar, Scalar]) -> Vector:
+    """Return what an order adds to the field."""
+    outer_g, outer_h, inner_g, inner_h, here_g, here_h = sums
+    (c, s), (below_c, below_s), (here_c, here_s) = circles
+    return (
+        0.5 * ((outer_g * c + outer_h * s) - (inner_g * below_c + inner_h * below_s)),
+        0.5 * ((outer_g * s - outer_h * c) + (inner_g * below_s - inner_h * below_c)),
+        here_g * here_c + here_h * here_s,
+    )

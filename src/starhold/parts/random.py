@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 from starhold.algebra.scalar import Scalar, sqrt, where
+from starhold.algebra.several import each
 from starhold.algebra.vector import Vector, scale
 from starhold.algebra.words import (
     MASK,
@@ -137,7 +138,8 @@ def normals(key: tuple[Word, Word], step: Word, first: int, count: int) -> tuple
     """The Gaussians with the numbers `first` to `first` + `count` - 1 of a step, independent of each other and of those of
     any other step, run or seed; key: (seed, run). Each depends on its own number alone; 2 n and 2 n + 1 share a call."""
     words = [threefry(key, (step, call)) for call in range(first // 2, (first + count + 1) // 2)]
-    return tuple(x for a, b in words for x in transform(a, b))[first % 2 :][:count]
+    pairs = each(transform, tuple(zip(*words, strict=True)))
+    return tuple(x for pair in pairs for x in pair)[first % 2 :][:count]
 
 
 def normal_vector(key: tuple[Word, Word], step: Word, first: int, deviation: Scalar) -> Vector:

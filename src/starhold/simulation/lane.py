@@ -103,8 +103,10 @@ def fly(
     loop: ClosedLoop, steps: int, record_every: int = 1, run: int | None = None, progress: Progress | None = None
 ) -> tuple[NDArray[np.float64], Carry]:
     """Return the samples (number, sample) of a trajectory, one row for each number of a sample, and its final carry."""
-    like, phases = loop.carry(), loop.phases(steps)
-    width = len(flatten(make_step(loop.composition()).sample(like, 0, loop.setup())))
+    setup, phases = loop.setup(), loop.phases(steps)
+    like = loop.carry(setup=setup)
+    first = flatten(make_step(loop.composition()).sample(like, 0, setup))
+    width, place = len(first), len(flatten(like)) - 1
     samples = _room(steps, record_every, width)
     carry, done, chunk = np.array(numbers_of(like)), 0, steps if progress is None else 1
     flight = _Flight(loop, like, record_every, loop.run if run is None else run, samples, steps >= LONG or None)
@@ -119,10 +121,10 @@ def fly(
             progress(done, steps)
             # Chunks grow until each takes about the reporting interval; the result does not depend on where they end.
             chunk = max(1, int(chunk * min(8.0, PULSE / max(time.perf_counter() - begun, 1e-9))))
-        lost_at = state_of(carry, like).lost_at
+        lost_at = float(carry[place])
         if lost_at == 0.0:
             # No command was decided; the only sample is the start.
-            samples[0] = flatten(make_step(loop.composition()).sample(like, 0, loop.setup()))
+            samples[0] = first
         if lost_at >= 0.0:
             return samples[: max(1, int(np.ceil(lost_at / record_every)))].T, state_of(carry, like)
     if steps % record_every == 0 and phases:
@@ -144,7 +146,7 @@ class _Flight:
         """Return arguments and kernel of a phase, made once for all its chunks."""
         if phase.first not in self._ready:
             numbers = Numbers.of(phase)
-            parts, more = self.loop.composition(), (self.like, numbers, self.loop.substeps)
+            parts, more = self.loop.composition(), (self.like, numbers, self.loop.substeps, True)
             kernel = make_kernel(one, parts, 1, *more, passes=self.passes)
             self._ready[phase.first] = Arguments(*numbers), kernel
         return self._ready[phase.first]

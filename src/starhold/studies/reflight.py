@@ -32,6 +32,7 @@ from starhold.studies.questions import Asked, ask
 from starhold.trace.calling import record_call
 from starhold.trace.handles import Handle
 from starhold.trace.program import Load, Program, statements
+from starhold.trace.rows import unrolled
 
 Array: TypeAlias = NDArray[np.float64]
 Values: TypeAlias = dict[str, Any]
@@ -244,7 +245,7 @@ def _reflown(
             kept = []
     derive, places = _recorded(scenario, loop, {key: by_key[key] for key in kept}) if kept else (None, ())
     carry, phase = loop.carry(), loop.phases(steps)[0]
-    program = make_program(one, loop.composition(), carry, Numbers.of(phase), loop.substeps)
+    program = unrolled(make_program(one, loop.composition(), carry, Numbers.of(phase), loop.substeps, True))
     lost = len(flatten(carry)) - 1
     return Reflown(
         entry.name,

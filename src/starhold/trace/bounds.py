@@ -309,6 +309,8 @@ class _Walk:
         self.places[s.memory] = min(low, ends[0]), max(high, ends[1])
 
     def _call(self, s: Call, known: dict[str, Form]) -> _Part:
+        if s.rows > 1:
+            return _Part(self._block(s.function, s.function.body, {}).each.times(s.rows), {})
         pairs = zip(s.function.params, s.args, strict=True)
         inner = {name: self._form(value, known) for (name, kind), value in pairs if kind == INDEX}
         self.depth += 1

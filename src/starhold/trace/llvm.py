@@ -8,7 +8,7 @@ import struct
 from typing import Any, ClassVar
 
 from starhold.algebra.operations import INDEX, NUMBER, STATIC, TRUTH, UNIFORM, WORD
-from starhold.trace.program import Branch, Call, Function, Load, Loop, Op, Program, Store, Value
+from starhold.trace.program import Branch, Call, Function, Load, Loop, Op, Program, Store, Value, statements
 
 ATTRIBUTES = 'attributes #0 = { nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512" }'
 
@@ -55,6 +55,11 @@ class Types:
         return text if self.width == 1 or kind in (INDEX, UNIFORM) else f"splat ({single} {text})"
 
 
+def _width(s: Call) -> int:
+    """Return the width of the vectors that a call of several rows takes."""
+    return 1 << (s.rows - 1).bit_length()
+
+
 class Llvm:
     """The printer makes the text of a program. Memories are pointers: a memory of lanes holds W numbers for each index."""
 
@@ -80,14 +85,15 @@ class Llvm:
         return "\n".join(self.text) + "\n"
 
     def _declarations(self) -> list[str]:
-        t = self.types
-        number, word = t.names[NUMBER], t.names[WORD]
-        declarations = [
-            f"declare {number} @llvm.sqrt.{t.suffix}({number})",
-            f"declare {word} @llvm.fshl.{t.words}({word}, {word}, {word})",
-        ]
+        t, declarations = self.types, list[str]()
+        calls = (s for function in self.program.functions for s in statements(function.body) if isinstance(s, Call))
+        for types in (t, *(Types(width) for width in sorted({_width(s) for s in calls if s.rows > 1}))):
+            number, word = types.names[NUMBER], types.names[WORD]
+            declarations.append(f"declare {number} @llvm.sqrt.{types.suffix}({number})")
+            declarations.append(f"declare {word} @llvm.fshl.{types.words}({word}, {word}, {word})")
         if t.width > 1:
-            declarations.append(f"declare void @llvm.masked.store.{t.suffix}.p0({number}, ptr, i32, {t.names[TRUTH]})")
+            given = f"{t.names[NUMBER]}, ptr, i32, {t.names[TRUTH]}"
+            declarations.append(f"declare void @llvm.masked.store.{t.suffix}.p0({given})")
         return declarations
 
     # Text of the parts.
@@ -145,7 +151,14 @@ class Llvm:
         main = function is self.program.main
         if main:
             self._begin(function)
-        self._block(function.body, "%.mask" if masked else None)
+        # Vectors of several rows: where each of their numbers is, what is there before the first loop, and vectors of that.
+        self.places, self.vectors = dict[Value, tuple[str, int, int]](), dict[Any, str]()
+        begin = next((k for k, s in enumerate(function.body) if isinstance(s, Loop)), 0)
+        self.early = {s.ref for s in function.body[:begin] if isinstance(s, (Op, Load))}
+        self._block(function.body[:begin], "%.mask" if masked else None)
+        self.hoisted, place = list[str](), len(self.lines)
+        self._block(function.body[begin:], "%.mask" if masked else None)
+        self.lines[place:place] = self.hoisted
         gives, out = self._gives(function), ""
         for place, (value, kind) in enumerate(function.outs):
             out = self._let(f"insertvalue {gives} {out or 'poison'}, {self._typed(value, kind)}, {place}")
@@ -160,7 +173,55 @@ class Llvm:
             if kind == WORD:
                 self._splat("i64", f"%{name}.given", WORD, f"%{name}")
 
+    def _rows(self, s: Call) -> None:
+        """Do the operations of a function of numbers on vectors of rows."""
+        single, self.types = self.types, Types(_width(s))
+        names: dict[Value, str] = {}
+        for k, (name, kind) in enumerate(s.function.params):
+            names[name] = self._column(s.args[k * s.rows : (k + 1) * s.rows], kind, single)
+        for op in s.function.body:
+            names[op.ref] = self._new()
+            self._op(op._replace(ref=names[op.ref][1:], args=tuple(names.get(x, x) for x in op.args)))
+        made = [names[x] for x, _ in dict.fromkeys(s.function.outs) if x in names and (x, _) not in s.function.params]
+        for k, (name, kind) in enumerate(s.refs):
+            vector, row = made[k // s.rows], k % s.rows
+            self._put(f"%{name} = extractelement {self.types.names[kind]} {vector}, i64 {row}")
+            self.places[name] = vector, row, self.types.width
+        self.types = single
+
+    def _column(self, values: tuple[Value, ...], kind: str, single: Types) -> str:
+        """Return the vector of a number, truth or word in several rows."""
+        width, many = self.types.width, self.types.names[kind]
+        sources = [self.places.get(x, ("", 0, 0)) for x in values]
+        if len({(name, size) for name, _, size in sources}) == 1 and (vector := sources[0][0]):
+            rows = [row for _, row, _ in sources]
+            if sources[0][2] == width and rows == [*range(len(rows))]:
+                return vector
+            wide = many.replace(f"<{width} ", f"<{sources[0][2]} ")
+            mask = ", ".join([f"i32 {row}" for row in rows] + ["i32 poison"] * (width - len(rows)))
+            return self._let(f"shufflevector {wide} {vector}, {wide} poison, <{width} x i32> <{mask}>")
+        # What does not change in the loops is put together before them.
+        early = all(not isinstance(x, str) or x in self.early for x in values)
+        if early and (values, kind) in self.vectors:
+            return self.vectors[values, kind]
+        lines, self.lines = self.lines, list[str]() if early else self.lines
+        one = single.names[kind]
+        constants = [single.constant(x, kind) if not isinstance(x, str) else "poison" for x in values]
+        constants += ["poison"] * (width - len(values))
+        vector = "<" + ", ".join(f"{one} {x}" for x in constants) + ">"
+        for row, x in enumerate(values):
+            if isinstance(x, str):
+                vector = self._let(f"insertelement {many} {vector}, {one} %{x}, i64 {row}")
+        if early:
+            self.hoisted += self.lines
+            self.lines = lines
+            self.vectors[values, kind] = vector
+        return vector
+
     def _call(self, s: Call, mask: str | None) -> None:
+        if s.rows > 1:
+            self._rows(s)
+            return
         given = [f"ptr %{memory.name}" for memory in self.program.memories]
         given += [self._typed(value, kind) for value, (_, kind) in zip(s.args, s.function.params, strict=True)]
         given += [f"i64 {name}" for name in self.passed]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.trace.llvm import Llvm
+from starhold.trace.ordering import ordered
 from starhold.trace.program import Call, Program, statements
 
 ALIGNMENT = 64
@@ -59,11 +60,12 @@ def load(program: Program, width: int, passes: bool | None = None) -> Callable[.
     passes: whether LLVM optimises the printed text before it makes code of it; None: where that has been measured to
     pay, on many lanes where registers are plenty and nothing is called. On one lane it takes longer than the code itself
     for some thousandths of the time of a step, or a fifth where matrices are solved: it pays from `LONG` steps on."""
-    calls = any(isinstance(s, Call) for s in statements(program.main.body))
+    calls = any(isinstance(s, Call) and s.rows == 1 for s in statements(program.main.body))
     if passes is None:
         passes = width > 1 and _is_wide() and not calls
     llvm, machine = _llvm(), _machine()
-    module = llvm.parse_assembly(str(Llvm(program, width)))
+    # Of many lanes, and of a law that solves an optimization, other things take the time.
+    module = llvm.parse_assembly(str(Llvm(program if width > 1 or calls else ordered(program), width)))
     module.verify()
     if passes:
         options = llvm.create_pipeline_tuning_options(speed_level=3)

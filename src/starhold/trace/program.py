@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Any, NamedTuple, TypeAlias
 
-from starhold.algebra.operations import Operation
+from starhold.algebra.operations import NUMBER, Operation
 
 Value: TypeAlias = Any
 """The name of an earlier statement's result (a str), or a constant (a float, bool or int)."""
@@ -70,11 +70,13 @@ class Branch(NamedTuple):
 
 
 class Call(NamedTuple):
-    """The call sets refs = function(args)."""
+    """The call sets refs = function(args). Of several rows it is the function of each, all at once in short vectors: what a
+    parameter is in each row comes together in args, and what a result is in each in refs."""
 
     refs: tuple[tuple[str, str], ...]
     function: Function
     args: tuple[Value, ...]
+    rows: int = 1
 
 
 Block: TypeAlias = tuple[Any, ...]
@@ -129,6 +131,15 @@ def statements(block: Block) -> Iterator[Any]:
                 break
         else:
             blocks.pop()
+
+
+def results(s: Any) -> list[tuple[str, str]]:
+    """Return the names and kinds of what a statement makes."""
+    if isinstance(s, Op):
+        return [(s.ref, s.operation.gives)]
+    if isinstance(s, Load):
+        return [(s.ref, NUMBER)]
+    return [(slot.end, slot.kind) for slot in s.slots] if isinstance(s, Loop) else list(getattr(s, "refs", ()))
 
 
 def reads(block: Block) -> Iterator[Value]:
@@ -186,7 +197,10 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
     """Return the block with settled slots replaced by the values in `names`, which grows."""
     result: list[Any] = []
     for s in block:
-        if isinstance(s, Loop):
+        if isinstance(s, (Op, Call)):
+            if not names.keys().isdisjoint(s.args):
+                s = s._replace(args=tuple(renamed(x, names) for x in s.args))
+        elif isinstance(s, Loop):
             slots = [slot._replace(before=renamed(slot.before, names)) for slot in s.slots]
             for slot in slots:
                 if _settles(slot):
@@ -196,8 +210,6 @@ def _settled(block: Block, names: dict[str, Value]) -> Block:
             s = Loop(s.counter, renamed(s.most, names), kept, head, renamed(s.done, names), body)
         elif isinstance(s, Branch):
             s = Branch(renamed(s.truth, names), _settled(s.body, names))
-        elif isinstance(s, (Op, Call)):
-            s = s._replace(args=tuple(renamed(x, names) for x in s.args))
         elif isinstance(s, Load):
             s = s._replace(index=renamed(s.index, names))
         else:

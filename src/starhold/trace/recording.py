@@ -68,12 +68,12 @@ class Cells:
 class _Names:
     """Every variable gets a name of its own."""
 
-    def __init__(self, taken: Iterable[str]) -> None:
-        self._taken, self._counts = {*taken, *RESERVED}, Counter[str]()
+    def __init__(self, taken: Iterable[str], mark: str = "") -> None:
+        self._mark, self._taken, self._counts = mark, {*taken, *RESERVED}, Counter[str]()
 
     def new(self, hint: str) -> str:
         """Return the hint, with a number where it is taken. None ends in an underscore, which marks values after a loop."""
-        name = hint = hint.strip("_") or "x"
+        name = hint = (hint.strip("_") or "x") + self._mark
         while name in self._taken or name == "t":
             self._counts[hint] += 1
             name = f"{hint}{self._counts[hint]}"
@@ -106,6 +106,9 @@ class Path:
 
 class Recorder:
     """A recorder keeps operations on handles as a tree of blocks, with equal operations kept once."""
+
+    by_rows = False
+    """Whether `each` of `algebra.several` is recorded for several rows at once."""
 
     def __init__(self) -> None:
         self.memories: list[Memory] = []
@@ -296,7 +299,9 @@ class Recorder:
         self._open[-1].append(Call(refs, function, tuple(_ref(flat[place]) for place in kept)))
         return self._handles(out, list(refs))
 
-    def _define(self, equation: Callable[..., Any], values: tuple[Any, ...]) -> tuple[Function, list[int], Any]:
+    def _define(
+        self, equation: Callable[..., Any], values: tuple[Any, ...], mark: str = ""
+    ) -> tuple[Function, list[int], Any]:
         params: list[tuple[str, str]] = []
 
         def formal(word: str) -> Callable[[Any], Any]:
@@ -311,7 +316,8 @@ class Recorder:
             return make
 
         words = [*inspect.signature(equation).parameters]
-        with self._alone():
+        words += ["x"] * (len(values) - len(words))
+        with self._alone(mark):
             given = [mapped(value, formal(word)) for value, word in zip(values, words, strict=True)]
             body, out = self._block(equation, *given)
         outs = self._refs(out)
@@ -321,13 +327,13 @@ class Recorder:
         kept = [place for place, (name, _) in enumerate(params) if name in used]
         params = [params[place] for place in kept]
         doc = inspect.cleandoc(equation.__doc__ or "")
-        return Function(self._titles.new(equation.__name__), doc, tuple(params), body, ends), kept, out
+        return Function(self._titles.new(getattr(equation, "__name__", "x")), doc, tuple(params), body, ends), kept, out
 
     @contextmanager
-    def _alone(self) -> Generator[None]:
+    def _alone(self, mark: str) -> Generator[None]:
         """Record a function apart from what is open."""
         outer = self._open, self._seen, self._names
-        self._open, self._seen, self._names = [], [], _Names(memory.name for memory in self.memories)
+        self._open, self._seen, self._names = [], [], _Names((memory.name for memory in self.memories), mark)
         yield
         self._open, self._seen, self._names = outer
 
@@ -364,14 +370,14 @@ class Recorder:
                     pairs.append((self._names.new(label), kind_of(leaf)))
         return pairs
 
-    def _handles(self, like: Any, names: list[tuple[str, str]]) -> Any:
+    def _handles(self, like: Any, names: list[tuple[Value, str]]) -> Any:
         source = iter(names)
 
         def make(leaf: Any) -> Any:
             if isinstance(leaf, Buffer):
                 return leaf
             name, kind = next(source)
-            return HANDLES[kind](self, name)
+            return HANDLES[kind](self, name) if isinstance(name, str) else name
 
         return mapped(like, make)
 

@@ -5,8 +5,6 @@ A value differs where it comes from the number of the lane or of the block of la
 another that differs. Only numbers are handed over: truths, words and indices are cheap, and computed in both parts.
 """
 
-from typing import Any
-
 from starhold.algebra.operations import NUMBER, OPERATIONS
 from starhold.trace.program import (
     Block,
@@ -20,6 +18,7 @@ from starhold.trace.program import (
     Value,
     live_names,
     prune,
+    results,
     statements,
     writes,
 )
@@ -68,14 +67,14 @@ def split(program: Program, most: int) -> tuple[Program, Program]:
             for s in block
             if not writes((s,))
         )
-        return tuple(s for s in shared if (made := _made(s)) and names.isdisjoint(name for name, _ in made))
+        return tuple(s for s in shared if (made := results(s)) and names.isdisjoint(name for name, _ in made))
 
     slots = [slot for slot in loop.slots if slot.name not in names and slot.kind == NUMBER]
-    wholly = (_made(s) for s in loop.body if s in same((s,)) and not isinstance(s, Load))
+    wholly = (results(s) for s in loop.body if s in same((s,)) and not isinstance(s, Load))
     moved = {name for made in wholly if all(kind == NUMBER for _, kind in made) for name, _ in made}
 
     def lane(handed: list[str], last: list[str]) -> Block:
-        body = tuple(s for s in loop.body if moved.isdisjoint(name for name, _ in _made(s)))
+        body = tuple(s for s in loop.body if moved.isdisjoint(name for name, _ in results(s)))
         loads = (Load(name, ROWS, f"row.{k}") for k, name in enumerate(handed))
         differ = tuple(slot for slot in loop.slots if slot not in slots)
         turn = loop._replace(slots=differ, body=(*_places(loop, len(handed)), *loads, *body))
@@ -106,15 +105,6 @@ def _loops(program: Program) -> tuple[Loop, int]:
     (blocks,) = (s for s in program.main.body if isinstance(s, Loop))
     counts = {name for name, _ in program.main.params}
     return blocks, next(k for k, s in enumerate(blocks.body) if isinstance(s, Loop) and s.most in counts)
-
-
-def _made(s: Any) -> list[tuple[str, str]]:
-    """Return the names and kinds of what a statement makes."""
-    if isinstance(s, Op):
-        return [(s.ref, s.operation.gives)]
-    if isinstance(s, Load):
-        return [(s.ref, NUMBER)]
-    return [(slot.end, slot.kind) for slot in s.slots] if isinstance(s, Loop) else list(getattr(s, "refs", ()))
 
 
 def _places(loop: Loop, width: int) -> list[Op]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import reduce
+from functools import partial, reduce
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -243,7 +243,8 @@ def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels, rub
 
     def braked(*given: Scalar) -> Numbers:
         columns = (given, momentum, inverse, wheels.axes, wheels.viscous, wheels.coulomb)
-        return each(_braked, columns, rate)
+        # Row by row: within a branch short vectors are put together and taken apart for too little.
+        return tuple(map(partial(_braked, rate), *columns))
 
     given = when(rubs, braked, *given)
     return tuple(map(plus, given, sticking(momentum, rate, wheels))) if wheels.sticking else given
@@ -259,7 +260,7 @@ def _driven(command: Scalar, momentum: Scalar, torque_limit: Scalar, momentum_li
 
 
 def _braked(
-    given: Scalar, momentum: Scalar, inverse: Scalar, axis: Vector, viscous: Scalar, coulomb: Scalar, rate: Vector
+    rate: Vector, given: Scalar, momentum: Scalar, inverse: Scalar, axis: Vector, viscous: Scalar, coulomb: Scalar
 ) -> Scalar:
     speed = momentum * inverse - dot(axis, rate)
     return given - viscous * speed - coulomb * clip(speed * (1.0 / CREEP), 1.0)
