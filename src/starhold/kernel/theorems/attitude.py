@@ -135,8 +135,6 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         said.append("comes to rest on target")
     else:
         demand(level is None or not loop.any_inertia, "a level for every inertia needs a sign of the quaternion")
-        if level is not None:
-            yield "the other equilibrium is inside", Exceeds(level, away.number)
         level_there = [V.slope(name).at(loop.opposite | loop.still) for name in loop.driven if strictly]
         yield from vanish("V is level at the other equilibrium", level_there)
         repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])

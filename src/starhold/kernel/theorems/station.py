@@ -58,7 +58,6 @@ def ends_on_circle(claim: Claim) -> Proof:
     circle = yield from weighed(loop)
     c, heavy = circle.square, circle.weights[0]
     level, inner, outer, velocity = (numbers[name] for name in ("level", "inner", "outer", "velocity"))
-    yield "the level is positive", Exceeds(level)
     yield "centre outside", Exceeds(heavy * c * c, level)
     yield from falls(loop, circle)
     yield from clear_of_bodies(loop, circle, level)
@@ -124,7 +123,7 @@ def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
     roots = {name: p for p, name in loop.ring.roots.items() if name != circle.size}
     if roots or loop.ring.divisors:
         square = loop.claim.numbers["clear"] ** 2
-        yield "off the line of the bodies", Exceeds(min(square, circle.square - square))
+        yield "off the line of the bodies", Exceeds(circle.square, square)
         yield "off it on the whole set", Exceeds(circle.weights[0] * (circle.square - square) ** 2, level)
         apart = dot(loop.x[1:], loop.x[1:]) - square
         for k, p in enumerate(roots.values()):
@@ -202,7 +201,6 @@ def returns_with_limited_control(claim: Claim) -> Proof:
         yield f"{name} can be held", Exceeds(limit, abs(u.at({**resting_state, "x1": 0, "v1": 0}).number))
     yield from clipped(loop, limit)
     off = max(abs(k - low * c), abs(k - high * c))
-    yield "the point repels", Exceeds(min(p, low, c, width))
     yield "its root", Exceeds(min(p - low * low, high * high - p))
     yield "the limit turns motions round", Exceeds(limit, p * width)
     yield "the law turns motions round", Exceeds(c * low * width - off * reach, p * width)
