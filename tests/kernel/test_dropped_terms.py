@@ -242,3 +242,30 @@ def test_what_momentum_adds_to_the_motion_that_noise_causes_is_that_of_flights(l
         assert np.abs(noise[:12] - wanted[:, 12:]).max() < 1e-6 * np.abs(D).max()
         assert np.allclose(motion[-6:, 12:], E, atol=1e-6 * np.abs(E).max())
         assert min(np.abs(D).max(), np.abs(E).max()) > 1e-3
+
+
+@pytest.mark.parametrize("law", leading(["lyapunov", "wheel"], 0))
+def test_what_momentum_adds_to_the_torque_and_to_the_drift_of_the_rates_is_in_the_tube(law):
+    """The one law makes no torque of it, and so the rates drift farther; the other makes up for it."""
+    held, oracle = quiet(law)
+    size, M, N = Fraction(oracle.numbers["momentum"]), floats(held.near.rates), floats(held.N)
+    flight, tube = Flight(held, oracle, momentum=float(size)), held.tube(held.region((held.s + held.G[3][3]) / 2**40))
+    X, drifts = floats(tube.region.X), np.array([float(x) for x in tube.drift])
+    asks, beyond = np.array([float(tube.sizes[f"u{k + 1}"]) for k in range(3)]), []
+    for axis in range(3):
+        for sign in (1, -1):
+            spin = [N @ floats(part) for part in spinning(held.loop, [sign * size * (axis == k) for k in range(3)])]
+            commanded, moved = (M + np.hstack([one, 0 * one]) for one in (spin[0], spin[0] + spin[1]))
+            H = sign * float(size) * np.eye(3)[:, [axis] * 3]
+            for rows, most in ((commanded, asks), (moved, drifts)):
+                # For each axis the state from which it goes farthest.
+                x = X @ rows.T / np.sqrt(np.diag(rows @ X @ rows.T)) * (1.0 - 1e-9)
+                q = np.concatenate([[np.sqrt(1.0 - (x[TURN] ** 2).sum(0))], x[TURN]])
+                if most is asks:
+                    far = N @ flight.asked(q, x[RATE], *[0 * H] * 3, H)
+                else:
+                    far = flight.after(x, H)[0][RATE] - x[RATE]
+                assert (np.abs(np.diag(far)) <= most).all()
+                linear = np.sqrt(np.diag(M @ X @ M.T)) * (1.0 if most is asks else flight.h)
+                beyond.append((np.abs(np.diag(far)) / linear).max())
+    assert max(beyond) > 1.05

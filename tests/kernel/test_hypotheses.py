@@ -248,6 +248,16 @@ def test_jumps_of_the_sign_that_raise_v_keep_a_body_spinning(jumps):
     assert speeds.max() > 3.0 if jumps else speeds.max() < 0.6
 
 
+def test_the_sign_never_changes_on_a_set_without_half_turns():
+    """With a mixed term a half turn with a rate has a lower V than a half turn at rest."""
+    for share, failed in ((0.97, set()), (0.99, {"the sign never changes"})):
+        claim, programs = case(V=leaning(0.1), theorem="converges strictly", taken=["shortest sign"], level=2 * K * share)
+        assert failing(claim, programs) == failed
+    q, zero = np.eye(4)[1], np.zeros(3)
+    V = Oracle({"programs": programs}, claim).lyapunov
+    assert V(q, -0.1 * q[1:]) - V(np.eye(4)[0], zero) < 2 * K * share
+
+
 NEARER = {"surface": 0.37, "end.angle": 0.37, "end.rate": 0.37}
 """Shares of what is claimed of the end: no body stays so near the target when it is pushed as told."""
 LAYER = {
