@@ -19,12 +19,12 @@ from starhold.certification.evidence.attitude import (
     Loop,
     descent,
 )
-from starhold.certification.evidence.finding import floats, obligations
+from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.isotropic import find_isotropic
 from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.refuted import against_sampling
 from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, settled, solved
-from starhold.certification.matrices import fraction
+from starhold.certification.matrices import floats, fraction
 from starhold.certification.subject import Subject
 from starhold.kernel.loops import HANDED, HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError, plus, scalar, times

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property
 from math import inf, isfinite, sqrt
 from typing import Any
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
-from starhold.certification.evidence.finding import NotFoundError, complete, read
+from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
 from starhold.certification.subject import Subject, above
 from starhold.certification.unmodelled import driven_errors
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
@@ -154,20 +153,12 @@ class RecordedLoop:
     def claim(self, theorem: str, taken: list[str], V: str | None, **numbers: Any) -> dict[str, Any]:
         """Return a claim without evidence."""
         roles = self.roles | ({} if V is None else {"lyapunov": V})
-        exact = {name: str(Fraction(x)) for name, x in numbers.items()}
-        return {
-            "theorem": theorem,
-            "taken": taken,
-            "programs": roles,
-            "subject": self.subject,
-            "numbers": exact,
-            "evidence": {},
-        }
+        return unproved(theorem, roles, self.subject, numbers, taken)
 
     @property
     def by_digest(self) -> dict[str, Any]:
         """The programs by their digests."""
-        return {digest(program): program for program in self.programs}
+        return by_digests(self.programs)
 
     def scales(self, V: str | None, level: float | None = None) -> dict[str, float]:
         """Return the approximate size of variables on {V <= level}."""
