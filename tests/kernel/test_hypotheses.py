@@ -304,6 +304,14 @@ def test_a_law_that_cancels_what_wheels_store_is_not_taken_to_slide():
         failing(*case(cancelling, theorem=REACHES, s=surface(0.1), taken=["wheels"]))
 
 
+@pytest.mark.parametrize("theorem", ["converges", "points"])
+def test_the_sign_is_chosen_in_one_way(theorem):
+    claim, programs = case(theorem=theorem, taken=["shortest sign", "hysteresis"], level=0.1, hysteresis=0.5)
+    claim["numbers"] |= {"period": "1", "outside": "0", "error": "0", "highest": "1"}
+    with pytest.raises(RefusedError, match="in two ways"):
+        failing(claim, programs)
+
+
 @pytest.mark.slow
 def test_a_law_that_clips_falls_in_every_case():
     for beyond, failed in ((0.0, set()), (0.5, set()), (-2.0, {"V is non-increasing"})):

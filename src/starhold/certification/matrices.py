@@ -35,12 +35,18 @@ def number(x: Any) -> float:
     return float(x.mid()) if isinstance(x, arb) else float(x)
 
 
+def inverted(a: Rows) -> Rows:
+    """Return the inverse of a definite matrix."""
+    Account.open()
+    return inverse(a)
+
+
 def least(a: Rows) -> Fraction:
     """Return a number just below the smallest eigenvalue of a symmetric matrix; positive where the matrix is definite."""
     Account.open()
     if definite(a):
         # A small one beside a large one would drown in the rounding of the large one.
-        return 1 / greatest(inverse(a))
+        return 1 / greatest(inverted(a))
     return -greatest(negative(a))
 
 

@@ -10,12 +10,12 @@ from flint import arb, fmpq
 
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
-from starhold.certification.matrices import fraction, greatest, least, matrix_of, negative, number, rows
+from starhold.certification.matrices import fraction, greatest, inverted, least, matrix_of, negative, number, rows
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.certification.unmodelled import assumed_away, envelope_of, is_read
 from starhold.errors import InputError
-from starhold.kernel.numbers import Rows, inverse, plus
+from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Envelope
@@ -158,8 +158,9 @@ def _finite(x: float) -> float | None:
 
 def above(x: Any) -> float:
     """A float not below a rational."""
-    value = number(x)
-    return value if exact(value) >= x else float(np.nextafter(value, np.inf))
+    exactly = fraction(x)
+    value = float(exactly)
+    return value if value >= exactly else float(np.nextafter(value, np.inf))
 
 
 def below(x: Any) -> float:
@@ -171,7 +172,7 @@ def exact_craft(inertia: Any, torque_limit: Any, gravity: Any) -> Craft:
     """A craft of constant polynomials with the exact inverse of its inertia; a limit that is infinite stays a variable."""
     full = rows(tensor(inertia))
     limit = Polynomial.constant(torque_limit) if np.isfinite(torque_limit) else Polynomial.variable("limit")
-    return Craft(as_tuple(full), as_tuple(inverse(full)), limit, Polynomial.constant(gravity))  # pyright: ignore
+    return Craft(as_tuple(full), as_tuple(inverted(full)), limit, Polynomial.constant(gravity))  # pyright: ignore
 
 
 def as_tuple(matrix: Rows) -> Matrix | Vector:

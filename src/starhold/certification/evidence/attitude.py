@@ -13,7 +13,7 @@ import numpy as np
 
 from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.recorded import TURNS, RecordedLoop, curvature, sign_words
-from starhold.certification.evidence.squares import cofactors, largest_number, once, posed, solved, squares
+from starhold.certification.evidence.squares import combined, largest_number, once, posed, solved, squares
 from starhold.kernel.loops import HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
@@ -96,7 +96,7 @@ class Loop(RecordedLoop):
             self.failed[STRICTLY] = str(reason)
             return False
         steps = [o.p - base.p for o in stepped]
-        others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, 18), strict=True) for c in parts]
+        others = combined(base, base.p, 18)
         unit = (
             sqrt(float(abs(steps[0].terms[("q1", "w1")]) / tensor(self.loop.craft.inertia).max())) if steps[0].terms else 1.0
         )
@@ -270,5 +270,4 @@ def highest(o: Squares, scales: Mapping[str, float]) -> float | None:
     a multiple of -p and sums of squares. It was made for the level 1."""
     *bounds, inside = o.known
     V, p = 1 - inside, o.p
-    others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
-    return largest_number(posed(V, [-p, *bounds], others, o.z), scales, Poly({(): Fraction(1)}))
+    return largest_number(posed(V, [-p, *bounds], combined(o, p, len(o.z)), o.z), scales, Poly({(): Fraction(1)}))

@@ -23,7 +23,7 @@ from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.isotropic import find_isotropic
 from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.refuted import against_sampling
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, settled, solved
+from starhold.certification.evidence.squares import combined, largest_number, posed, rounded, settled, solved
 from starhold.certification.matrices import floats, fraction
 from starhold.certification.subject import Subject
 from starhold.kernel.loops import HANDED, HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS
@@ -205,7 +205,7 @@ def find_near(loop: Loop, tolerance: float | None = None) -> None:
         loop.failed[NEARBY] = str(reason)
         return
     A, B, D = stiff.p - base.p, leaning.p - base.p, leaning.p - shifted.p
-    others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, KNOWN), strict=True) for c in parts]
+    others = combined(base, base.p, KNOWN)
     z, J = base.z[:KNOWN], tensor(loop.loop.craft.inertia)
     unit = sqrt(float(abs(A.terms[("q1", "w1")]) / J.max())) if A.terms else 1.0
     scales = {f"w{k}": unit for k in (1, 2, 3)}
