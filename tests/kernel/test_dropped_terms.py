@@ -18,9 +18,9 @@ from starhold.certification.unmodelled import Pushes
 from starhold.kernel.held import MOMENTA, Held
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import spinning
-from starhold.kernel.numbers import Account, scalar
-from starhold.kernel.polynomials import Poly
-from starhold.kernel.regions import ANGLE, AT_REST, RATE, SPEED, STATE, TURN
+from starhold.kernel.numbers import Account, RefusedError, scalar
+from starhold.kernel.polynomials import Poly, var
+from starhold.kernel.regions import ANGLE, AT_REST, RATE, SPEED, STATE, TURN, felt
 from starhold.kernel.theorems.noise import driven
 from starhold.scenario.building import build
 from tests.kernel.flights import Around, Surroundings, along, cross, stepped
@@ -269,3 +269,9 @@ def test_what_momentum_adds_to_the_torque_and_to_the_drift_of_the_rates_is_in_th
                 linear = np.sqrt(np.diag(M @ X @ M.T)) * (1.0 if most is asks else flight.h)
                 beyond.append((np.abs(np.diag(far)) / linear).max())
     assert max(beyond) > 1.05
+
+
+def test_a_vector_whose_size_is_not_told_is_not_taken_for_zero():
+    assert felt([var("w1")], "r", {}) == 0
+    with pytest.raises(RefusedError, match="is not told"):
+        felt([var("h1") * var("w1")], "w", {"h1": Fraction(1)})
