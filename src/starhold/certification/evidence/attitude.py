@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from starhold.certification.evidence.finding import obligations
-from starhold.certification.evidence.recorded import TURNS, RecordedLoop, curvature, sign_words
+from starhold.certification.evidence.recorded import RecordedLoop, curvature, sign_words
 from starhold.certification.evidence.squares import combined, largest_number, once, posed, solved, squares
 from starhold.kernel.loops import HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError
@@ -208,9 +208,7 @@ class Loop(RecordedLoop):
 
     def cap(self, theorem: str, words: list[str], V: str) -> float:
         """Return a level below V where other rests are, or where the sign of the quaternion changes."""
-        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
-        values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        return min(values[1:]) if SHORTEST in words else inf
+        return min(self.resting(V)[1:]) if SHORTEST in words else inf
 
     def largest_level(self, claim: dict[str, Any], V: str, cap: float) -> Fraction | None:
         """Return the largest level that keeps all limits of a claim, and stays below the cap."""

@@ -178,11 +178,14 @@ class RecordedLoop:
             self.forms[V] = AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
         return self.forms[V]
 
+    def resting(self, V: str | None) -> list[float]:
+        """Return V at rest at `TURNS`."""
+        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
+        return [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
+
     def potential(self, V: str | None) -> float:
         """Return the largest of V at rest."""
-        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
-        values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        return max(*map(abs, values), 1e-300) if V is not None else 1.0
+        return max(*map(abs, self.resting(V)), 1e-300) if V is not None else 1.0
 
     def kinetic(self, V: str | None) -> list[float]:
         """Return twice the sizes of the coefficients of the squares of the rates in V."""
