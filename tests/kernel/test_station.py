@@ -229,6 +229,24 @@ def test_only_this_hypothesis_fails_and_a_root_has_no_value_somewhere(steps, cle
         StationOracle(content, claim).holds()
 
 
+VALUELESS = [
+    # Zero times what has no value at x = 0, where no body is, at most places, or at the place that is told.
+    ("rest", [["divide", 0, 1], ["minus", -1, -1], ["plus", "out", -1]], "a divisor may be zero"),
+    ("x leaves", [["divide", 0, 1], ["minus", -1, -1], ["plus", "out", -1]], "a divisor may be zero"),
+    ("rest", [["product", 0, 0], ["sqrt", -1], ["divide", 1, -1], ["minus", -1, -1], ["plus", "out", -1]], "may be zero"),
+    ("rest", [["product", 0, 1], ["sqrt", -1], ["minus", -1, -1], ["plus", "out", -1]], "a root may have no value"),
+    ("limited axis", [["divide", 0, 1], ["minus", -1, -1], ["plus", "out", -1]], "a divisor may be zero"),
+    ("deficit", [["divide", 0, 0], ["minus", -1, -1], ["plus", "out", -1]], "divides by zero there"),
+]
+
+
+@pytest.mark.parametrize(("name", "steps", "match"), VALUELESS)
+def test_zero_times_what_has_no_value_is_none(name, steps, match):
+    content = push(made(name), "law", 0, steps)
+    with pytest.raises(RefusedError, match=match):
+        check(text(content))
+
+
 def test_an_axis_that_another_one_moves_may_return():
     """x'' = -3x' - y, y'' = x - 2y - 3y': along x nothing pulls back but y, and all motions come to rest."""
     x, y, z, u, v, w = (Polynomial.variable(f"{name}.{k}") for name in ("position", "velocity") for k in range(3))
