@@ -167,10 +167,10 @@ CASES = {
         sliding(0.1), theorem=REACHES, s=surface(0.1), taken=["outside torque"], outside_0=0.2, outside_1=0.0, outside_2=0.0
     ),
 }  # fmt: skip
-"""Two more are below, and others in the tests of pointing, noise and stations. No false claim is known for the others: the kernel itself compares V with the level at the other
-equilibrium; that V is level there makes the proof short; of rests at half turns only, and of the circle only, the other
-hypotheses show what they say of all V that they admit; beyond a layer one axis loses more than the others gain, far less
-than is lost where bodies and pushes could show it; the sign of a loop that points, and the response of its acceleration."""
+"""Two more are below, and others in the tests of pointing, noise and stations. No false claim is known for the rest: the
+kernel itself compares V with the level at the other equilibrium; that V is level there makes the proof short; of rests at
+half turns only, and of the circle only, the other hypotheses show what they say of all V that they admit; beyond a layer
+one axis loses more than the others gain; the sign of a loop that points, and the response of its acceleration."""
 
 
 @pytest.mark.parametrize("hypothesis", CASES)
