@@ -17,7 +17,7 @@ from starhold.certification.proofs import checked
 from starhold.kernel.check import check
 from starhold.kernel.held import Held
 from starhold.kernel.loops import AttitudeLoop
-from starhold.kernel.numbers import Account, root, up
+from starhold.kernel.numbers import Account, RefusedError, root, up
 from starhold.kernel.polynomials import Poly, most, total
 from starhold.kernel.regions import STATE, Region, least_form
 from starhold.kernel.theorems.pointing import periods
@@ -251,6 +251,26 @@ FALSE = {
     "end of the rate": lambda numbers, told: numbers.update({"end.rate": 0.4 * numbers["end.rate"]}),
     "settling": lambda numbers, told: numbers.update(settling=numbers["settling"] / 50),
 }
+
+
+UNTOLD = [
+    *(("level", "cubesat", key, value) for key, value in (("tau", "0"), ("beta", "0"), ("beta", "401/100"), ("end", "0"))),
+    *(("ellipsoid", "calm", key, value) for key, value in (("rate", "1"), ("reach", "0"), ("shares", ["0", "1/4", "1/4"]))),
+    ("ellipsoid", "calm", "shares", ["1/2", "1/4", "1/4"]),
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "key", "value"), UNTOLD)
+def test_numbers_without_a_sense_are_refused(kind, name, key, value):
+    """Else some would be divided by zero, and more than all of V would be lost in a period."""
+    content = contents("flying", name)
+    told = content["claims"][0]["evidence"]
+    if kind == "ellipsoid":
+        shape = [[str(int(i == k)) for k in range(6)] for i in range(6)]
+        told["ellipsoids"] = [{"shape": shape, "shares": ["1/4"] * 3, "rate": "1/2", "reach": "2"}]
+    told[f"{kind}s"][0][key] = value
+    with pytest.raises(RefusedError, match=f"an? {kind} is not properly told"):
+        check(text(content))
 
 
 def falsified(hypothesis):

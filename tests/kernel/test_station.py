@@ -10,7 +10,7 @@ import pytest
 from starhold.algebra.polynomial import Polynomial
 from starhold.certification.invariant.theorems import program
 from starhold.kernel.check import check
-from starhold.kernel.numbers import RefusedError
+from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import digest
 from tests.kernel.certificates import failing, rekeyed, text
 from tests.kernel.mutations import refusals
@@ -99,6 +99,7 @@ FALSE = [
     ("limited axis", "numbers", {"boundary": "2/5"}, "nothing returns from beyond"),
     ("deficit", "numbers", {"limit.norm": "7/2"}, "more than the limit"),
     ("deficit", "numbers", {"control": "100"}, "control"),
+    ("deficit", "numbers", {"z": "2", "control": "7/2"}, "on the circle"),
     ("relay", "numbers", {"radius": "1"}, "another circle"),
     ("rest", "subject", {"gains.k_x": "8"}, "returns"),
     ("rest", "subject", {"gains.k_velocity.1": "-1"}, "returns"),
@@ -114,7 +115,11 @@ def test_only_this_hypothesis_fails_and_the_claim_is_false(name, part, changed, 
     assert not all(StationOracle(content, claim, seed).holds() for seed in range(3))
 
 
-# Steps that come after a program's own: an operand counts from the first of the program, or names an output.
+# Steps that come after a program's own: an operand counts from the first of the program, or back from the step, or names an
+# output.
+DISTANCE = [["product", 1, 1], ["product", 2, 2], ["plus", -1, -2], ["product", 0, 0], ["plus", -1, -2]]
+ROOTED = [["sqrt", -1], ["minus", -1, -1], ["plus", "out", -1]]
+"""What adds nothing, but where the last has no root has no value."""
 PUSHED = [
     ("relay", "law", 0, [["constant", "1"], ["plus", "out", -1]], "the plane is not left"),
     ("relay", "law", 1, [["constant", "1000"], ["plus", "out", -1]], "the drift"),
@@ -124,7 +129,26 @@ PUSHED = [
     ("limited axis", "field", 0, [["constant", "1"], ["plus", "out", -1]], "the field along X"),
     ("limited axis", "law", 0, [["constant", "1"], ["plus", "out", -1]], "the law along X"),
     ("limited axis", "law", 1, [["constant", "1000"], ["plus", "out", -1]], "Y can be held"),
-]
+    ("limited axis", "law", 2, [["constant", "1000"], ["plus", "out", -1]], "Z can be held"),
+    ("circle", "law", 0, [["plus", "out", 1]], "x is on its own"),
+    # A limit that lets twice as much act on one side, or nothing.
+    ("limited axis", "limited", 0,
+     [["plus", 5, 5], ["less", 0, -1], ["select", -1, -2, 0], ["select", 4, 3, -1]], "limited at least"),
+    ("limited axis", "limited", 0,
+     [["plus", 3, 3], ["less", -1, 0], ["select", -1, -2, 0], ["select", 6, 5, -1]], "limited at most"),
+    ("limited axis", "limited", 0,
+     [["constant", "0"], ["less", "out", -1], ["select", -1, "out", -2]], "limited near from below"),
+    ("limited axis", "limited", 0,
+     [["constant", "0"], ["less", -1, "out"], ["select", -1, "out", -2]], "limited near from above"),
+]  # fmt: skip
+
+
+MULTIPLIERS = {
+    "limited at most": {"limited near from below 1": ["0", "32"], "limited near from above 1": ["0", "96"]},
+    "limited near from below": {"limited near from above 0": ["0", "0", "4"]},
+    "limited near from above": {"limited near from below 0": ["0", "0", "4"]},
+}
+"""Evidence that an interior point does not find, because it has no interior."""
 
 
 def push(content, role, place, steps):
@@ -133,8 +157,8 @@ def push(content, role, place, steps):
     program = content["programs"][claim["programs"][role]]
     for name, *operands in steps:
         last = len(program["inputs"]) + len(program["steps"])
-        known = {"out": program["outputs"][place], -1: last - 1}
-        program["steps"].append([name, *(operands if name == "constant" else (known.get(k, k) for k in operands))])
+        back = {"out": program["outputs"][place], -1: last - 1, -2: last - 2}
+        program["steps"].append([name, *(operands if name == "constant" else (back.get(k, k) for k in operands))])
     program["outputs"][place] = last
     return rekeyed(content)
 
@@ -143,8 +167,84 @@ def push(content, role, place, steps):
 def test_only_this_hypothesis_about_a_program_fails_and_the_claim_is_false(name, role, place, steps, hypothesis):
     content = push(made(name), role, place, steps)
     (claim,) = content["claims"]
+    told = MULTIPLIERS.get(hypothesis, {})
+    claim["evidence"] |= {key: {"multipliers": m, "cofactors": [], "gram": [["0"]]} for key, m in told.items()}
     assert failing(claim, content["programs"]) == {hypothesis}
     assert not all(StationOracle(content, claim, seed).holds() for seed in range(3))
+
+
+def test_the_circle_that_asks_for_more_is_that_of_the_errors():
+    """Errors that vanish at a place off the circle, where the law asks for more."""
+    content = push(made("deficit"), "errors", 0, [["constant", "3/2"], ["product", 1, -1], ["minus", "out", -1]])
+    (claim,) = content["claims"]
+    claim["numbers"] |= {"z": "2", "control": "7/2"}
+    assert failing(claim, content["programs"]) == {"the errors are those of a circle"}
+    assert not StationOracle(content, claim).holds()
+
+
+def test_the_slope_of_the_field_has_the_root_that_is_told():
+    """The law damps as for a point that repels more."""
+    content = made("limited axis")
+    (claim,) = content["claims"]
+    claim["subject"]["gains.k_x"] = "30"
+    root = str(30 / rational(claim["subject"]["gains.k_velocity.0"]))
+    claim["numbers"] |= {"root.low": root, "root.high": root}
+    assert failing(claim, content["programs"]) == {"its root"}
+    assert not StationOracle(content, claim).holds()
+
+
+def test_errors_of_the_velocity_that_make_v_smaller_grow():
+    """y'' and z'' for which V = f1^2 - f2^2 + f3^2 falls, while f2 grows."""
+    x, y, z, u, v, w = (Polynomial.variable(f"{name}.{k}") for name in ("position", "velocity") for k in range(3))
+    f1, f2, f3 = y * y + z * z - 1, v + z, w - y
+    control = -1 * x - 2 * u, 2 * f1 * y + f2 - w, -2 * f1 * z - f3 + v
+    V = (f1 * f1 - f2 * f2 + f3 * f3) / 2
+    functions = {"field": (0 * x,) * 3, "law": control, "errors": (f1, f2, f3), "lyapunov": (V,)}
+    names = [f"{name}.{k}" for name in ("position", "velocity") for k in range(3)]
+    roles = {role: program(parts, names) for role, parts in functions.items()}
+    for role in ("law", "errors", "lyapunov"):
+        roles[role]["inputs"] = [f"measurement.{name}" for name in names]
+    content = made("circle")
+    (claim,) = content["claims"]
+    claim |= {"programs": {role: digest(one) for role, one in roles.items()}, "subject": {}}
+    content["programs"] = {digest(one): one for one in roles.values()}
+    assert failing(claim, content["programs"]) == {"V is positive"}
+    assert not StationOracle(content, claim).holds()
+
+
+@pytest.mark.parametrize(
+    ("steps", "clear", "hypothesis"),
+    [
+        ([["product", 0, 1]], "1/2", "a root has a value"),
+        ([*DISTANCE, ["constant", "1/2"], ["minus", -2, -1]], "4/5", "off it on the whole set"),
+        ([*DISTANCE, ["constant", "2"], ["minus", -2, -1]], "11/5", "off the line of the bodies"),
+    ],
+)
+def test_only_this_hypothesis_fails_and_a_root_has_no_value_somewhere(steps, clear, hypothesis):
+    content = push(made("full"), "field", 0, [*steps, *ROOTED])
+    (claim,) = content["claims"]
+    claim["numbers"]["clear"] = clear if "off" in hypothesis else claim["numbers"]["clear"]
+    assert failing(claim, content["programs"]) == {hypothesis}
+    with pytest.raises(ValueError, match=r"math domain error|nonnegative"):
+        StationOracle(content, claim).holds()
+
+
+VALUELESS = [
+    # Zero times what has no value at x = 0, where no body is, at most places, or at the place that is told.
+    ("rest", [["divide", 0, 1], ["minus", -1, -1], ["plus", "out", -1]], "a divisor may be zero"),
+    ("x leaves", [["divide", 0, 1], ["minus", -1, -1], ["plus", "out", -1]], "a divisor may be zero"),
+    ("rest", [["product", 0, 0], ["sqrt", -1], ["divide", 1, -1], ["minus", -1, -1], ["plus", "out", -1]], "may be zero"),
+    ("rest", [["product", 0, 1], ["sqrt", -1], ["minus", -1, -1], ["plus", "out", -1]], "a root may have no value"),
+    ("limited axis", [["divide", 0, 1], ["minus", -1, -1], ["plus", "out", -1]], "a divisor may be zero"),
+    ("deficit", [["divide", 0, 0], ["minus", -1, -1], ["plus", "out", -1]], "divides by zero there"),
+]
+
+
+@pytest.mark.parametrize(("name", "steps", "match"), VALUELESS)
+def test_zero_times_what_has_no_value_is_none(name, steps, match):
+    content = push(made(name), "law", 0, steps)
+    with pytest.raises(RefusedError, match=match):
+        check(text(content))
 
 
 def test_an_axis_that_another_one_moves_may_return():

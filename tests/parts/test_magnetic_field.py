@@ -33,6 +33,16 @@ def computed(positions, numbers):
     return np.array([earth_fixed(tuple(position), numbers) for position in positions.tolist()])
 
 
+def test_what_rows_lack_is_zero_and_there_is_no_more_than_their_highest_degree():
+    left_out = {(2, 1), (3, 0)}
+    zeroed = tuple((n, m, *([0.0] * 4 if (n, m) in left_out else given)) for n, m, *given in ROWS)
+    told = prepared(NEW_YEAR, rows=tuple(row for row in ROWS if row[:2] not in left_out))
+    assert told == prepared(NEW_YEAR, rows=zeroed)
+    highest = ROWS[-1][0]
+    for numbers in told[:2]:
+        assert list(map(len, numbers)) == [highest + 1 - max(m, 1) for m in range(highest + 1)]
+
+
 def test_with_all_coefficients_it_is_the_field_of_ppigrf():
     for epoch in (NEW_YEAR, (2027.0, 7.0, 3.0, 18.0, 0.0, 0.0)):
         expected = reference(places(), datetime(*(int(part) for part in epoch)))

@@ -51,10 +51,15 @@ def texts(identifiers: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(assumption(name).text for name in identifiers))
 
 
+def as_it_starts(loop: ClosedLoop) -> Any:
+    """Return what the law measures as a loop starts, without errors."""
+    loop = loop.without("sensor", "estimator")
+    return make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
+
+
 def cancels(loop: ClosedLoop) -> bool:
     """Return whether the law subtracts the modelled torque from its command, as tested at an arbitrary start."""
-    loop = loop.without("sensor", "estimator")
-    measurement = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
+    measurement = as_it_starts(loop)
     memory = loop.law.remember(loop.gains, loop.craft, loop.period)
     more = 0.01 * loop.craft.torque_limit if math.isfinite(loop.craft.torque_limit) else 1.0
     # From rest on target, where clipped and switching laws are farthest from saturation.

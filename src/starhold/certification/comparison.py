@@ -63,7 +63,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
     if claim["theorem"] == POINTS:
-        envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(exact(numbers.get("momentum", 0))))
+        envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
         pushed = pushes(loop, envelope).numbers
         if not numbers.keys().isdisjoint(CHANGE):
             # Without both a torque may turn over at once.

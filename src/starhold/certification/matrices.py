@@ -1,104 +1,76 @@
-"""Definite matrices without rounding: floats only guess, rationals decide. A matrix is a list of rows of these (`fmpq`)."""
+"""Exact numbers and matrices of the kernel from floats and FLINT's numbers, and bounds of eigenvalues: floats only guess."""
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from flint import arb, fmpq, fmpq_mat
+from flint import arb, fmpq
 from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import Polynomial, exact
-
-Rows: TypeAlias = list[list[Any]]
+from starhold.kernel.numbers import Account, Rows, definite, inverse, plus, scalar
 
 
 def rows(array: Any) -> Rows:
-    """A matrix of floats at their exact values."""
-    return [[exact(x) for x in row] for row in array]
+    """Return a matrix of floats at their exact values."""
+    return [[fraction(x) for x in row] for row in array]
 
 
 def fraction(x: Any) -> Fraction:
-    """A number of FLINT as the kernel has it, and others at their exact value."""
+    """Return a number of FLINT as the kernel has it, and others at their exact value."""
     value = exact(x)
     return Fraction(int(value.p), int(value.q))
 
 
 def floats(matrix: Sequence[Sequence[Any]]) -> NDArray[np.float64]:
-    """The nearest array of floats."""
-    return np.array([[number(x) for x in row] for row in matrix], dtype=float)
+    """Return a matrix in floats."""
+    return np.array([[float(x) for x in row] for row in matrix], dtype=np.float64)
 
 
 def number(x: Any) -> float:
-    """The nearest float of a rational or of a ball's middle."""
+    """Return the nearest float of a rational or of a ball's middle."""
     if isinstance(x, fmpq):
         return int(x.p) / int(x.q)
     return float(x.mid()) if isinstance(x, arb) else float(x)
 
 
-def identity(size: int, c: Any) -> Rows:
-    """c times the unit matrix."""
-    return [[c if i == j else fmpq(0) for j in range(size)] for i in range(size)]
+def inverted(a: Rows) -> Rows:
+    """Return the inverse of a definite matrix."""
+    Account.open()
+    return inverse(a)
 
 
-def plus(a: Rows, b: Rows, c: Any = 1) -> Rows:
-    """a + c b."""
-    return [[x + y * c for x, y in zip(s, t, strict=True)] for s, t in zip(a, b, strict=True)]
-
-
-def times(c: Any, a: Rows) -> Rows:
-    """c a."""
-    return [[x * c for x in row] for row in a]
-
-
-def inverse(a: Rows) -> Rows:
-    """The exact inverse; ZeroDivisionError for a singular matrix."""
-    inverted = fmpq_mat(len(a), len(a), [x for row in a for x in row]).inv()
-    return [[inverted[i, j] for j in range(len(a))] for i in range(len(a))]
-
-
-def definite(a: Rows) -> bool:
-    """Return whether a symmetric matrix is positive definite, by its pivots."""
-    rest = [list(row) for row in a]
-    for k in range(len(rest)):
-        pivot = rest[k][k]
-        if not pivot > 0:
-            return False
-        for i in range(k + 1, len(rest)):
-            factor = rest[i][k] / pivot
-            for j in range(k + 1, len(rest)):
-                rest[i][j] = rest[i][j] - factor * rest[k][j]
-    return True
-
-
-def least(a: Rows) -> Any:
-    """A rational just below the smallest eigenvalue of a symmetric matrix; positive where the matrix is definite."""
+def least(a: Rows) -> Fraction:
+    """Return a number just below the smallest eigenvalue of a symmetric matrix; positive where the matrix is definite."""
+    Account.open()
     if definite(a):
         # A small one beside a large one would drown in the rounding of the large one.
-        return 1 / greatest(inverse(a))
+        return 1 / greatest(inverted(a))
+    return -greatest(negative(a))
+
+
+def greatest(a: Rows) -> Fraction:
+    """Return a number just above the largest eigenvalue of a symmetric matrix."""
     values = np.linalg.eigvalsh(floats(a))
-    return _just_below(float(values[0]), float(np.abs(values).max()), a)
-
-
-def greatest(a: Rows) -> Any:
-    """A rational just above the largest eigenvalue of a symmetric matrix."""
-    values = np.linalg.eigvalsh(floats(a))
-    return -_just_below(-float(values[-1]), float(np.abs(values).max()), times(-1, a))
-
-
-def _just_below(guess: float, size: float, a: Rows) -> Any:
-    if size == 0.0:
-        return fmpq(0)
-    step = 1e-13
-    while step < 1e6:
-        bound = exact(guess - step * size)
-        if definite(plus(a, identity(len(a), bound), -1)):
+    size, step = float(np.abs(values).max()), 1e-13
+    while size and step < 1e6:
+        bound = Fraction(float(values[-1]) + step * size)
+        Account.open()
+        if definite(plus(scalar(bound, len(a)), a, -1)):
             return bound
         step *= 4.0
-    raise ArithmeticError("no bound of an eigenvalue was found")
+    if size:
+        raise ArithmeticError("no bound of an eigenvalue was found")
+    return Fraction(0)
+
+
+def negative(a: Rows) -> Rows:
+    """Return -a."""
+    return [[-x for x in row] for row in a]
 
 
 def matrix_of(form: Polynomial, names: Sequence[str]) -> Rows:
-    """The symmetric matrix of a quadratic form in these variables."""
-    entries = [[form.terms.get(tuple(sorted((a, b))), fmpq(0)) for b in names] for a in names]
+    """Return the symmetric matrix of a quadratic form in these variables."""
+    entries = [[fraction(form.terms.get(tuple(sorted((a, b))), 0)) for b in names] for a in names]
     return [[c if i == j else c / 2 for j, c in enumerate(row)] for i, row in enumerate(entries)]

@@ -41,18 +41,23 @@ def band_of(loop: ClosedLoop) -> Band:
     """Return the band that claims assume; an empty one where no part moves the orbit, or where it has no bounds."""
     if not movers(loop) or not loop.has("two-body"):
         return Band()
-    begun, gravity = (loop.start.position, loop.start.velocity), loop.craft.gravity
-    low, high, fast = (find(*begun, gravity) for find in (lowest, highest, highest_speed))
+    (low, high, fast), gravity = extremes(loop), loop.craft.gravity
     share = ROOM * _forces(loop, low)[0] / (gravity / low**2) * MORE
     if share >= 1.0 or not isfinite(high):
         return Band()
     low, high, fast = low * (1.0 - share), high * (1.0 + share), fast * (1.0 + share)
     force, gradient = _forces(loop, low)
-    momentum = angular_momentum(*begun) * (1.0 - share)
+    momentum = angular_momentum(loop.start.position, loop.start.velocity) * (1.0 - share)
     rate = high * force / momentum
     # f_n changes as the craft moves and the normal turns; r and h change too.
     turned = (gradient * fast + force * rate) * high / momentum + force * fast / momentum + rate**2
     return Band(share, share * fast, rate * MORE, hypot(force / low, turned) * MORE)
+
+
+def extremes(loop: ClosedLoop) -> tuple[float, float, float]:
+    """Return the least and the largest distance (m) and the largest speed (m/s) of two-body motion."""
+    begun = loop.start.position, loop.start.velocity, loop.craft.gravity
+    return lowest(*begun), highest(*begun), highest_speed(*begun)
 
 
 def _forces(loop: ClosedLoop, distance: float) -> tuple[float, float]:
@@ -65,9 +70,9 @@ def _forces(loop: ClosedLoop, distance: float) -> tuple[float, float]:
 
 def strays(loop: ClosedLoop, position: Any, velocity: Any) -> Any:
     """Tell at which positions (n, 3) and velocities (n, 3) a flight is outside the band of its loop's orbit."""
-    share, begun, gravity = band_of(loop).share, (loop.start.position, loop.start.velocity), loop.craft.gravity
-    low, high, fast = (find(*begun, gravity) for find in (lowest, highest, highest_speed))
+    share, (low, high, fast) = band_of(loop).share, extremes(loop)
     distance, speed = np.linalg.norm(position, axis=1), np.linalg.norm(velocity, axis=1)
-    momentum = np.linalg.norm(np.cross(position, velocity), axis=1) / angular_momentum(*begun)
+    begun = angular_momentum(loop.start.position, loop.start.velocity)
+    momentum = np.linalg.norm(np.cross(position, velocity), axis=1) / begun
     off = (distance < low * (1.0 - share)) | (distance > high * (1.0 + share)) | (speed > fast * (1.0 + share))
     return off | (abs(momentum - 1.0) > share)

@@ -7,8 +7,6 @@ from fractions import Fraction
 from math import asin, pi, sqrt
 from typing import Any
 
-from flint import fmpq
-
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.certificate import EXACT, EXACT_SIGN, LYAPUNOV, SQUARES, Claim, Obligation, Proof
 from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
@@ -169,9 +167,9 @@ def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
             "rate_everywhere": None,
         }
     # For an unknown inertia no rate is stated.
-    level, angle, rate = (below(_exact(numbers[n])) if n in numbers else None for n in ("level", "angle", "rate"))
+    level, angle, rate = (below(numbers[n]) if n in numbers else None for n in ("level", "angle", "rate"))
     whole = numbers.get("start.angle") == ANY_ANGLE
-    everywhere = below(_exact(numbers["start.rate"])) if whole else None
+    everywhere = below(numbers["start.rate"]) if whole else None
     begun = {"slew_angle": angle, "rate": rate, "rate_everywhere": everywhere}
     return {"level": level, "start": level, "everything": False, **begun}
 
@@ -183,7 +181,7 @@ def _limit(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     each = {
-        name: [above(_exact(numbers[at])) if (at := f"{key}.{k}") in numbers else None for k in range(len(loop.loop.rotors))]
+        name: [above(numbers[at]) if (at := f"{key}.{k}") in numbers else None for k in range(len(loop.loop.rotors))]
         for name, key in (("motors", "motors"), ("wheel_momentum", "stored"))
     }
     limits = {name: values for name, values in each.items() if any(x is not None for x in values)}
@@ -191,7 +189,7 @@ def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 
 def _inertia(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
-    tolerance = {"tolerance": below(_exact(numbers["tolerance"])) if "tolerance" in numbers else None}
+    tolerance = {"tolerance": below(numbers["tolerance"]) if "tolerance" in numbers else None}
     return tolerance | {name: x for name, x in _set(numbers, loop).items() if name != "level"}
 
 
@@ -199,8 +197,8 @@ def _handed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     begun = _set(numbers, loop)
     angle = numbers.get("start.angle", Fraction(ANY_ANGLE))
     bounds = {
-        "rate": below(_exact(numbers["start.rate"])) if "start.rate" in numbers else None,
-        "angle": below(_exact(angle)) if angle < ANY_ANGLE else None,
+        "rate": below(numbers["start.rate"]) if "start.rate" in numbers else None,
+        "angle": below(angle) if angle < ANY_ANGLE else None,
     }
     return {name: begun[name] for name in ("level", "start", "everything")} | bounds
 
@@ -209,16 +207,16 @@ def _sampled(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     longest = numbers.get("longest", numbers.get("other"))
     return {
         "period": float(numbers["period"]),
-        "radius": above(_exact(numbers["radius"])),
+        "radius": above(numbers["radius"]),
         "eigenvalues": loop.eigenvalues,
-        "longest": None if longest is None else below(_exact(longest)),
+        "longest": None if longest is None else below(longest),
         "every_shorter": "longest" in numbers,
     }
 
 
 def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     def most(name: str) -> float:
-        return above(_exact(numbers[name])) if name in numbers else 0.0
+        return above(numbers[name]) if name in numbers else 0.0
 
     begun = _set(numbers, loop)
     begun["rate_start"] = begun.pop("rate")
@@ -227,7 +225,7 @@ def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
 
 
 def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
-    angle, rate = (below(_exact(numbers.get(f"start.{name}", numbers.get(name, Fraction(0))))) for name in ("angle", "rate"))
+    angle, rate = (below(numbers.get(f"start.{name}", numbers.get(name, Fraction(0)))) for name in ("angle", "rate"))
     most = {
         "torque": "outside",
         "error": "error",
@@ -246,22 +244,18 @@ def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
         **errors,
         "told": "outside.0" in numbers,
-        "share": below(1 - _exact(numbers["share"])) if "share" in numbers else None,
+        "share": below(1 - numbers["share"]) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),
         **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
-        **{name: above(_exact(numbers[key])) for name, key in ends.items()},
+        **{name: above(numbers[key]) for name, key in ends.items()},
     }
 
 
 def _funnel(within: Sequence[tuple[Fraction, Fraction]], settling: float, angle: float) -> list[tuple[float, float]]:
     """Return times (s), each with the angle (rad) that motions do not exceed from then on; the ultimate bound is last."""
     # A margin, because the angle is computed in floats.
-    bounds = [(above(_exact(time)), 2.0 * asin(min(float(sine), 1.0)) * (1.0 + 1e-9)) for time, sine in within]
+    bounds = [(above(time), 2.0 * asin(min(float(sine), 1.0)) * (1.0 + 1e-9)) for time, sine in within]
     return [*((time, most) for time, most in bounds if time < settling and most > angle), (settling, angle)]
-
-
-def _exact(x: Fraction) -> Any:
-    return fmpq(x.numerator, x.denominator)
 
 
 _NUMBERS = {

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, cast
 
 import numpy as np
@@ -9,11 +10,12 @@ from flint import arb, fmpq
 
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
-from starhold.certification.matrices import Rows, greatest, inverse, least, matrix_of, number, plus, rows, times
+from starhold.certification.matrices import fraction, greatest, inverted, least, matrix_of, negative, number, rows
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
 from starhold.certification.unmodelled import assumed_away, envelope_of, is_read
 from starhold.errors import InputError
+from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Envelope
@@ -43,16 +45,6 @@ class Subject:
     target_rate: Any
     target_acceleration: Any
     total_momentum: Any
-
-    @property
-    def law(self) -> Law:
-        """The law."""
-        return self.loop.law
-
-    @property
-    def inertia(self) -> Rows:
-        """The inertia tensor, kg m2."""
-        return rows(tensor(self.loop.craft.inertia))
 
     def envelope(self, noisy: bool) -> Envelope:
         """Return the envelope of its motions, for the bounds of parts; noisy: except for a share of times."""
@@ -166,8 +158,9 @@ def _finite(x: float) -> float | None:
 
 def above(x: Any) -> float:
     """A float not below a rational."""
-    value = number(x)
-    return value if exact(value) >= x else float(np.nextafter(value, np.inf))
+    exactly = fraction(x)
+    value = float(exactly)
+    return value if value >= exactly else float(np.nextafter(value, np.inf))
 
 
 def below(x: Any) -> float:
@@ -179,7 +172,7 @@ def exact_craft(inertia: Any, torque_limit: Any, gravity: Any) -> Craft:
     """A craft of constant polynomials with the exact inverse of its inertia; a limit that is infinite stays a variable."""
     full = rows(tensor(inertia))
     limit = Polynomial.constant(torque_limit) if np.isfinite(torque_limit) else Polynomial.variable("limit")
-    return Craft(as_tuple(full), as_tuple(inverse(full)), limit, Polynomial.constant(gravity))  # pyright: ignore
+    return Craft(as_tuple(full), as_tuple(inverted(full)), limit, Polynomial.constant(gravity))  # pyright: ignore
 
 
 def as_tuple(matrix: Rows) -> Matrix | Vector:
@@ -231,7 +224,7 @@ def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
     torque: Any = gravity_gradient(direction("p"), cast(Any, Polynomial.constant(1)), whole)
     axes = [strength * _largest_form(component) for component in torque]
     # |n x Jn| is the deviation of the moments about their mean in direction n, so at most half their range.
-    return tuple(axes), strength * (greatest(full) - least(full)) / 2
+    return tuple(axes), strength * exact(greatest(full) - least(full)) / 2
 
 
 def _with_rotors(loop: ClosedLoop) -> Rows:
@@ -239,15 +232,15 @@ def _with_rotors(loop: ClosedLoop) -> Rows:
     full = rows(tensor(loop.craft.inertia))
     if loop.wheels is not None:
         for axis, inertia in zip(loop.wheels.axes, loop.wheels.inertia, strict=True):
-            a = [exact(x) for x in axis]
-            full = plus(full, [[x * y for y in a] for x in a], exact(inertia))
+            a = [fraction(x) for x in axis]
+            full = plus(full, [[x * y for y in a] for x in a], fraction(inertia))
     return full
 
 
 def _largest_form(quadratic: Polynomial) -> Any:
     """A bound of |quadratic form| over the unit sphere."""
     form = matrix_of(quadratic, ("p1", "p2", "p3"))
-    return max(greatest(form), greatest(times(-1, form)), fmpq(0))
+    return exact(max(greatest(form), greatest(negative(form)), Fraction(0)))
 
 
 def direction(name: str, first: int = 1, count: int = 3) -> Any:

@@ -13,11 +13,11 @@ from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import Vector, apply, norm, scale
 from starhold.certification.certificate import ORBIT, WITHOUT, Claim
-from starhold.certification.orbit_band import band_of, movers
+from starhold.certification.orbit_band import band_of, extremes, movers
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS, NO_ERRORS, Envelope, Errors, Noise, Push, Recursion
 from starhold.parts.craft import tensor
-from starhold.parts.orbit import highest_speed, lowest, period_of
+from starhold.parts.orbit import period_of
 from starhold.parts.part import Fitted
 from starhold.parts.pushes import moves
 
@@ -69,8 +69,8 @@ def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
     """Tell what the motions of a loop do not leave while its momentum (N m s) is no more than told, its orbit stays in its
     band, and no part that is left out by name moves it. A little more, for floats tell how low the orbit comes. noisy: but
     for a share of times."""
-    begun, gravity, share = (loop.start.position, loop.start.velocity), loop.craft.gravity, band_of(loop).share
-    low, fast = (find(*begun, gravity) for find in (lowest, highest_speed)) if loop.has("two-body") else map(norm, begun)
+    start, share = loop.start, band_of(loop).share
+    low, _, fast = extremes(loop) if loop.has("two-body") else (norm(start.position), inf, norm(start.velocity))
     moment = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[-1])
     field = sum(_field_error(fitted, loop.period, noisy) for fitted in loop.used("sensor"))
     low, fast = low * (1.0 - share) * (1.0 - 1e-9), fast * (1.0 + share) * (1.0 + 1e-9)

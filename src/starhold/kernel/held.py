@@ -370,7 +370,7 @@ class Held:
         near = region.sizes | {"v": turn * turn}
         odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
         # What noise adds has in it what momentum makes of it, but not what it makes of that.
-        noisy = felt(self.heeded, "w", self.others) * self.noise[1] * stretch(self.N)
+        noisy = felt(self.heeded, "w", near) * self.noise[1] * stretch(self.N)
         drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven))
         drift += h * (pulled + self.pulled(self.apart) + noisy)
         growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))

@@ -151,6 +151,18 @@ class AttitudeLoop(Loop):
         turned = [self.q[0] * x + c for x, c in zip(w, cross(w, vector), strict=True)]
         return [self.off * dot(w, w) - dot(turned, minus(apply(self.J, w), apply(self.given, w)))]
 
+    @cached_property
+    def signs(self) -> list[str]:
+        """Return how the sign of the quaternion that is fed back is chosen anew, empty where it never is."""
+        words = [word for word in (SHORTEST, HYSTERESIS) if self.claim.taken.get(word)]
+        demand(len(words) < 2, "the sign of the quaternion is chosen in two ways")
+        return words
+
+    @property
+    def sign_assumed(self) -> str:
+        """Return what is assumed of that sign."""
+        return "sign-at-once" if self.signs else "quaternion-as-fed"
+
     @property
     def divisors(self) -> dict[str, Poly]:
         """Return the polynomials that variables are inverses of."""

@@ -6,11 +6,12 @@ Roots and quotients by the state are variables, the same wherever the same is as
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import cached_property
 
 from .loops import Loop, wired
-from .numbers import demand
-from .polynomials import Poly, dot, var, variables
+from .numbers import definite, demand
+from .polynomials import Poly, apply, dot, poly, var, variables
 from .programs import Asking, Case, Piecewise, joined
 from .reading import Claim
 
@@ -54,8 +55,29 @@ class PointLoop(Loop):
 
     @property
     def bodies(self) -> list[str]:
-        """Return what is assumed where the equations have no value everywhere."""
+        """Return what is assumed where the equations have no value everywhere: they take roots of forms that are nowhere
+        negative, and divide by distances, which are zero at the bodies alone."""
+        self.divides_by_distances()
+        one = [poly(1), *self.x, *self.v]
+        for p in self.radicands.values():
+            form = [[p.terms.get(m, 0) / Fraction(1 + (a is not b)) for b in one for m in (a * b).terms] for a in one]
+            demand(not (p - dot(one, apply(form, one))).terms and definite(form, False), "a root may have no value")
         return ["off-the-bodies"] if self.ring.roots or self.ring.divisors else []
+
+    @property
+    def radicands(self) -> dict[str, Poly]:
+        """Return what roots are of, by their names."""
+        return {name: Poly(dict(terms)) for terms, name in self.ring.roots.items()}
+
+    def divides_by_distances(self) -> None:
+        """Refuse equations that divide, where no guard says that it is positive, by other than sums of distances: roots of
+        squares of the place that grow in all directions."""
+        place, distances = STATE[:3], set[str]()
+        for name, p in self.radicands.items():
+            curved = [[p.slope(a).slope(b).terms.get((), Fraction(0)) for b in place] for a in place]
+            distances |= {name} if p.names <= {*place} and definite(curved) else set()
+        for b in self.ring.divisors:
+            demand(b.names <= distances and min(b.terms.values()) > 0, "a divisor may be zero")
 
     def relay(self, wrong: list[Poly]) -> tuple[str, str]:
         """Return the names of |wrong| and of its inverse; of none that is asked for where none is."""

@@ -93,12 +93,13 @@ def read_certificate(text: str) -> list[Claim]:
     for name in tables.content:
         demand(tables.content[name].digest == name, "a program is another one than its digest says")
     demand(1 <= len(read_list(claims)) <= CLAIMS, "there are no claims, or too many")
-    read = [_claim(claim, tables) for claim in claims]
+    read = [read_claim(claim, tables) for claim in claims]
     tables.close()
     return read
 
 
-def _claim(given: Any, programs: Told[Program]) -> Claim:
+def read_claim(given: Any, programs: Told[Program]) -> Claim:
+    """Read a claim, of which the programs are told by their digests."""
     keys = ("theorem", "taken", "programs", "subject", "numbers", "evidence")
     theorem, taken, roles, subject, numbers, evidence = read_table(given, *keys)
     demand(isinstance(theorem, str), "a theorem has no name")

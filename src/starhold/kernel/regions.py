@@ -101,8 +101,9 @@ def least_form(p: Poly, region: Region) -> Rows:
 
 
 def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
-    """Return how much parts change at most with a vector, in norms."""
+    """Return how much parts change at most with a vector, in norms: not at all with one that none of them has."""
     names = [name for name in sizes if name[0] == letter]
+    demand(all(name in names for p in parts for name in p.names if name[0] == letter), "how large a vector is is not told")
     return stretched([[p.slope(name) for name in names] for p in parts], sizes) if names else Fraction(0)
 
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from starhold.certification.evidence.finding import obligations
-from starhold.certification.evidence.recorded import TURNS, RecordedLoop, curvature, sign_words
-from starhold.certification.evidence.squares import cofactors, largest_number, once, posed, solved, squares
+from starhold.certification.evidence.recorded import RecordedLoop, curvature, sign_words
+from starhold.certification.evidence.squares import combined, largest_number, once, posed, solved, squares
 from starhold.kernel.loops import HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly
@@ -96,7 +96,7 @@ class Loop(RecordedLoop):
             self.failed[STRICTLY] = str(reason)
             return False
         steps = [o.p - base.p for o in stepped]
-        others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, 18), strict=True) for c in parts]
+        others = combined(base, base.p, 18)
         unit = (
             sqrt(float(abs(steps[0].terms[("q1", "w1")]) / tensor(self.loop.craft.inertia).max())) if steps[0].terms else 1.0
         )
@@ -208,9 +208,7 @@ class Loop(RecordedLoop):
 
     def cap(self, theorem: str, words: list[str], V: str) -> float:
         """Return a level below V where other rests are, or where the sign of the quaternion changes."""
-        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
-        values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        return min(values[1:]) if SHORTEST in words else inf
+        return min(self.resting(V)[1:]) if SHORTEST in words else inf
 
     def largest_level(self, claim: dict[str, Any], V: str, cap: float) -> Fraction | None:
         """Return the largest level that keeps all limits of a claim, and stays below the cap."""
@@ -270,5 +268,4 @@ def highest(o: Squares, scales: Mapping[str, float]) -> float | None:
     a multiple of -p and sums of squares. It was made for the level 1."""
     *bounds, inside = o.known
     V, p = 1 - inside, o.p
-    others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
-    return largest_number(posed(V, [-p, *bounds], others, o.z), scales, Poly({(): Fraction(1)}))
+    return largest_number(posed(V, [-p, *bounds], combined(o, p, len(o.z)), o.z), scales, Poly({(): Fraction(1)}))

@@ -19,15 +19,15 @@ from starhold.certification.evidence.attitude import (
     Loop,
     descent,
 )
-from starhold.certification.evidence.finding import floats, obligations
+from starhold.certification.evidence.finding import obligations
 from starhold.certification.evidence.isotropic import find_isotropic
 from starhold.certification.evidence.recorded import ASKED, sign_words
 from starhold.certification.evidence.refuted import against_sampling
-from starhold.certification.evidence.squares import cofactors, largest_number, posed, rounded, settled, solved
-from starhold.certification.matrices import fraction
+from starhold.certification.evidence.squares import combined, largest_number, posed, rounded, settled, solved
+from starhold.certification.matrices import floats, fraction
 from starhold.certification.subject import Subject
 from starhold.kernel.loops import HANDED, HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS
-from starhold.kernel.numbers import RefusedError, plus
+from starhold.kernel.numbers import RefusedError, plus, scalar, times
 from starhold.kernel.rules import Contracts, Definite, Squares
 from starhold.parts.craft import tensor
 
@@ -85,21 +85,23 @@ def find_sampled(loop: Loop) -> None:
     except RefusedError as reason:
         loop.failed[SAMPLED] = str(reason)
         return
-    step, K = wanted["step"], wanted["stiffness"]
-    J, C = wanted["inertia outweighs damping"], wanted["damping outweighs stiffness"]
+    step = wanted["step"]
     assert isinstance(step, Contracts)
-    assert isinstance(J, Definite)
-    assert isinstance(C, Definite)
-    assert isinstance(K, Definite)
+    # Those of J - hC and C - hK/2 were made for twice the period.
+    inertia, less_damped, less_stiff = (
+        o.a
+        for o in (wanted["inertia"], wanted["inertia outweighs damping"], wanted["damping outweighs stiffness"])
+        if isinstance(o, Definite)
+    )
+    damping = times(scalar(1 / h), plus(inertia, less_damped, -1))
+    stiffness = times(scalar(2 / h), plus(damping, less_stiff, -1))
     roots: Any = np.linalg.eigvals(floats(step.A))
     radius = float(np.abs(roots).max())
     ordered = sorted(map(complex, roots), key=lambda z: (-abs(z), z.imag))
     loop.eigenvalues = [[z.real, z.imag] for z in ordered]
     numbers = {"period": h, "radius": rounded(radius + 1e-4 * (1.0 - radius), 9)}
     with np.errstate(all="ignore"):
-        # They were made for twice the period.
-        damping = plus(C.a, K.a, h / 2)
-        longest = min(2.0 / largest_ratio(damping, plus(J.a, damping, h)), 4.0 / largest_ratio(K.a, damping))
+        longest = min(2.0 / largest_ratio(damping, inertia), 4.0 / largest_ratio(stiffness, damping))
     if longest > float(h) and loop.try_to_show(
         loop.claim(SAMPLED, [], None, **numbers, longest=rounded(longest * (1.0 - 1e-9), 15)), {}
     ):
@@ -107,7 +109,7 @@ def find_sampled(loop: Loop) -> None:
     if radius >= 1.0:
         loop.failed[SAMPLED] = "the control period is too long"
         return
-    other = longest_stable(floats(J.a) + float(h) * floats(damping), floats(damping), floats(K.a), float(h))
+    other = longest_stable(floats(inertia), floats(damping), floats(stiffness), float(h))
     for share in (1e-9, 1e-7, 1e-5, 1e-3):
         if loop.try_to_show(loop.claim(SAMPLED, [], None, **numbers, other=other * (1.0 - share)), {}):
             return
@@ -203,7 +205,7 @@ def find_near(loop: Loop, tolerance: float | None = None) -> None:
         loop.failed[NEARBY] = str(reason)
         return
     A, B, D = stiff.p - base.p, leaning.p - base.p, leaning.p - shifted.p
-    others = [c * r for r, parts in zip(base.modulo, cofactors(base, base.p, KNOWN), strict=True) for c in parts]
+    others = combined(base, base.p, KNOWN)
     z, J = base.z[:KNOWN], tensor(loop.loop.craft.inertia)
     unit = sqrt(float(abs(A.terms[("q1", "w1")]) / J.max())) if A.terms else 1.0
     scales = {f"w{k}": unit for k in (1, 2, 3)}

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.certification.evidence.finding import floats
 from starhold.certification.evidence.squares import interior_point
+from starhold.certification.matrices import floats
 from starhold.kernel.numbers import Rows
 from starhold.kernel.regions import RATE, TURN
 

@@ -2,24 +2,27 @@
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
 from importlib import import_module
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from starhold.certification.evidence.reduced import Reduced
 from starhold.certification.evidence.squares import once, plainly, rounded, squares, text
 from starhold.certification.evidence.terms import solved
+from starhold.certification.matrices import floats
 from starhold.kernel import rules
-from starhold.kernel.numbers import Account, RefusedError, Rows, rational
+from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import Poly, poly
 from starhold.kernel.programs import Program, digest
-from starhold.kernel.reading import Claim, Numbers, Told
+from starhold.kernel.reading import FORMAT, Claim, Told, read_claim
+from starhold.kernel.rules import Part
 from starhold.kernel.theorems import THEOREMS
 
 linalg: Any = import_module("scipy.linalg")
+T = TypeVar("T")
 
 
 class NotFoundError(Exception):
@@ -29,14 +32,7 @@ class NotFoundError(Exception):
 def read(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> Claim:
     """Return a claim in the kernel's form, with the evidence that theorems themselves need, and no limit on work."""
     Account.left = 10**12
-    return Claim(
-        claim["theorem"],
-        Told("words", dict.fromkeys(claim["taken"], True)),
-        Told("programs", {role: Program.read(programs[name]) for role, name in claim["programs"].items()}),
-        Told("subject", {name: rational(x) for name, x in claim["subject"].items()}),
-        Numbers("numbers", {name: rational(x) for name, x in claim["numbers"].items()}),
-        Told("evidence", claim["evidence"]),
-    )
+    return read_claim(claim, Told("programs", {name: Program.read(programs[name]) for name in claim["programs"].values()}))
 
 
 def obligations(claim: Mapping[str, Any], programs: Mapping[str, Any]) -> tuple[dict[str, rules.Obligation], Claim]:
@@ -104,11 +100,6 @@ def evidence(name: str, wanted: Mapping[str, rules.Obligation], scales: Mapping[
     return shown
 
 
-def floats(rows: Rows) -> NDArray[np.float64]:
-    """Return a matrix in floats."""
-    return np.array([[float(x) for x in row] for row in rows], dtype=np.float64)
-
-
 def combined(name: str, o: rules.Vanishes) -> list[Poly]:
     """Return numbers for cofactors: those with which the relations make a polynomial."""
     cofactors = solved(o.p, list(o.modulo))
@@ -126,7 +117,7 @@ def euler(name: str, wanted: Mapping[str, rules.Obligation]) -> list[Poly]:
 
 def contracts(o: rules.Contracts) -> list[list[str]]:
     """Return Lyapunov's matrix of a motion."""
-    A = np.array([[float(x) for x in row] for row in o.A])
+    A = floats(o.A)
     size = np.eye(len(A))
     solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
     solution = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
@@ -143,7 +134,7 @@ def _rounded(P: Any) -> list[list[str]]:
 
 def persists(o: rules.Persists) -> list[list[str]]:
     """Return the matrix of a form that grows along x+ = Ax, as A'PA - P = 1 has it, or A'PA - c^2 P with c near 1."""
-    A = np.array([[float(x) for x in row] for row in o.A])
+    A = floats(o.A)
     for c in (1.0, 1.0 + 1e-6, 1.0 + 1e-4, 1.0 + 1e-2):
         try:
             rows = _rounded(linalg.solve_discrete_lyapunov(A.T / c, -np.eye(len(A))))
@@ -154,12 +145,35 @@ def persists(o: rules.Persists) -> list[list[str]]:
     raise NotFoundError("no form was found that grows")
 
 
+def by_digests(programs: Iterable[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return programs by the names that claims have for them."""
+    return {digest(program): program for program in programs}
+
+
+def unproved(
+    theorem: str,
+    programs: Mapping[str, str],
+    subject: Mapping[str, str],
+    numbers: Mapping[str, Any],
+    taken: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Return a claim without evidence. programs: their digests by roles."""
+    exact = {name: str(Fraction(x)) for name, x in numbers.items()}
+    parts = {"programs": dict(programs), "subject": dict(subject), "numbers": exact, "evidence": dict[str, Any]()}
+    return {"theorem": theorem, "taken": list(taken), **parts}
+
+
 def certificate(programs: list[dict[str, Any]], claims: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the content of a certificate with these claims and those of the programs that they are about."""
     used = {name for claim in claims for name in claim["programs"].values()}
-    by_digest = {digest(program): program for program in programs}
-    return {
-        "format": "starhold certificate 3",
-        "programs": {n: p for n, p in by_digest.items() if n in used},
-        "claims": claims,
-    }
+    kept = {n: p for n, p in by_digests(programs).items() if n in used}
+    return {"format": FORMAT, "programs": kept, "claims": claims}
+
+
+def concluded(part: Part[T]) -> T:
+    """Return what follows from obligations that are taken to be met."""
+    while True:
+        try:
+            next(part)
+        except StopIteration as end:
+            return end.value

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from starhold.certification.evidence.attitude import Loop
-from starhold.certification.evidence.finding import floats
+from starhold.certification.matrices import floats
 from starhold.certification.unmodelled import driven_errors, measures_noisy_field, samples_of
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio, smallest
-from starhold.certification.evidence.finding import floats, read
+from starhold.certification.evidence.finding import concluded, read
 from starhold.certification.evidence.noise import find_radii
 from starhold.certification.evidence.recorded import sign_words
-from starhold.certification.evidence.responses import concluded, find_response
+from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.evidence.terms import valued
+from starhold.certification.matrices import floats
 from starhold.certification.subject import above
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes
 from starhold.kernel.held import CHANGE, Held

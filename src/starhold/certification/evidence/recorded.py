@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property
 from math import inf, isfinite, sqrt
 from typing import Any
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
-from starhold.certification.evidence.finding import NotFoundError, complete, read
+from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
 from starhold.certification.subject import Subject, above
 from starhold.certification.unmodelled import driven_errors
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
@@ -154,20 +153,12 @@ class RecordedLoop:
     def claim(self, theorem: str, taken: list[str], V: str | None, **numbers: Any) -> dict[str, Any]:
         """Return a claim without evidence."""
         roles = self.roles | ({} if V is None else {"lyapunov": V})
-        exact = {name: str(Fraction(x)) for name, x in numbers.items()}
-        return {
-            "theorem": theorem,
-            "taken": taken,
-            "programs": roles,
-            "subject": self.subject,
-            "numbers": exact,
-            "evidence": {},
-        }
+        return unproved(theorem, roles, self.subject, numbers, taken)
 
     @property
     def by_digest(self) -> dict[str, Any]:
         """The programs by their digests."""
-        return {digest(program): program for program in self.programs}
+        return by_digests(self.programs)
 
     def scales(self, V: str | None, level: float | None = None) -> dict[str, float]:
         """Return the approximate size of variables on {V <= level}."""
@@ -187,11 +178,14 @@ class RecordedLoop:
             self.forms[V] = AttitudeLoop(read(self.claim("converges", [], V), self.by_digest)).lyapunov
         return self.forms[V]
 
+    def resting(self, V: str | None) -> list[float]:
+        """Return V at rest at `TURNS`."""
+        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
+        return [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
+
     def potential(self, V: str | None) -> float:
         """Return the largest of V at rest."""
-        p = self.form(V).at({"w1": 0, "w2": 0, "w3": 0})
-        values = [float(p.at(dict(zip(("q0", "q1", "q2", "q3"), q, strict=True))).number) for q in TURNS]
-        return max(*map(abs, values), 1e-300) if V is not None else 1.0
+        return max(*map(abs, self.resting(V)), 1e-300) if V is not None else 1.0
 
     def kinetic(self, V: str | None) -> list[float]:
         """Return twice the sizes of the coefficients of the squares of the rates in V."""

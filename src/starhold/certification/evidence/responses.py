@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from importlib import import_module
 from math import ceil, log
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from starhold.certification.evidence.finding import floats
+from starhold.certification.matrices import floats
 from starhold.kernel.held import Held
-from starhold.kernel.rules import Part
 from starhold.kernel.theorems.response import MOST, PARTS
 
 Array = NDArray[np.float64]
-T = TypeVar("T")
 
 LEFT = 7.0
 """Minus the logarithm of the share of a state that is left after the samples of a response."""
@@ -65,12 +63,3 @@ def weigh(squares: Array) -> Array:
     best = roots(optimize.minimize(cost, even, method="BFGS").x)
     best = np.maximum(best, LEAST * best.mean())
     return best.max() / best
-
-
-def concluded(part: Part[T]) -> T:
-    """Return what follows from obligations that are taken to be met."""
-    while True:
-        try:
-            next(part)
-        except StopIteration as end:
-            return end.value

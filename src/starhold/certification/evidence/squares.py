@@ -138,6 +138,11 @@ def cofactors(o: Squares, p: Poly, count: int) -> list[list[Poly]]:
     return cofactors
 
 
+def combined(o: Squares, p: Poly, count: int) -> list[Poly]:
+    """Return the relations times the monomials of their cofactors."""
+    return [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, count), strict=True) for c in parts]
+
+
 def degree(p: Poly) -> int:
     """Return the degree of a polynomial."""
     return max(map(len, p.terms), default=0)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from starhold.certification.assumptions import as_it_starts
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, read
 from starhold.kernel.loops import AttitudeLoop
@@ -13,16 +14,13 @@ from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.theorems.pointing import points
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.loop.kernels import make_step
 
 POINTS = "points"
 
 
 def start_rate(loop: ClosedLoop) -> float:
     """Return the rate (rad/s), relative to its target, at which a loop starts."""
-    loop = loop.without("sensor", "estimator")
-    shown = make_step(loop.composition()).measure(loop.carry(), 0, 0, loop.craft, loop.setup())
-    return float(np.linalg.norm(shown.rate))
+    return float(np.linalg.norm(as_it_starts(loop).rate))
 
 
 def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:

@@ -1,15 +1,23 @@
 """Claims about a craft near a libration point for the kernel: its programs as they fly, numbers, and evidence."""
 
-from collections.abc import Generator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from math import inf, isqrt, nextafter, sqrt
-from typing import Any, TypeVar
+from typing import Any
 
 from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.evidence.attitude import highest
-from starhold.certification.evidence.finding import NotFoundError, complete, obligations, read
+from starhold.certification.evidence.finding import (
+    NotFoundError,
+    by_digests,
+    complete,
+    concluded,
+    obligations,
+    read,
+    unproved,
+)
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.points import PointLoop
 from starhold.kernel.polynomials import multiple
@@ -39,7 +47,6 @@ BEYOND = Fraction(1, 10**15)
 """By this share the boundary that is claimed is beyond that bound."""
 ROUNDING = Fraction(1, 10**12)
 """By this share a control may exceed its limit and be taken for one that meets it."""
-_T = TypeVar("_T")
 
 
 def full_problem(loop: ClosedLoop) -> bool:
@@ -63,18 +70,13 @@ class Station:
     @cached_property
     def by_digest(self) -> dict[str, dict[str, Any]]:
         """The programs by digest."""
-        return {digest(program): program for program in self.programs.values()}
+        return by_digests(self.programs.values())
 
     def claim(self, theorem: str, **numbers: Fraction | float) -> dict[str, Any]:
         """Return a claim without evidence."""
-        return {
-            "theorem": theorem,
-            "taken": [],
-            "programs": {role: digest(self.programs[role]) for role in ROLES[theorem] if role in self.programs},
-            "subject": point_subject(self.loop.gains, self.loop.craft, self.loop.known),
-            "numbers": {name.replace("_", "."): str(Fraction(x)) for name, x in numbers.items()},
-            "evidence": {},
-        }
+        roles = {role: digest(self.programs[role]) for role in ROLES[theorem] if role in self.programs}
+        subject = point_subject(self.loop.gains, self.loop.craft, self.loop.known)
+        return unproved(theorem, roles, subject, {name.replace("_", "."): x for name, x in numbers.items()})
 
     def show(self, claim: dict[str, Any], scales: Mapping[str, float] | None = None) -> None:
         """Add a claim with evidence; NotFoundError where there is none."""
@@ -84,7 +86,7 @@ class Station:
     def circle(self) -> tuple[PointLoop, Circle]:
         """The loop as the kernel has it, and the circle of its law. RefusedError where it declares none."""
         loop = PointLoop(read(self.claim(CIRCLE), self.by_digest))
-        return loop, ended(weighed(loop))
+        return loop, concluded(weighed(loop))
 
     def contents(self, level: float) -> dict[str, float]:
         """Return the numbers of a level: radii of circles in the set, errors of the velocity, distance from the bodies."""
@@ -210,15 +212,6 @@ def root(x: Fraction, towards: float) -> float:
     while Fraction(near) ** 2 >= x if towards == 0.0 else Fraction(near) ** 2 <= x:
         near = nextafter(near, towards)
     return near
-
-
-def ended(proof: Generator[Any, None, _T]) -> _T:
-    """Return what a part of a proof returns."""
-    while True:
-        try:
-            next(proof)
-        except StopIteration as end:
-            return end.value
 
 
 UNSHOWN = (NotFoundError, RefusedError, UnreadableError)

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
-from starhold.certification.evidence.finding import read
+from starhold.certification.evidence.finding import by_digests, read, unproved
 from starhold.certification.evidence.squares import text
 from starhold.certification.evidence.sums import Guess, find, monomials
 from starhold.kernel.numbers import RefusedError, rational
@@ -52,12 +52,12 @@ class Attempt:
     def claim(self, evidence: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Return the claim as a certificate has it."""
         roles = {role: digest(program) for role, program in self.programs.items()}
-        claim = {"theorem": self.theorem, "taken": list(self.taken), "programs": roles, "subject": self.subject}
-        return claim | {"numbers": self.numbers, "evidence": self.hints | dict(evidence or {})}
+        claim = unproved(self.theorem, roles, self.subject, self.numbers, self.taken)
+        return claim | {"evidence": self.hints | dict(evidence or {})}
 
     def read(self) -> Claim:
         """Return the claim as the kernel has it, without a limit on work."""
-        return read(deepcopy(self.claim()), {digest(program): program for program in self.programs.values()})
+        return read(deepcopy(self.claim()), by_digests(self.programs.values()))
 
     @cached_property
     def system(self) -> System:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from starhold.certification.invariant.prover import Attempt
 from starhold.certification.invariant.system import System, check_sizes, program
 from starhold.kernel.cells import Cell as Wired
+from starhold.kernel.numbers import Account
 from starhold.kernel.polynomials import Poly, poly, var
 
 Array = NDArray[np.float64]
@@ -42,11 +43,6 @@ class Cell:
     def sides(self) -> list[Poly]:
         """The polynomials that are not negative in it."""
         return [Poly(dict(surface)) * sign for surface, sign in self.wired.signs.items() if sign]
-
-    @cached_property
-    def zero(self) -> list[Poly]:
-        """The polynomials that vanish in it, if it is a thin one."""
-        return [Poly(dict(surface)) for surface, sign in self.wired.signs.items() if not sign]
 
     @property
     def function(self) -> Poly:
@@ -79,7 +75,7 @@ class Candidate:
     @cached_property
     def whole(self) -> list[Cell]:
         """The cells that lie in no surface."""
-        return [cell for cell in self.cells if not cell.zero]
+        return [cell for cell in self.cells if all(cell.wired.signs.values())]
 
     @cached_property
     def values(self) -> "Fields":
@@ -93,13 +89,18 @@ class Candidate:
 
     def at(self, p: Poly, state: State) -> Fraction:
         """The value of a polynomial at an exact state."""
-        values = dict(zip(self.system.names, state, strict=True))
-        return sum((c * math.prod(values[x] for x in m) for m, c in p.terms.items()), Fraction(0))
+        # A search has no limit on work.
+        Account.left = 10**12
+        return p.at(self.named(state)).number
+
+    def named(self, state: State) -> dict[str, Fraction]:
+        """An exact state by the names of its variables."""
+        return dict(zip(self.system.names, state, strict=True))
 
     def near(self, state: State) -> list[Cell]:
         """All the cells, thin ones too, whose closures hold an exact state."""
-        closed = [cell for cell in self.cells if all(self.at(p, state) >= 0 for p in cell.sides)]
-        return [cell for cell in closed if all(self.at(p, state) == 0 for p in cell.zero)]
+        Account.left = 10**12
+        return [cell for cell in self.cells if cell.wired.holds(self.named(state))]
 
     def has(self, state: State) -> bool:
         """Whether the box holds an exact state."""
@@ -342,5 +343,5 @@ def ray(what: Candidate) -> dict[str, Fraction] | None:
 
 
 def named(what: Candidate, state: State) -> dict[str, float]:
-    """A state by the names of its variables."""
-    return dict(zip(what.system.names, map(float, state), strict=True))
+    """A state by the names of its variables, in floats."""
+    return {name: float(x) for name, x in what.named(state).items()}

@@ -111,10 +111,10 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
 def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Proof:
     """Settle the part that the rest at q0 = -1 and the quaternion's sign play."""
     numbers, V, q, w = loop.claim.numbers, loop.lyapunov, loop.q, loop.w
-    level, assumed = numbers.get("level"), "quaternion-as-fed"
+    level = numbers.get("level")
     away = V.at(loop.opposite | loop.still)
-    if loop.claim.taken.get(HYSTERESIS):
-        width, assumed = numbers["hysteresis"], "sign-at-once"
+    if HYSTERESIS in loop.signs:
+        width = numbers["hysteresis"]
         yield "width", Exceeds(min(width, 1 - width))
         jump, inside = V - V.at({f"q{k}": -x for k, x in enumerate(q)}), [] if level is None else [level - V]
         if loop.near:
@@ -125,8 +125,8 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
             inside = [*kinetic(loop, more), *loop.heaviest(q[1:])]
         yield "a jump lowers V", Squares(jump, [poly(1), *q, *w], 1, [-width - q[0], *inside], [loop.sphere])
         said.append(f"comes to rest on target, with the quaternion's sign chosen anew at q0 < -{above(width)}")
-    elif loop.claim.taken.get(SHORTEST):
-        assumed, known = "sign-at-once", loop.heaviest(q[1:])
+    elif SHORTEST in loop.signs:
+        known = loop.heaviest(q[1:])
         higher, z = V.at({"q0": 0}) - numbers["level"], [poly(1), *q[1:], *w]
         yield "the sign never changes", Squares(higher, z, 1, known, [loop.sphere.at({"q0": 0})], kinetic(loop))
         said.append("comes to rest on target by the shorter turn")
@@ -135,14 +135,12 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         said.append("comes to rest on target")
     else:
         demand(level is None or not loop.any_inertia, "a level for every inertia needs a sign of the quaternion")
-        if level is not None:
-            yield "the other equilibrium is inside", Exceeds(level, away.number)
         level_there = [V.slope(name).at(loop.opposite | loop.still) for name in loop.driven if strictly]
         yield from vanish("V is level at the other equilibrium", level_there)
         repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])
         yield "the other equilibrium repels", repels
         said.append("comes to rest on target, but for a set of measure zero, which ends on the other quaternion")
-    return (yield from finished(loop, said, assumed))
+    return (yield from finished(loop, said, loop.sign_assumed))
 
 
 def finished(loop: AttitudeLoop, said: list[str], *assumed: str) -> Proof:

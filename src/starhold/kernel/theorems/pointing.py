@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from ..held import Held
-from ..loops import HYSTERESIS, SHORTEST, AttitudeLoop
+from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
 from ..regions import ANGLE, AT_REST, RATE, TURN, balls, widened
@@ -44,8 +44,7 @@ def points(claim: Claim) -> Proof:
     start = yield from contents(loop, loop.lyapunov)
     region = motion.region(c)
     limited = yield from within_limits(loop, motion.misread(region)[0])
-    signs = [word for word in (SHORTEST, HYSTERESIS) if claim.taken.get(word)]
-    if signs:
+    if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * motion.swing(tube))
@@ -121,7 +120,7 @@ def points(claim: Claim) -> Proof:
     assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
     assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
-    assumed += ["bounded-momentum" if loop.wheels else "no-wheels", "sign-at-once" if signs else "quaternion-as-fed"]
+    assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
     return Statement(text + said, tuple(dict.fromkeys(assumed)), "pointing", within=tuple(within))
 

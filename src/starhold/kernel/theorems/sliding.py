@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from ..loops import AXES, HYSTERESIS, NONE, SHORTEST, TURNS, AttitudeLoop, slopes
+from ..loops import AXES, NONE, TURNS, AttitudeLoop, slopes
 from ..numbers import Rows, demand, plus, scalar, times, transpose
 from ..polynomials import Poly, apply, dot, minus, multiple
 from ..programs import Case
@@ -34,9 +34,8 @@ def reaches_surface(claim: Claim) -> Proof:
     for i, (reach, _) in enumerate(axes):
         yield f"reach {i}", Exceeds(reach, outside[i])
     layered = any(slope is not None for _, slope in axes)
-    signed = bool(claim.taken.get(SHORTEST) or claim.taken.get(HYSTERESIS))
     said, begun, most = "approaches" if layered else "reaches in a finite time", "every attitude and rate", Fraction(0)
-    if signed or (layered and any(outside)):
+    if loop.signs or (layered and any(outside)):
         half = [[x / 2 for x in row] for row in plus(K, transpose(K))]
         yield "least moment", Definite(plus(J, scalar(1), -numbers["inertia.low"]))
         yield "least slope", Definite(plus(half, scalar(1), -numbers["surface.low"]))
@@ -44,14 +43,14 @@ def reaches_surface(claim: Claim) -> Proof:
     if layered and any(outside):
         most = yield from losses(loop, axes, outside)
         ending = yield from ending_in_the_layer(loop, most, J, K)
-    if signed:
+    if loop.signs:
         low, k, level = numbers["inertia.low"], numbers["surface.low"], numbers["level"]
         yield "the sign never changes", Exceeds(low * k * k, max(2 * level, most))
         contained = yield from contents(loop, dot(s, apply(loop.J, s)) * Fraction(1, 2))
         begun = " ".join([f"{{s.Js/2 <= {below(level)}}}", *(f"({part})" for part in contained)])
     assumed = ["bounded-outside-torque" if name == "known-outside-torque" else name for name in loop.assumed]
     demand(not loop.wheels, "no law of this kind is taken with wheels")
-    assumed += ["continuous-torque", "unlimited-torque", "sign-at-once" if signed else "quaternion-as-fed"]
+    assumed += ["continuous-torque", "unlimited-torque", loop.sign_assumed]
     return Statement(f"from {begun} the motion {said} the law's surface and {ending}", tuple(assumed), "sliding")
 
 

@@ -58,7 +58,6 @@ def ends_on_circle(claim: Claim) -> Proof:
     circle = yield from weighed(loop)
     c, heavy = circle.square, circle.weights[0]
     level, inner, outer, velocity = (numbers[name] for name in ("level", "inner", "outer", "velocity"))
-    yield "the level is positive", Exceeds(level)
     yield "centre outside", Exceeds(heavy * c * c, level)
     yield from falls(loop, circle)
     yield from clear_of_bodies(loop, circle, level)
@@ -121,16 +120,15 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
 
 def clear_of_bodies(loop: PointLoop, circle: Circle, level: Fraction) -> Shown:
     """Where V <= level every root and quotient has a value: y^2 + z^2 is above clear^2, and there radicands are positive."""
-    roots = {name: p for p, name in loop.ring.roots.items() if name != circle.size}
+    roots = {name: p for name, p in loop.radicands.items() if name != circle.size}
     if roots or loop.ring.divisors:
         square = loop.claim.numbers["clear"] ** 2
-        yield "off the line of the bodies", Exceeds(min(square, circle.square - square))
+        yield "off the line of the bodies", Exceeds(circle.square, square)
         yield "off it on the whole set", Exceeds(circle.weights[0] * (circle.square - square) ** 2, level)
         apart = dot(loop.x[1:], loop.x[1:]) - square
         for k, p in enumerate(roots.values()):
-            yield f"a root has a value {k}", Squares(Poly(dict(p)), [poly(1), loop.x[0]], 1, [apart])
-    for b in loop.ring.divisors:
-        demand(b.names <= roots.keys() and min(b.terms.values()) > 0, "a divisor may be zero")
+            yield f"a root has a value {k}", Squares(p, [poly(1), loop.x[0]], 1, [apart])
+    loop.divides_by_distances()
 
 
 def within_limit(loop: PointLoop, circle: Circle, level: Fraction) -> Part[str]:
@@ -201,8 +199,8 @@ def returns_with_limited_control(claim: Claim) -> Proof:
     for name, u in zip("YZ", loop.sides[0].value[1:], strict=True):
         yield f"{name} can be held", Exceeds(limit, abs(u.at({**resting_state, "x1": 0, "v1": 0}).number))
     yield from clipped(loop, limit)
+    demand(not loop.bodies, "the equations have no value at the bodies")
     off = max(abs(k - low * c), abs(k - high * c))
-    yield "the point repels", Exceeds(min(p, low, c, width))
     yield "its root", Exceeds(min(p - low * low, high * high - p))
     yield "the limit turns motions round", Exceeds(limit, p * width)
     yield "the law turns motions round", Exceeds(c * low * width - off * reach, p * width)
@@ -236,6 +234,7 @@ def needs_more_control(claim: Claim) -> Proof:
     yield from vanish("on the circle", [p.at(at) for p in circle.errors], first=1)
     here = [s for s in loop.sides if all((Poly(dict(p)).at(at).number > 0) == holds for p, holds in s.guards)]
     demand(len(here) == 1, "the law has no side there")
+    demand(all(b.at(at).number for b in loop.ring.divisors), "a program divides by zero there")
     squares = [p.at(at).number ** 2 for p in here[0].value]
     yield "control", Exceeds(max(squares) if limits[0] is None else sum(squares, Fraction(0)), control * control)
     yield "more than the limit", Exceeds(control, next(x for x in limits if x is not None))
