@@ -189,9 +189,11 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 
 def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     """Return a number that |p| does not exceed where no variable exceeds its size."""
+    if not p.upper:
+        return Fraction(0)
     names = [*p.names]
     numbers, lower = whole([sizes[name] for name in names])
-    ratios, degree = dict(zip(names, numbers, strict=True)), max(map(len, p.upper), default=0)
+    ratios, degree = dict(zip(names, numbers, strict=True)), max(map(len, p.upper))
     bits = max(map(int.bit_length, (lower, *numbers)))
     Account.spend(len(p.upper) + sum(map(len, p.upper)), p.bits + degree * bits // 2)
     # The sums of the terms of each degree.
