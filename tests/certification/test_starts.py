@@ -3,7 +3,6 @@
 import random
 from fractions import Fraction
 
-
 from starhold.certification.certify import certify
 from starhold.certification.evidence import squares, starts
 from starhold.certification.evidence.starts import likely
