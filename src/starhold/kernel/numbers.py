@@ -94,7 +94,7 @@ def matrix(given: Any, rows: int, columns: int) -> Rows:
     return [[rational(x) for x in read_list(row, columns)] for row in read_list(given, rows)]
 
 
-def whole(numbers: Sequence[Fraction]) -> tuple[list[int], int]:
+def whole(numbers: Sequence[Fraction | int]) -> tuple[list[int], int]:
     """Return whole numbers and their common denominator."""
     below = lcm(*(x.denominator for x in numbers))
     return [x.numerator * (below // x.denominator) for x in numbers], below

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 from itertools import product
 from math import gcd, lcm
+from operator import mul
 from typing import Any, TypeAlias
 
 from .numbers import Account, demand, rational, read_dict, up, whole
@@ -18,33 +20,23 @@ DEGREE, TERMS = 24, 100_000
 
 class Poly:
     """A polynomial holds its coefficients, none of them zero, by monomial: whole numbers (`upper`) over one of their own
-    (`lower`)."""
+    (`lower`), with no factor that all share. Nothing changes it."""
 
     __slots__ = ("_slopes", "_terms", "lower", "upper")
 
-    def __init__(self, terms: Mapping[Monomial, Fraction]) -> None:
-        numbers, lower = whole([*terms.values()])
-        self._hold(dict(zip(terms, numbers, strict=True)), lower)
-
-    _terms: dict[Monomial, Fraction] | None
-
-    def _hold(self, upper: dict[Monomial, int], lower: int) -> None:
-        self.upper, self.lower = {m: c for m, c in upper.items() if c}, lower
-        self._terms, self._slopes = None, dict[str, Poly]()
+    def __init__(self, terms: Mapping[Monomial, Fraction | int], lower: int = 1) -> None:
+        """Take coefficients over a positive number."""
+        numbers, below = whole([*terms.values()])
+        common = gcd(below * lower, *numbers)
+        self.upper = {m: c // common for m, c in zip(terms, numbers, strict=True) if c}
+        self.lower = below * lower // common
+        self._terms, self._slopes = dict[Monomial, Fraction](), dict[str, Poly]()
         demand(len(self.upper) <= TERMS, "a polynomial is too long")
-
-    @classmethod
-    def over(cls, upper: dict[Monomial, int], lower: int) -> Poly:
-        """Return a polynomial with these coefficients over a positive number."""
-        p = cls.__new__(cls)
-        p._hold(upper, lower)
-        return p
 
     @property
     def terms(self) -> dict[Monomial, Fraction]:
         """Return the coefficients by monomial."""
-        if self._terms is None:
-            self._terms = {m: Fraction(c, self.lower) for m, c in self.upper.items()}
+        self._terms = self._terms or {m: Fraction(c, self.lower) for m, c in self.upper.items()}
         return self._terms
 
     @property
@@ -64,11 +56,11 @@ class Poly:
         for (m, c), (n, d) in product(self.upper.items(), other.upper.items()):
             both = tuple(sorted(m + n)) if n else m
             upper[both] = upper.get(both, 0) + c * d
-        return reduced(upper, self.lower * other.lower)
+        return Poly(upper, self.lower * other.lower)
 
     def __neg__(self) -> Poly:
         Account.spend(len(self.upper))
-        return Poly.over({m: -c for m, c in self.upper.items()}, self.lower)
+        return Poly({m: -c for m, c in self.upper.items()}, self.lower)
 
     def __sub__(self, other: Poly | Fraction | int) -> Poly:
         return self + -poly(other)
@@ -91,7 +83,7 @@ class Poly:
 
     def only(self, wanted: Callable[[Monomial], bool]) -> Poly:
         """Return the terms whose monomials are wanted."""
-        return Poly.over({m: c for m, c in self.upper.items() if wanted(m)}, self.lower)
+        return Poly({m: c for m, c in self.upper.items() if wanted(m)}, self.lower)
 
     def slope(self, name: str) -> Poly:
         """Return the derivative: every monomial with the name loses one, and gains its count as a factor."""
@@ -102,7 +94,7 @@ class Poly:
                 if name in m:
                     place = m.index(name)
                     upper[m[:place] + m[place + 1 :]] = c * m.count(name)
-            self._slopes[name] = Poly.over(upper, self.lower)
+            self._slopes[name] = Poly(upper, self.lower)
         return self._slopes[name]
 
     def powers(self, name: str) -> list[Poly]:
@@ -110,7 +102,7 @@ class Poly:
         powers = [dict[Monomial, int]() for _ in range(1 + max((m.count(name) for m in self.upper), default=0))]
         for m, c in self.upper.items():
             powers[m.count(name)][tuple(x for x in m if x != name)] = c
-        return [Poly.over(upper, self.lower) for upper in powers]
+        return [Poly(upper, self.lower) for upper in powers]
 
     def at(self, values: Mapping[str, Poly | Fraction | int]) -> Poly:
         """Return the polynomial with numbers or polynomials in place of variables, all at once."""
@@ -118,18 +110,8 @@ class Poly:
         for m, c in self.upper.items():
             placed = tuple(name for name in m if name in values)
             rest.setdefault(placed, {})[tuple(name for name in m if name not in values) if placed else m] = c
-        products: dict[Monomial, Poly] = {(): poly(1)}
-        for placed in rest:
-            for k in range(len(placed)):
-                if placed[: k + 1] not in products:
-                    products[placed[: k + 1]] = products[placed[:k]] * values[placed[k]]
-        return total(Poly.over(upper, self.lower) * products[placed] for placed, upper in rest.items())
-
-
-def reduced(upper: dict[Monomial, int], lower: int) -> Poly:
-    """Return a polynomial with these coefficients over a positive number, without their common factors."""
-    common = gcd(lower, *upper.values())
-    return Poly.over({m: c // common for m, c in upper.items()} if common > 1 else upper, lower // common)
+        products = ((upper, reduce(mul, (values[name] for name in placed), poly(1))) for placed, upper in rest.items())
+        return total(Poly(upper, self.lower) * p for upper, p in products)
 
 
 def poly(value: Poly | Fraction | int) -> Poly:
@@ -156,7 +138,7 @@ def total(parts: Iterable[Poly]) -> Poly:
         scale = lower // part.lower
         for m, c in part.upper.items():
             upper[m] = upper.get(m, 0) + c * scale
-    return reduced(upper, lower)
+    return Poly(upper, lower)
 
 
 def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) -> Poly:
@@ -216,7 +198,7 @@ def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fractio
     changing = [name for name in moving if sizes[name]]
     numbers, lower = whole([up(speeds[name] / sizes[name]) for name in changing])
     shares = dict(zip(changing, numbers, strict=True))
-    along = Poly.over({m: c * sum(shares.get(name, 0) for name in m) for m, c in p.upper.items()}, p.lower * lower)
+    along = Poly({m: c * sum(shares.get(name, 0) for name in m) for m, c in p.upper.items()}, p.lower * lower)
     still = (most(p.slope(name), sizes) * speeds[name] for name in moving if not sizes[name])
     return sum(still, most(along, sizes))
 

@@ -79,7 +79,7 @@ def factored(p: Poly) -> Factored:
         *left, i, k = factors
         kind = 2 if any(left.count(name) % 2 for name in left) else int(c < 0)
         parts.setdefault((place[i], place[k]), ({}, {}, {}))[kind][(*left, *["q0"] * m.count("q0"))] = abs(c)
-    return {ends: [Poly.over(part, p.lower) for part in kinds] for ends, kinds in parts.items()}
+    return {ends: [Poly(part, p.lower) for part in kinds] for ends, kinds in parts.items()}
 
 
 def least_form(parts: Factored, region: Region) -> Rows:
