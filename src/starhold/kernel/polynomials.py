@@ -177,7 +177,7 @@ def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     numbers, lower = whole([sizes[name] for name in names])
     ratios, degree = dict(zip(names, numbers, strict=True)), max(map(len, p.upper))
     bits = max(map(int.bit_length, (lower, *numbers)))
-    Account.spend(len(p.upper) + sum(map(len, p.upper)), p.bits + degree * bits // 2)
+    Account.spend(len(p.upper), p.bits + degree * bits)
     # The sums of the terms of each degree.
     sums = [0] * (degree + 1)
     for m, c in p.upper.items():
