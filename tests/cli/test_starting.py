@@ -63,7 +63,7 @@ def packages(modules):
 
 
 PICTURES = ("accuracy", "angle", "attitude", "rate", "roll-pitch-yaw", "scalar", "torque")
-LATER = {"starhold.report.page", "starhold.report.painter", "starhold.report.figures", "starhold.studies.reflight", "h5py"}
+LATER = {"starhold.report.page", "starhold.report.figures", "starhold.studies.reflight", "h5py"}
 """What pictures, pages and files are made with."""
 
 

@@ -2,13 +2,14 @@
 kernel. It looks at the equations at random states, and at no evidence."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from tests.kernel.driven import Driven
 from tests.kernel.flights import Fleet, Surroundings, cross, rates, stepped, turn
-from tests.kernel.programs import number, run
+from tests.kernel.programs import number, run, written
 
 STEP = 1e-6
 
@@ -25,7 +26,7 @@ def turned(rng, least=-1.0):
 class Oracle(Driven):
     def __init__(self, content, claim, seed=0):
         self.claim, self.rng = claim, np.random.default_rng(seed)
-        self.programs = {role: content["programs"][name] for role, name in claim["programs"].items()}
+        self.programs = {role: written(content["programs"][name]) for role, name in claim["programs"].items()}
         self.numbers = {name: number(x) for name, x in claim["numbers"].items()}
         self.subject = {name: number(x) for name, x in claim["subject"].items()}
         self.any = "whatever" in claim["theorem"]
@@ -71,6 +72,7 @@ class Oracle(Driven):
             given |= {f"measurement.{field}.{k}": x for k, x in enumerate(value)}
         return given, h
 
+    @cached_property
     def plant(self):
         inverse = np.linalg.inv(self.J)
         found = {f"craft.inertia.{i}.{k}": self.J[i, k] for i in range(3) for k in range(3)}
@@ -84,7 +86,7 @@ class Oracle(Driven):
 
     def lyapunov(self, q, w):
         given, _ = self.inputs(q, w, *[np.zeros(np.shape(w))] * 4)
-        return run(self.programs["lyapunov"], given | self.plant())[0]
+        return run(self.programs["lyapunov"], given | self.plant)[0]
 
     def slope(self, q, w, T):
         qd = 0.5 * np.concatenate([[-w @ q[1:]], q[0] * w + np.cross(q[1:], w)])
@@ -105,7 +107,7 @@ class Oracle(Driven):
         for _ in range(3):
             w, t, q = self.rng.normal(size=3), self.rng.normal(size=3), self.rng.normal(size=4)
             given = (
-                self.subject | self.plant() | {f"rate.{k}": w[k] for k in range(3)} | {f"torque.{k}": t[k] for k in range(3)}
+                self.subject | self.plant | {f"rate.{k}": w[k] for k in range(3)} | {f"torque.{k}": t[k] for k in range(3)}
             )
             wanted = np.linalg.solve(self.J, t - np.cross(w, self.J @ w))
             flat = {f"craft.inertia.{k}": self.J[k, k] for k in range(3)}

@@ -133,7 +133,8 @@ def rerun(
     write_run(flight.recording, place / "run.nc")
     write_text(place / "scenario.toml", scenario.text)
     print_outcome([flight])
-    with Painter(scenario, [flight], place, pictures is Drawn.ALL) as painter:
+    with Painter(pictures is Drawn.ALL) as painter:
+        painter.draw(scenario, [flight], place)
         page = write_results(scenario, [flight], place, pictures is not Drawn.NONE)
         said = "The same bits as in the campaign."
         if again.differs:

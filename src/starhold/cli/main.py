@@ -115,56 +115,58 @@ def _fly(
     scenario = load(file, allow_unstable)
     from starhold.cli.console import console
     from starhold.cli.show import flying, print_outcome, print_results
+    from starhold.report.painter import Painter
     from starhold.report.results import open_folder, write_results, write_run
     from starhold.studies import compare as studies
     from starhold.studies.timing import Stopwatch
 
     entries = list(scenario.laws) if nested else [scenario.pick(law)]
-    # All are built before the first flight, so that an error in the last is reported at once.
-    loops = [studies.build(scenario, entry) for entry in entries]
-    name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
-    folder = open_folder(output or Path("results") / name, force)
-    flights: list[Flight] = []
+    # Its library loads while laws fly.
+    with Painter(pictures is Drawn.ALL) as painter:
+        # All are built before the first flight, so that an error in the last is reported at once.
+        loops = [studies.build(scenario, entry) for entry in entries]
+        name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
+        folder = open_folder(output or Path("results") / name, force)
+        flights: list[Flight] = []
 
-    def keep(flight: Flight) -> None:
-        write_run(flight.recording, (folder / flight.name if nested else folder) / "run.nc")
+        def keep(flight: Flight) -> None:
+            write_run(flight.recording, (folder / flight.name if nested else folder) / "run.nc")
 
-    with Stopwatch(scenario, loops if process is None else []) as stopwatch:
-        with flying(entries, scenario.table.simulation.steps) as show:
+        with Stopwatch(scenario, loops if process is None else []) as stopwatch:
+            with flying(entries, scenario.table.simulation.steps) as show:
 
-            def notice(name: str, done: int, total: int) -> None:
-                _heed_interrupt()
-                show(name, done, total)
+                def notice(name: str, done: int, total: int) -> None:
+                    _heed_interrupt()
+                    show(name, done, total)
 
-            for entry, loop in zip(entries, loops, strict=True):
-                for flight in flights[-1:]:
-                    keep(flight)
-                try:
-                    flights.append(studies.fly_law(scenario, entry, loop, notice, process))
-                except CutShortError as error:
-                    # Nothing that was flown is lost.
-                    if error.recording is not None:
-                        write_run(error.recording, folder / "run.nc")
-                        console.print(f"Recording so far: {folder / 'run.nc'}", soft_wrap=True, markup=False)
-                    raise
-        try:
-            if check_step:
-                flights = [
-                    studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
-                    for loop, flight in zip(loops, flights, strict=True)
-                ]
-            if process is None:
-                flights = [stopwatch.timed(place, flight) for place, flight in enumerate(flights)]
-            print_outcome(flights)
-            if process is not None:
-                console.print(f"The commands came from {process}: nothing is proved about it.", soft_wrap=True, markup=False)
-        finally:
-            # The table does not wait for it, and no flight is lost if it fails.
-            keep(flights[-1])
+                for entry, loop in zip(entries, loops, strict=True):
+                    for flight in flights[-1:]:
+                        keep(flight)
+                    try:
+                        flights.append(studies.fly_law(scenario, entry, loop, notice, process))
+                    except CutShortError as error:
+                        # Nothing that was flown is lost.
+                        if error.recording is not None:
+                            write_run(error.recording, folder / "run.nc")
+                            console.print(f"Recording so far: {folder / 'run.nc'}", soft_wrap=True, markup=False)
+                        raise
+            try:
+                if check_step:
+                    flights = [
+                        studies.check_step(scenario, loop, flight, lambda done, total: _heed_interrupt())
+                        for loop, flight in zip(loops, flights, strict=True)
+                    ]
+                if process is None:
+                    flights = [stopwatch.timed(place, flight) for place, flight in enumerate(flights)]
+                print_outcome(flights)
+                if process is not None:
+                    said = f"The commands came from {process}: nothing is proved about it."
+                    console.print(said, soft_wrap=True, markup=False)
+                painter.draw(scenario, flights, folder)
+            finally:
+                # The table does not wait for it, and no flight is lost if it fails.
+                keep(flights[-1])
 
-    from starhold.report.painter import Painter
-
-    with Painter(scenario, flights, folder, pictures is Drawn.ALL) as painter:
         if certify and process is None:
             flights = [studies.prove(scenario, *trio, pointing=proof) for trio in zip(entries, loops, flights, strict=True)]
         if any(flight.certificates for flight in flights):

@@ -25,10 +25,12 @@ from .regions import (
     SPEED,
     STATE,
     TURN,
+    Factored,
     Radii,
     Region,
     Sizes,
     Tube,
+    factored,
     felt,
     first,
     growing,
@@ -150,8 +152,8 @@ class Held:
         return [u - g for u, g in zip(variables("u"), self.bend, strict=True)]
 
     @cached_property
-    def motion(self) -> tuple[Poly, Poly, Fraction]:
-        """Return V' in the mean of a period without pushes, up to a derivative of V', and that, with its share in the mean:
+    def motion(self) -> tuple[Factored, Poly, Fraction]:
+        """Return -V' in the mean of a period without pushes, up to a derivative of V', and that, with its share in the mean:
         the law's torque is held, and wheels' momentum turns against the body."""
         loop, rates, share = self.loop, [self.rate], Fraction(1)
         carried = dict(zip(MOMENTA, cross(loop.H, loop.w), strict=True)) if loop.wheels else {}
@@ -163,7 +165,7 @@ class Held:
             share *= self.h / (len(rates))
             mean += share * rates[-1]
         commanded = {f"u{k + 1}": p for k, p in enumerate(self.pull)}
-        return mean.at(commanded), rates[-1], share * self.h / (len(rates) + 1)
+        return factored(-mean.at(commanded)), rates[-1], share * self.h / (len(rates) + 1)
 
     def form(self, c: Fraction) -> Rows:
         """Return the matrix of x.Gx + c |q|^2."""
@@ -293,7 +295,7 @@ class Held:
 
     def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
-        h, region, L, (mean, last, share) = self.h, tube.region, self.rate, self.motion
+        h, region, L, (falling, last, share) = self.h, tube.region, self.rate, self.motion
         near = region.sizes | {"v": 1 - region.least}
         push = tube.steady + tube.pushed
         demand(push > 0, "nothing pushes")
@@ -325,7 +327,7 @@ class Held:
         F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        return least_form(-mean, region), over, F, push * root(1 + 2 / WEIGHT), rest
+        return least_form(falling, region), over, F, push * root(1 + 2 / WEIGHT), rest
 
     def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""

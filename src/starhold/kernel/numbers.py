@@ -57,7 +57,8 @@ def rational(given: Any) -> Fraction:
     if match := _FLOAT.fullmatch(text):
         sign, whole, after, exponent = match.groups(default="")
         demand(abs(int(exponent)) <= 1100, "a float is out of range")
-        return Fraction(int(sign + whole + after, 16), 16 ** len(after)) * Fraction(2) ** int(exponent)
+        upper, places = int(sign + whole + after, 16), int(exponent) - 4 * len(after)
+        return Fraction(upper << max(places, 0), 1 << max(-places, 0))
     match = _QUOTIENT.fullmatch(text)
     upper, lower = match.groups(default="1") if match else ("", "")
     demand(match is not None, "a number is not written as one")
@@ -93,7 +94,7 @@ def matrix(given: Any, rows: int, columns: int) -> Rows:
     return [[rational(x) for x in read_list(row, columns)] for row in read_list(given, rows)]
 
 
-def whole(numbers: Sequence[Fraction]) -> tuple[list[int], int]:
+def whole(numbers: Sequence[Fraction | int]) -> tuple[list[int], int]:
     """Return whole numbers and their common denominator."""
     below = lcm(*(x.denominator for x in numbers))
     return [x.numerator * (below // x.denominator) for x in numbers], below
@@ -166,7 +167,8 @@ def transpose(a: Sequence[Sequence[Fraction]]) -> Rows:
 
 def scalar(c: Fraction | int, count: int = 3) -> Rows:
     """Return c times the identity."""
-    return [[Fraction(c) * (i == k) for k in range(count)] for i in range(count)]
+    entry, zero = Fraction(c), Fraction(0)
+    return [[entry if i == k else zero for k in range(count)] for i in range(count)]
 
 
 def beside(a: Rows, b: Rows) -> Rows:
@@ -206,9 +208,11 @@ def up(x: Fraction) -> Fraction:
 
 def norm(v: Iterable[Fraction]) -> Fraction:
     """Return a number that is not below the Euclidean norm, and hardly above it."""
-    return root(sum((x * x for x in v), Fraction(0)))
+    numbers, below = whole([*v])
+    return root(Fraction(sum(x * x for x in numbers), below * below))
 
 
 def reach(a: Rows, v: Sequence[Fraction]) -> list[Fraction]:
     """Return how large a matrix makes a vector whose components are no larger than those of v."""
-    return [sum((abs(x) * y for x, y in zip(row, v, strict=True)), Fraction(0)) for row in a]
+    (sizes, under), rows = whole(v), list(map(whole, a))
+    return [Fraction(sum(abs(x) * y for x, y in zip(row, sizes, strict=True)), below * under) for row, below in rows]

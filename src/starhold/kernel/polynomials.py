@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import reduce
 from itertools import product
+from math import gcd, lcm
+from operator import mul
 from typing import Any, TypeAlias
 
-from .numbers import Account, added, demand, longest, rational, read_dict, up, whole
+from .numbers import Account, demand, rational, read_dict, up, whole
 
 Monomial: TypeAlias = tuple[str, ...]
 """The sorted names of its factors, each as often as it occurs."""
@@ -16,37 +19,48 @@ DEGREE, TERMS = 24, 100_000
 
 
 class Poly:
-    """A polynomial holds its coefficients, none of them zero, by monomial."""
+    """A polynomial holds its coefficients, none of them zero, by monomial: whole numbers (`upper`) over one of their own
+    (`lower`), with no factor that all share. Nothing changes it."""
 
-    __slots__ = ("terms",)
+    __slots__ = ("_slopes", "_terms", "lower", "upper")
 
-    def __init__(self, terms: dict[Monomial, Fraction]) -> None:
-        self.terms = {m: c for m, c in terms.items() if c}
-        demand(len(self.terms) <= TERMS, "a polynomial is too long")
+    def __init__(self, terms: Mapping[Monomial, Fraction | int], lower: int = 1) -> None:
+        """Take coefficients over a positive number."""
+        numbers, below = whole([*terms.values()])
+        common = gcd(below * lower, *numbers)
+        self.upper = {m: c // common for m, c in zip(terms, numbers, strict=True) if c}
+        self.lower = below * lower // common
+        self._terms, self._slopes = dict[Monomial, Fraction](), dict[str, Poly]()
+        demand(len(self.upper) <= TERMS, "a polynomial is too long")
+
+    @property
+    def terms(self) -> dict[Monomial, Fraction]:
+        """Return the coefficients by monomial."""
+        self._terms = self._terms or {m: Fraction(c, self.lower) for m, c in self.upper.items()}
+        return self._terms
+
+    @property
+    def bits(self) -> int:
+        """Return the bits of the longest of its whole numbers."""
+        return max(map(int.bit_length, (self.lower, *self.upper.values())))
 
     def __add__(self, other: Poly | Fraction | int) -> Poly:
         return total((self, poly(other)))
 
     def __mul__(self, other: Poly | Fraction | int) -> Poly:
         other = poly(other)
-        bits = longest(self.terms.values()) + longest(other.terms.values())
-        Account.spend(len(self.terms) * len(other.terms) + 1, bits)
-        highest = max(map(len, self.terms), default=0) + max(map(len, other.terms), default=0)
+        Account.spend(len(self.upper) * len(other.upper) + 1, self.bits + other.bits)
+        highest = max(map(len, self.upper), default=0) + max(map(len, other.upper), default=0)
         demand(highest <= DEGREE, "a degree is too high")
-        if len(other.terms) == 1:
-            ((n, d),) = other.terms.items()
-            return Poly({(tuple(sorted(m + n)) if n else m): c * d for m, c in self.terms.items()})
-        # In whole numbers, reduced once for each monomial.
-        (left, below), (right, under) = whole([*self.terms.values()]), whole([*other.terms.values()])
-        terms = dict[Monomial, int]()
-        for (m, c), (n, d) in product(zip(self.terms, left, strict=True), zip(other.terms, right, strict=True)):
-            both = tuple(sorted(m + n))
-            terms[both] = terms.get(both, 0) + c * d
-        return Poly({m: Fraction(c, below * under) for m, c in terms.items()})
+        upper = dict[Monomial, int]()
+        for (m, c), (n, d) in product(self.upper.items(), other.upper.items()):
+            both = tuple(sorted(m + n)) if n else m
+            upper[both] = upper.get(both, 0) + c * d
+        return Poly(upper, self.lower * other.lower)
 
     def __neg__(self) -> Poly:
-        Account.spend(len(self.terms))
-        return Poly({m: -c for m, c in self.terms.items()})
+        Account.spend(len(self.upper))
+        return Poly({m: -c for m, c in self.upper.items()}, self.lower)
 
     def __sub__(self, other: Poly | Fraction | int) -> Poly:
         return self + -poly(other)
@@ -59,40 +73,45 @@ class Poly:
     @property
     def names(self) -> set[str]:
         """Return the variables that occur."""
-        return {name for m in self.terms for name in m}
+        return {name for m in self.upper for name in m}
 
     @property
     def number(self) -> Fraction:
         """Return the value of a polynomial without variables."""
-        demand(not self.names, "a number depends on the state")
-        return self.terms.get((), Fraction(0))
+        demand(not any(self.upper), "a number depends on the state")
+        return Fraction(self.upper.get((), 0), self.lower)
+
+    def only(self, wanted: Callable[[Monomial], bool]) -> Poly:
+        """Return the terms whose monomials are wanted."""
+        return Poly({m: c for m, c in self.upper.items() if wanted(m)}, self.lower)
 
     def slope(self, name: str) -> Poly:
         """Return the derivative: every monomial with the name loses one, and gains its count as a factor."""
-        Account.spend(len(self.terms))
-        terms: dict[Monomial, Fraction] = {}
-        for m, c in self.terms.items():
-            if name in m:
-                place = m.index(name)
-                terms[m[:place] + m[place + 1 :]] = c * m.count(name)
-        return Poly(terms)
+        if name not in self._slopes:
+            Account.spend(len(self.upper))
+            upper = dict[Monomial, int]()
+            for m, c in self.upper.items():
+                if name in m:
+                    place = m.index(name)
+                    upper[m[:place] + m[place + 1 :]] = c * m.count(name)
+            self._slopes[name] = Poly(upper, self.lower)
+        return self._slopes[name]
 
     def powers(self, name: str) -> list[Poly]:
         """Return the coefficients of a polynomial in one variable, from the lowest on."""
-        powers = [dict[Monomial, Fraction]() for _ in range(1 + max((m.count(name) for m in self.terms), default=0))]
-        for m, c in self.terms.items():
+        powers = [dict[Monomial, int]() for _ in range(1 + max((m.count(name) for m in self.upper), default=0))]
+        for m, c in self.upper.items():
             powers[m.count(name)][tuple(x for x in m if x != name)] = c
-        return list(map(Poly, powers))
+        return [Poly(upper, self.lower) for upper in powers]
 
     def at(self, values: Mapping[str, Poly | Fraction | int]) -> Poly:
         """Return the polynomial with numbers or polynomials in place of variables, all at once."""
-        terms = list[Poly]()
-        for m, c in self.terms.items():
-            terms.append(Poly({tuple(name for name in m if name not in values): c}))
-            for name in m:
-                if name in values:
-                    terms[-1] = terms[-1] * values[name]
-        return total(terms)
+        rest: dict[Monomial, dict[Monomial, int]] = {}
+        for m, c in self.upper.items():
+            placed = tuple(name for name in m if name in values)
+            rest.setdefault(placed, {})[tuple(name for name in m if name not in values) if placed else m] = c
+        products = ((upper, reduce(mul, (values[name] for name in placed), poly(1))) for placed, upper in rest.items())
+        return total(Poly(upper, self.lower) * p for upper, p in products)
 
 
 def poly(value: Poly | Fraction | int) -> Poly:
@@ -112,17 +131,19 @@ def variables(letter: str, first: int = 1, last: int = 3) -> list[Poly]:
 
 def total(parts: Iterable[Poly]) -> Poly:
     """Return a sum."""
-    coefficients = dict[Monomial, list[Fraction]]()
+    parts = list(parts)
+    lower, upper = lcm(*(part.lower for part in parts)), dict[Monomial, int]()
     for part in parts:
-        Account.spend(len(part.terms) + 1, longest(part.terms.values()))
-        for m, c in part.terms.items():
-            coefficients.setdefault(m, []).append(c)
-    return Poly({m: some[0] if len(some) == 1 else added(some) for m, some in coefficients.items()})
+        Account.spend(len(part.upper) + 1, max(part.bits, lower.bit_length()))
+        scale = lower // part.lower
+        for m, c in part.upper.items():
+            upper[m] = upper.get(m, 0) + c * scale
+    return Poly(upper, lower)
 
 
 def dot(a: Sequence[Poly | Fraction | int], b: Sequence[Poly | Fraction | int]) -> Poly:
     """Return the sum of products."""
-    return total(poly(x) * y for x, y in zip(a, b, strict=True))
+    return total(poly(x) * y for x, y in zip(a, b, strict=True) if x)
 
 
 def horner(parts: Sequence[Poly], x: Poly) -> Poly:
@@ -150,26 +171,34 @@ def cross(a: Sequence[Poly], b: Sequence[Poly]) -> list[Poly]:
 
 def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     """Return a number that |p| does not exceed where no variable exceeds its size."""
-    ratios = {name: sizes[name].as_integer_ratio() for name in p.names}
-    bound, places = 0, 64
-    for m, c in p.terms.items():
-        upper, lower = abs(c.numerator), c.denominator
+    if not p.upper:
+        return Fraction(0)
+    names = [*p.names]
+    numbers, lower = whole([sizes[name] for name in names])
+    ratios, degree = dict(zip(names, numbers, strict=True)), max(map(len, p.upper))
+    bits = max(map(int.bit_length, (lower, *numbers)))
+    Account.spend(len(p.upper), p.bits + degree * bits)
+    # The sums of the terms of each degree.
+    sums = [0] * (degree + 1)
+    for m, c in p.upper.items():
+        c = abs(c)
         for name in m:
-            n, d = ratios[name]
-            upper, lower = upper * n, lower * d
-        Account.spend(len(m) + 1, upper.bit_length() + lower.bit_length())
-        finer = max(0, 64 + lower.bit_length() - upper.bit_length() - places)
-        places += finer
-        bound = (bound << finer) - ((-upper << places) // lower)
-    return up(Fraction(bound, 1 << places))
+            c *= ratios[name]
+        sums[len(m)] += c
+    bound = 0
+    for terms in sums:
+        bound = bound * lower + terms
+    return up(Fraction(bound, p.lower * lower**degree))
 
 
 def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fraction]) -> Fraction:
     """Return a number that |p'| does not exceed where variables besides change no faster than at their speeds, and others do
     not change."""
     moving = [name for name in speeds if name in p.names]
-    shares = {name: up(speeds[name] / sizes[name]) for name in moving if sizes[name]}
-    along = Poly({m: c * sum((shares.get(name, 0) for name in m), Fraction(0)) for m, c in p.terms.items()})
+    changing = [name for name in moving if sizes[name]]
+    numbers, lower = whole([up(speeds[name] / sizes[name]) for name in changing])
+    shares = dict(zip(changing, numbers, strict=True))
+    along = Poly({m: c * sum(shares.get(name, 0) for name in m) for m, c in p.upper.items()}, p.lower * lower)
     still = (most(p.slope(name), sizes) * speeds[name] for name in moving if not sizes[name])
     return sum(still, most(along, sizes))
 

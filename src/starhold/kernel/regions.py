@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from .loops import AXES, RATES, TURNS
-from .numbers import RefusedError, Rows, added, demand, norm, plus, reach, root, scalar, transpose, up
-from .polynomials import Poly, most
+from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, up, whole
+from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
@@ -17,6 +17,7 @@ SPEED, ANGLE, PULL = "|w", "|q", "|u"
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
 """The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
+Factored = dict[tuple[int, int], list[Poly]]
 Radii = tuple[Fraction, Fraction]
 """Bounds of |w| and |q| of a motion."""
 AT_REST: Radii = (Fraction(0), Fraction(0))
@@ -67,31 +68,32 @@ class Tube:
         return self.steady + self.pushed + self.stale
 
 
-def least_form(p: Poly, region: Region) -> Rows:
-    """Return the matrix of a form that p is not below: two factors of x are taken out of every monomial, what is left lies
-    in an interval, and |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
-    sizes, place = region.sizes, {name: k for k, name in enumerate(STATE)}
-    ratios = {name: sizes[name].as_integer_ratio() for name in p.names}
-    bounds: dict[tuple[int, int], tuple[list[Fraction], list[Fraction]]] = {}
-    for m, c in p.terms.items():
-        factors, power = sorted((name for name in m if name != "q0"), key=place.__contains__), m.count("q0")
+def factored(p: Poly) -> Factored:
+    """Return what two factors of x, the last of every monomial, leave of a polynomial, by their places: sizes of what is
+    even but for powers of q0, where it is added and where it is subtracted, and of the rest."""
+    place, parts = {name: k for k, name in enumerate(STATE)}, dict[tuple[int, int], tuple[dict[Monomial, int], ...]]()
+    for m, c in p.upper.items():
+        factors = sorted((name for name in m if name != "q0"), key=place.__contains__)
         demand(set(factors[-2:]) <= set(place) and len(factors) > 1, "the torque is not zero at rest on target")
-        # The rates first; what is left is even, of powers of q0 and of squares, or of any sign.
+        # The rates first.
         *left, i, k = factors
-        upper, lower = c.as_integer_ratio()
-        for name in left:
-            n, d = ratios[name]
-            upper, lower = upper * n, lower * d
-        even = all(left.count(name) % 2 == 0 for name in left) and (power == 0 or region.least >= 0)
-        size = Fraction(abs(upper), lower)
-        high = up(size)
-        low = high if not even else Fraction(0) if left else up(-size * region.least**power)
-        below, above = bounds.setdefault((place[i], place[k]), ([], []))
-        below.append(high if c < 0 else low)
-        above.append(low if c < 0 else high)
-    middle, radius = scalar(0, 6), scalar(0, 6)
-    for (i, k), ends in bounds.items():
-        below, above = map(added, ends)
+        kind = 2 if any(left.count(name) % 2 for name in left) else int(c < 0)
+        parts.setdefault((place[i], place[k]), ({}, {}, {}))[kind][(*left, *["q0"] * m.count("q0"))] = abs(c)
+    return {ends: [Poly(part, p.lower) for part in kinds] for ends, kinds in parts.items()}
+
+
+def least_form(parts: Factored, region: Region) -> Rows:
+    """Return the matrix of a form that a polynomial is not below: what two factors of x leave of it lies in an interval, and
+    |x_i x_k| <= (x_i^2 r_k / r_i + x_k^2 r_i / r_k) / 2 with the sizes r."""
+    sizes, middle, radius = region.sizes, scalar(0, 6), scalar(0, 6)
+    for (i, k), (more, less, uneven) in parts.items():
+        if region.least < 0:
+            uneven = total([uneven, *(part.only(lambda m: "q0" in m) for part in (more, less))])
+            more, less = (part.only(lambda m: "q0" not in m) for part in (more, less))
+        # Without another factor than q0 it is at least what it is at the least of that.
+        least = [part.only(lambda m: {*m} <= {"q0"}).at({"q0": region.least}).number for part in (more, less)]
+        high, low, spread = (most(part, sizes) for part in (more, less, uneven))
+        above, below = high - least[1] + spread, low - least[0] + spread
         for a, b in ((i, k), (k, i)):
             middle[a][b] += (above - below) / 4
             radius[a][b] += (above + below) / 4
@@ -116,10 +118,9 @@ def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
         c = rows[1][0].terms.get((names[2],))
         if c is None:
             continue
-        alone = [(name,) for name in names]
-        slopes = [[[p.terms.get(m, 0) for m in alone] for p in row] for row in rows]
+        slopes = [[[p.terms.get((name,), 0) for name in names] for p in row] for row in rows]
         if slopes == [[[(0, c, -c)[x] for x in axis] for axis in row] for row in TURNED]:
-            rows = [[Poly({m: x for m, x in p.terms.items() if m not in alone}) for p in row] for row in rows]
+            rows = [[p.only(lambda m, names=names: len(m) != 1 or m[0] not in names) for p in row] for row in rows]
             bound += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
     return bound + stretch([[most(p, sizes) for p in row] for row in rows])
 
@@ -142,17 +143,17 @@ def balls(radii: Radii) -> Rows:
 
 def first(p: Poly, letter: str) -> Poly:
     """Return the terms of which the first variable but q0 has this letter."""
-    return Poly({m: c for m, c in p.terms.items() if next(name for name in m if name != "q0")[0] == letter})
+    return p.only(lambda m: next(name for name in m if name != "q0")[0] == letter)
 
 
 def with_momentum(p: Poly, rate: str = "w") -> Poly:
     """Return what of a polynomial is a product of wheels' momentum and a rate, the body's or the target's."""
-    return Poly({m: c for m, c in p.terms.items() if [name[0] for name in m] == sorted(("h", rate))})
+    return p.only(lambda m: [name[0] for name in m] == sorted(("h", rate)))
 
 
 def growing(parts: list[Poly]) -> list[Poly]:
     """Return what of polynomials vanishes with the state."""
-    return [Poly({m: c for m, c in p.terms.items() if set(m) & set(STATE)}) for p in parts]
+    return [p.only(lambda m: not set(STATE).isdisjoint(m)) for p in parts]
 
 
 def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
@@ -162,8 +163,10 @@ def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
 
 def stretch(rows: Rows) -> Fraction:
     """Return a bound of how much longer a matrix makes a vector: of the sums of its rows and of its columns, or of all."""
-    across, down = (max(sum(map(abs, row), Fraction(0)) for row in lines) for lines in (rows, transpose(rows)))
-    return min(root(across * down), norm(x for row in rows for x in row))
+    numbers, below = whole([abs(x) for row in rows for x in row])
+    lines = [numbers[k : k + len(rows[0])] for k in range(0, len(numbers), len(rows[0]))]
+    across, down = max(map(sum, lines)), max(map(sum, zip(*lines, strict=True)))
+    return root(Fraction(min(across * down, sum(x * x for x in numbers)), below * below))
 
 
 def settled(change: Callable[[list[Fraction]], list[Fraction]], begun: list[Fraction] | None = None) -> list[Fraction]:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any, TypeAlias, TypeVar
 
 from .numbers import Rows, definite, demand, matrix, plus, rational, read_list, read_table, times, transpose
-from .polynomials import Poly, apply, dot, read_poly
+from .polynomials import Poly, dot, read_poly, total
 from .sentences import Statement
 
 
@@ -29,7 +29,9 @@ def form(rows: Any, z: Sequence[Poly], strictly: bool) -> Poly:
     """Return z'Gz, with a G of the evidence that is positive definite, or is nowhere negative."""
     gram = matrix(rows, len(z), len(z))
     demand(definite(gram, strictly), "a matrix is not positive definite")
-    return dot(z, apply(gram, z))
+    return total(
+        a * b * gram[i][k] * (1 + (i != k)) for i, a in enumerate(z) for k, b in enumerate(z[: i + 1]) if gram[i][k]
+    )
 
 
 @dataclass(frozen=True)

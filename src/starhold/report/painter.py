@@ -7,6 +7,8 @@ import os
 import signal
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -14,32 +16,47 @@ from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.files import clear_unfinished
-from starhold.report.body import report_of
 from starhold.studies.timing import can_fork
 
 if TYPE_CHECKING:
-    from starhold.report.figures import Picture
     from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
 
-AT_ONCE = 1
-
 
 class Painter:
-    """Processes that draw the figures of flights into `folder`, which exists; `finish` waits until they have. Leaving the
-    context ends them. Where nothing is to be drawn, no process starts, and figures of earlier flights are removed."""
+    """A process that draws the figures of flights that `draw` sends it; `finish` waits until it has. Where this process can
+    be copied and there is another processor, it starts at once, and loads its library while laws fly. Leaving the context
+    ends it. Unless `wanted`, nothing is drawn, no process starts, and figures of earlier flights are removed."""
 
-    def __init__(self, scenario: Scenario, flights: Sequence[Flight], folder: Path, draw: bool = True) -> None:
-        picture = report_of(scenario.body).picture(flights, scenario)
-        if not draw:
-            for name in picture:
-                (folder / f"{name}.png").unlink(missing_ok=True)
+    def __init__(self, wanted: bool = True) -> None:
+        self._wanted, self._process = wanted, None
+        self._folder: Path | None = None
+        if wanted and can_fork() and len(os.sched_getaffinity(0)) > 1:
+            self._start()
+
+    def _start(self) -> None:
         # A copy of this process has nearly everything loaded.
         context: Any = get_context("fork" if can_fork() else "spawn")
-        self._folder, (self._failures, self._told) = folder, context.Pipe(duplex=False)
-        self._process = context.Process(target=_draw, args=(picture, folder.absolute(), self._told)) if draw else None
-        if self._process is not None:
-            self._process.start()
+        (self._failures, self._failed), (requests, self._requests) = (context.Pipe(duplex=False) for _ in range(2))
+        self._process = context.Process(target=_draw, args=(requests, self._failed, self._requests))
+        self._process.start()
+        requests.close()
+
+    def draw(self, scenario: Scenario, flights: Sequence[Flight], folder: Path) -> None:
+        """Begin to draw the figures into a folder that exists."""
+        from starhold.report.body import report_of
+
+        self._folder = folder
+        picture = report_of(scenario.body).picture(flights, scenario)
+        if not self._wanted:
+            for name in picture:
+                (folder / f"{name}.png").unlink(missing_ok=True)
+            return
+        if self._process is None:
+            self._start()
+        # `finish` tells how it ended.
+        with suppress(OSError):
+            self._requests.send((picture, folder.absolute()))
 
     def __enter__(self) -> Painter:
         return self
@@ -48,7 +65,8 @@ class Painter:
         if self._process is not None and self._process.is_alive():
             self._process.kill()
             self._process.join()
-            clear_unfinished(self._folder)
+            if self._folder is not None:
+                clear_unfinished(self._folder)
 
     def finish(self) -> None:
         """Wait for the files. InputError where they cannot be written; RuntimeError for any other failure."""
@@ -62,16 +80,22 @@ class Painter:
             raise RuntimeError(f"the figures could not be drawn: {failure}")
 
 
-def _draw(picture: Picture, folder: Path, failures: Connection) -> None:
-    """Draw the figures; what prevents that goes to `failures`, and what libraries say to nobody."""
+def _draw(requests: Connection, failures: Connection, other: Connection) -> None:
+    """Draw the figures that are requested; what prevents that goes to `failures`, and what libraries say to nobody."""
+    # With its last copy closed, the end of the original process is noticed here.
+    other.close()
     # Ctrl-C goes to the original process alone, which ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     gc.disable()
-    from starhold.report.figures import paint
-
     try:
+        from starhold.report.figures import paint
+
+        import_module("matplotlib.backends.backend_agg")
+        picture, folder = requests.recv()
         paint(picture, folder)
+    except EOFError:
+        return
     except InputError as error:
         failures.send(error)
     except Exception:

@@ -47,7 +47,7 @@ def smallest(A: Array, corners: Array, pushes: list[Array], heed: float) -> tupl
         room = symmetric - corners @ symmetric @ corners.transpose(0, 2, 1) / kept
         if np.linalg.eigvalsh(room).min() <= 0.0:
             return inf, A, shares
-        symmetric = symmetric * max(float(linalg.eigh(fed, one, eigvals_only=True)[-1]) for one in room)
+        symmetric = symmetric * max(top(fed, one) for one in room)
         return extent(symmetric, heed), symmetric, shares
 
     def size(x: Array) -> float:
@@ -100,7 +100,7 @@ def fitted(corners: Array, pushes: list[Array], shares: Array, X: Array, heed: f
     room = fit - corners @ fit @ corners.transpose(0, 2, 1) / kept
     if np.linalg.eigvalsh(fit)[0] <= 0.0 or np.linalg.eigvalsh(room).min() <= 0.0:
         return None
-    return fit * max(float(linalg.eigh(plain, one, eigvals_only=True)[-1]) for one in room)
+    return fit * max(top(plain, one) for one in room)
 
 
 def triangle(M: Array) -> Array:
@@ -112,4 +112,13 @@ def triangle(M: Array) -> Array:
 
 def highest_ratio(a: Rows, b: Rows) -> float:
     """Return an upper bound of the eigenvalues of b^-1 a."""
-    return float(linalg.eigh(floats(a), floats(b), eigvals_only=True)[-1]) * MORE
+    return top(floats(a), floats(b)) * MORE
+
+
+def top(a: Array, b: Array) -> float:
+    """Return the largest eigenvalue of b^-1 a, a and b symmetric and b positive definite: by LAPACK at once, because checks
+    of small matrices take longer than the eigenvalues."""
+    values, _, failed = linalg.lapack.dsygvd(a, b, jobz="N", uplo="L")
+    if failed:
+        raise np.linalg.LinAlgError("a matrix is not positive definite")
+    return float(values[-1])

@@ -54,10 +54,7 @@ LEANS = (0.1, 0.18, 0.3, 0.45)
 own V, if it is a form of q, takes the place of the first two terms."""
 FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.03, 7, 8.0, 20, 24, 2000
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
-the largest ratio of successive levels; the most levels and ellipsoids; the number of states of a set at which the torque is
-examined.
-"""
-
+the largest ratio of successive levels; the most levels and ellipsoids; at how many states of a set torque is examined."""
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 Beginning: TypeAlias = tuple[list[float], float, dict[str, float], list[float]]
@@ -259,7 +256,8 @@ def ways(loop: Loop, against: Pushes, noisy: bool, begin: Beginning) -> list[Pus
     """Return the searches by the law's own even V and by another, that of the larger start first."""
     first = Pushed(loop, against, noisy)
     both = [first, Pushed(loop, against, noisy, given=False)] if first.even else [first]
-    return sorted(both, key=lambda one: one.start(*begin), reverse=True) if len(both) > 1 else both
+    angle, rate = both[-1].start(*begin) if first.even else (0.0, 0.0)
+    return both if not angle or first.may_begin(angle, rate, begin[2]) else both[::-1]
 
 
 class Pushed:
@@ -339,7 +337,7 @@ class Pushed:
         """Return whether there is a start set, which is looked for once."""
         key = angle, rate, *limits.items()
         if key not in self.refused:
-            self.refused[key] = "" if self.begun(angle, rate, limits) is not None else self.loop.failed[POINTS]
+            self.refused[key] = "" if self.begun(angle, rate, limits, True) is not None else self.loop.failed[POINTS]
         if self.refused[key]:
             self.loop.failed[POINTS] = self.refused[key]
         return not self.refused[key]
@@ -352,9 +350,11 @@ class Pushed:
         self.largest = max(self.largest, (angle, rate, start + self.loop.failed[POINTS]))
         return False
 
-    def begun(self, angle: float, rate: float, limits: dict[str, float]) -> tuple[dict[str, Any], list[Chain]] | None:
+    def begun(
+        self, angle: float, rate: float, limits: dict[str, float], examined: bool = False
+    ) -> tuple[dict[str, Any], list[Chain]] | None:
         """Return the claim's numbers of the start set, and a chain from there for each lean of V; None, and the reason in
-        `failed`, where V does not decrease on the set or the torque exceeds its limits."""
+        `failed`, where V does not decrease on the set or, as far as this is examined, the torque exceeds its limits."""
         loop, J, begun, half = self.loop, self.J, list[Chain](), min(angle, pi) / 2.0
         numbers = self.numbers | limits
         numbers |= {"start.angle": angle, "start.rate": rate} if rate > 0.0 else {"angle": angle}
@@ -369,7 +369,7 @@ class Pushed:
         if not any(chain.decreases() for chain in begun):
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return None
-        if not begins(loop, self.claim(begun[0].V, numbers | {"level": begun[0].level}), self.scales):
+        if examined and not begins(loop, self.claim(begun[0].V, numbers | {"level": begun[0].level}), self.scales):
             return None
         return numbers, begun
 

@@ -10,6 +10,7 @@ from fractions import Fraction
 from functools import cache
 from importlib import import_module
 from itertools import combinations_with_replacement
+from math import ldexp
 from typing import Any, TypeVar
 
 import numpy as np
@@ -95,9 +96,10 @@ def counts(o: Squares) -> list[int]:
 
 def free(columns: Sequence[Poly], z: Sequence[Poly]) -> Sequence[Poly]:
     """Return z without those of which the matrix would have to have a zero for the square, that nothing else makes."""
-    others = {m for q in columns for m in q.terms}
-    others |= {m for i, a in enumerate(z) for b in z[:i] for m in (a * b).terms}
-    kept = [a for a in z if not others.isdisjoint((a * a).terms)]
+    pairs, grams = products(z)
+    others = {m for q in columns for m in q.upper}
+    others |= {m for (i, k), q in zip(pairs, grams, strict=True) if i != k for m in q.upper}
+    kept = [z[i] for (i, k), q in zip(pairs, grams, strict=True) if i == k and not others.isdisjoint(q.upper)]
     return z if len(kept) == len(z) else free(columns, kept)
 
 
@@ -118,10 +120,9 @@ def ansatzes(o: Squares, p: Poly, known: list[Poly], count: int) -> list[list[li
     """Return what is tried for cofactors: first only what makes no monomial that nothing else has, so that all that rounding
     leaves can be put on the matrix."""
     whole = cofactors(o, p, count)
-    grams = [a * b for k, a in enumerate(o.z[:count]) for b in o.z[: k + 1]]
-    monomials = {m for q in (p, *known, *grams) for m in q.terms}
+    monomials = {m for q in (p, *known, *products(o.z[:count])[1]) for m in q.upper}
     fitting = [
-        [c for c in parts if (c * relation).terms.keys() <= monomials]
+        [c for c in parts if (c * relation).upper.keys() <= monomials]
         for relation, parts in zip(o.modulo, whole, strict=True)
     ]
     return [fitting, whole] if fitting != whole and any(fitting) else [whole]
@@ -150,13 +151,17 @@ def degree(p: Poly) -> int:
 
 def posed(p: Poly, known: list[Poly], others: list[Poly], z: Sequence[Poly]) -> Problem:
     """Return the problem of finding multipliers of what is known, factors of the others and a Gram matrix."""
-    pairs, grams = products(tuple(tuple(sorted(p.terms.items())) for p in z))
+    pairs, grams = products(z)
     return Problem(p, [*known, *others, *grams], len(known), pairs, z)
 
 
-@cache
-def products(z: tuple[tuple[tuple[Monomial, Fraction], ...], ...]) -> tuple[list[tuple[int, int]], list[Poly]]:
+def products(z: Sequence[Poly]) -> tuple[list[tuple[int, int]], list[Poly]]:
     """Return the places of a Gram matrix's upper triangle, and what its entries stand before."""
+    return _products(tuple(tuple(sorted(p.terms.items())) for p in z))
+
+
+@cache
+def _products(z: tuple[tuple[tuple[Monomial, Fraction], ...], ...]) -> tuple[list[tuple[int, int]], list[Poly]]:
     parts, pairs = [Poly(dict(terms)) for terms in z], [(i, k) for k in range(len(z)) for i in range(k + 1)]
     return pairs, [parts[i] * parts[k] * (1 if i == k else 2) for i, k in pairs]
 
@@ -272,7 +277,7 @@ def rounded(x: float, digits: int) -> Fraction:
     if x == 0.0:
         return Fraction(0)
     exponent = int(np.floor(np.log2(abs(x)))) + 1 - int(digits * 3.33)
-    return Fraction(round(Fraction(x) / Fraction(2) ** exponent)) * Fraction(2) ** exponent
+    return Fraction(round(ldexp(x, -exponent)) << max(exponent, 0), 1 << max(-exponent, 0))
 
 
 def exactly(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:

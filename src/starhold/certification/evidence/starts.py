@@ -1,20 +1,25 @@
 """From where a claim about the loop that flies is sought: the rate of the loop's start, its stiffness, and sound sets."""
 
+from collections.abc import Mapping
 from fractions import Fraction
 from itertools import takewhile
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.certification.assumptions import as_it_starts
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, read
+from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, interior_point, posed, settled
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
 from starhold.kernel.numbers import RefusedError
+from starhold.kernel.rules import Squares
 from starhold.kernel.theorems.pointing import points
 from starhold.loop.closed_loop import ClosedLoop
 
+Array = NDArray[np.float64]
 POINTS = "points"
 
 
@@ -24,12 +29,17 @@ def start_rate(loop: ClosedLoop) -> float:
 
 
 def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
-    """Return whether the set of a claim without levels is sound, and the torque keeps its limits on it."""
+    """Return whether the set of a claim without levels is sound, and the torque keeps its limits on it, as far as floats
+    tell."""
     try:
         shown = points(read(claim | {"numbers": claim["numbers"] | {"highest": "0"}}, loop.by_digest))
         wanted = dict(takewhile(lambda one: one[0] != "V between samples", shown))
-        for name in wanted:
-            evidence(name, wanted, scales)
+        for name, o in wanted.items():
+            chance = likely(o, scales) if isinstance(o, Squares) else None
+            if chance is None:
+                evidence(name, wanted, scales)
+            elif chance < DEFINITE:
+                raise NotFoundError(f"{name}: no sum of squares was found")
     except (NotFoundError, RefusedError) as reason:
         loop.failed[POINTS] = str(reason)
         return False
@@ -39,3 +49,36 @@ def begins(loop: Loop, claim: dict[str, Any], scales: dict[str, float]) -> bool:
 def feedback(loop: AttitudeLoop) -> float:
     """Return the stiffness of the law near rest, a third of its trace."""
     return -float(sum(row[3 + k] for k, row in enumerate(near_target(loop, Fraction(0)).torque))) / 3.0
+
+
+def likely(o: Squares, scales: Mapping[str, float]) -> float | None:
+    """Return by how much the matrix of a sum of squares can be definite, in floats, where each of its entries has a monomial
+    of its own: it follows from multipliers and cofactors, and the interior point looks for these few alone. None otherwise.
+    """
+    p, known, _ = settled(o)
+    others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
+    z = o.z if o.least else free([p, *known, *others], o.z)
+    problem = posed(p, known, others, z)
+    A, b, _ = equations(problem, scales)
+    head, count = A.shape[1] - len(problem.pairs), len(problem.pairs)
+    grams = A[:, head:]
+    places: list[int] = list(grams.indices)
+    if not len(places) == len(set(places)) == count:
+        return None
+    # In triangles of matrices, the entries beside the diagonal twice.
+    weights = np.array([1.0 if i == k else 0.5**0.5 for i, k in problem.pairs]) / grams.data
+    unit, equal = float(np.abs(b).max()) or 1.0, sorted(set(range(len(b))) - set(places))
+    square, strict = (
+        [[float(i == k)] for i, k in problem.pairs],
+        [[float(k < problem.strict)] for k in range(problem.signed)],
+    )
+    rows: list[Array] = [
+        np.hstack([A[equal, :head].toarray(), np.zeros((len(equal), 1))]),
+        np.hstack([-np.eye(problem.signed, head), np.array(strict).reshape(-1, 1)]),
+        np.eye(head + 1)[head:],
+        np.hstack([A[places, :head].toarray() * weights[:, None], np.array(square)]),
+    ]
+    right = np.concatenate([b[equal] / unit, np.zeros(problem.signed), np.ones(1), b[places] * weights / unit])
+    cost = -np.eye(head + 1)[head]
+    x = interior_point(cost, np.vstack(rows), right, len(equal), problem.signed + 1, [len(z)])
+    return None if x is None else float(x[-1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
-from math import ceil, floor
+from math import ceil
 
 from ..held import Held
 from ..loops import AXES, AttitudeLoop, slopes
@@ -164,20 +164,20 @@ def covariance(X: Rows, A: Rows, B: Rows) -> Rows:
     """Return what is no less than the covariance of Ax + Bn, in numbers as short as those of X. With what is rounded off of
     A and B, b, (a + b)(a + b)' <= (1 + 1/c) aa' + (1 + c) bb', and bb' is no more than squares of entries and the trace."""
     n, size, one, fine = len(A), len(X), 1 << PLACES, 1 << FINE
-    motion, noise = ([{k: y for k, x in enumerate(row) if (y := floor(x * one))} for row in rows] for rows in (A, B))
-    shape = [[floor(x * fine) for x in row] for row in X]
+    whole = [[[x.numerator * one // x.denominator for x in row] for row in rows] for rows in (A, B)]
+    motion, noise = ([{k: x for k, x in enumerate(row) if x} for row in rows] for rows in whole)
+    shape = [[x.numerator * fine // x.denominator for x in row] for row in X]
     Account.spend(size * sum(map(len, motion)) + n * sum(map(len, motion + noise)), 2 * PLACES + FINE)
     half = [[sum([x * row[k] for k, x in given.items()]) for row in shape] for given in motion]
     trace, c = sum(X[k][k] for k in range(size)), 1 << SLIGHT
     room = ceil((1 + c) * n * (size * trace + len(B[0])) * Fraction(fine, one * one)) + n
-    bound = scalar(Fraction(room, fine), n)
+    bound = scalar(0, n)
     for i, (given, pushed) in enumerate(zip(motion, noise, strict=True)):
         for j in range(i + 1):
             spread = sum([x * half[j][k] for k, x in given.items()])
             spread += sum([x * noise[j].get(k, 0) for k, x in pushed.items()]) << FINE
-            entry = Fraction(spread * (c + 1) >> 2 * PLACES + SLIGHT, fine)
-            bound[i][j] += entry
-            bound[j][i] = bound[i][j]
+            rounded = spread * (c + 1) >> 2 * PLACES + SLIGHT
+            bound[i][j] = bound[j][i] = Fraction(rounded + room * (i == j), fine)
     return bound
 
 
