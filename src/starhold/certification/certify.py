@@ -12,9 +12,10 @@ from starhold.algebra.vector import dot
 from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, VALID_ESTIMATE, WHEELS
 from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, Claim, Obligation
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
+from starhold.certification.evidence.detumbling import is_about
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.evidence.pointing import POINTS
-from starhold.certification.proofs import HELD_AND_PUSHED, pointed, proved_claims
+from starhold.certification.proofs import HELD_AND_PUSHED, detumbled, pointed, proved_claims
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
 from starhold.certification.unmodelled import named
 from starhold.laws.interface import Measurement
@@ -99,6 +100,9 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
     if loop.remembers and loop.law.lyapunov is not None:
         claims.append(undecided("convergence", EVERYWHERE, subject, REMEMBERS))
     unflown = REMEMBERS if loop.remembers else unsound
+    if is_about(loop):
+        claim, _ = detumbled(subject)
+        claims += [] if claim is None else [claim]
     if not unflown and wanted.alone:
         claim, reason = pointed(subject, wanted.like, wanted.begun)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))

@@ -3,13 +3,13 @@
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import Any, cast
 
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
 from starhold.certification.certificate import FILE, ORBIT, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
+from starhold.certification.rounding import angle, shown, speed
 from starhold.laws.catalogue import file_of, known_law
 
 HEADINGS = {
@@ -22,32 +22,12 @@ HEADINGS = {
     "pointing": "pointing as it flies",
     "sampling": "torque held between samples",
     "sliding": "reaches its surface",
+    "detumbling": "loses energy",
     "circle": "ends on the circle",
     "control-limit": "within the control's limit",
     "equilibrium": "comes to rest",
     "saturated-axis": "X with limited control",
 }
-
-
-def shown(value: float, unit: str = "", up: bool = False) -> str:
-    """Show a number as it was written, if that takes at most seven digits; else with four, rounded down, or up where it
-    bounds from above, so that no more is said than is proved."""
-    written = Decimal(f"{value:.15g}")
-    if len(written.normalize().as_tuple().digits) <= 7:
-        # Converting a unit loses the last bits.
-        return f"{float(written):.7g}{unit}"
-    rounding = ROUND_CEILING if up else ROUND_FLOOR
-    return f"{float(Context(prec=4, rounding=rounding).create_decimal(Decimal(value))):g}{unit}"
-
-
-def angle(radians: float, up: bool = False) -> str:
-    """An angle in degrees."""
-    return shown(math.degrees(radians), "°", up)
-
-
-def speed(rate: float, up: bool = False) -> str:
-    """A rate in degrees a second."""
-    return shown(math.degrees(rate), "°/s", up)
 
 
 def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
@@ -288,6 +268,22 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{where} the motion reaches the surface {against} and {end}"
 
 
+def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    levels = zip(*(n[name] for name in ("rates", "turning", "rise", "often", "spell", "share")), strict=True)
+    falls = [
+        f"at up to {speed(rate)} of the body above {speed(least, True)}, else it rises by up to {shown(rise, ' W', True)},"
+        f" so that it is above {speed(often, True)} for at most {shown(spell, ' s', True)} and"
+        f" {shown(100.0 * share, ' %', True)} of the time"
+        for rate, least, rise, often, spell, share in levels
+    ]
+    return (
+        f"the energy falls in each control period of {n['period']:.12g} s in which the field turns in the body fast enough,"
+        f" {'; '.join(falls)}; in a field of at least {shown(n['field'], ' T', True)} that changes by up to"
+        f" {shown(100.0 * n['field_change'], ' %')} a second, with torques from outside of up to"
+        f" {shown(n['torque'], ' N m')} and, across the field, {shown(n['torque_across'], ' N m')}"
+    )
+
+
 def _circles(n: Mapping[str, Any]) -> str:
     if "inner" not in n:
         return ""
@@ -331,6 +327,7 @@ _SENTENCES = {
     "pointing": _pointing,
     "sampling": _sampling,
     "sliding": _sliding,
+    "detumbling": _detumbling,
     "circle": _circle,
     "control-limit": _control_limit,
     "equilibrium": _equilibrium,

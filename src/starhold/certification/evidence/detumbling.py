@@ -1,0 +1,153 @@
+"""Finds the claim about a law that opposes the change of the magnetic field: rates of the body, and above which turning of
+the field in it the kinetic energy falls."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import hypot, inf, isfinite, sqrt
+from typing import Any
+
+import numpy as np
+
+from starhold.algebra.polynomial import UnreadableError
+from starhold.certification.evidence.finding import NotFoundError, complete, read
+from starhold.certification.evidence.recorded import RecordedLoop
+from starhold.certification.evidence.squares import rounded
+from starhold.certification.field import field_along
+from starhold.certification.subject import Subject, above
+from starhold.certification.unmodelled import environment_torques
+from starhold.errors import InputError
+from starhold.kernel.loops import WHEELS, AttitudeLoop
+from starhold.kernel.numbers import RefusedError
+from starhold.kernel.theorems.detumbling import Quadratic, highest, power_at, slope, value
+from starhold.laws.program import law_program
+from starhold.loop.closed_loop import ClosedLoop
+from starhold.parts.craft import tensor
+from starhold.parts.effectors.magnetorquers import LIMITED
+from starhold.parts.effectors.wheel_motion import has_friction
+
+DETUMBLES = "detumbles"
+IDLE = "inactive-wheels"
+"""The wheels of a mode in which they are inactive."""
+MORE = 1.0 + 1e-6
+PARTS, PART = 5, 3.0
+"""How many rates are tried, and the ratio of each to the next."""
+NEARLY = 1e-3
+"""The share of a rate by which the field's turning, above which the energy falls, is less at least."""
+
+
+def find_detumbling(subject: Subject) -> RecordedLoop:
+    """Find the claim for the rate at the start, and for parts of it while the field's turning, above which the energy is
+    shown to fall, is slower than the body."""
+    loop = RecordedLoop(subject)
+    try:
+        words, numbers = bounds_of(subject)
+        loop = remembering(subject)
+        wired = AttitudeLoop(read(loop.claim(DETUMBLES, words, None, **numbers), loop.by_digest), quotients=True)
+        rates = levels(wired, hypot(*subject.loop.start.rate) * MORE)
+        if not rates:
+            raise NotFoundError("the body turns too far in a control period for its dipole to oppose its rate")
+        claim = loop.claim(DETUMBLES, words, None, **numbers, **rates)
+        loop.claims.append(complete(claim, loop.by_digest, {}))
+    except (NotFoundError, RefusedError, ValueError, InputError, UnreadableError) as reason:
+        loop.failed[DETUMBLES] = str(reason)
+    return loop
+
+
+def remembering(subject: Subject) -> RecordedLoop:
+    """Return a loop with its law's memory among the inputs and outputs of its program. Errors as of `straight_line`."""
+    loop, flown = RecordedLoop(subject), subject.loop
+    loop.roles["law"] = loop.keep(law_program(flown.law, flown.gains, flown.known, flown.period, remembers=True))
+    return loop
+
+
+def bounds_of(subject: Subject) -> tuple[list[str], dict[str, Any]]:
+    """Return the words of the claim, and the numbers that are not about rates. NotFoundError for a loop that the theorem is
+    not about."""
+    loop = subject.loop
+    rods = [f for f in loop.used("effector") if f.part.name == "magnetorquers" and f.part.file is None]
+    idle = [f for f in loop.used("effector") if f.part.name == IDLE]
+    if len(rods) != 1 or len(rods) + len(idle) < len(loop.used("effector")):
+        raise NotFoundError("other effectors than magnetorquers act")
+    params = rods[0].params
+    if params.limited != LIMITED.choices.index("together") or any(params.mounting_error):
+        raise NotFoundError("the dipoles of the magnetorquers are not reduced together, or not as commanded")
+    if any(has_friction(f.params) for f in idle):
+        raise NotFoundError("wheels are braked by friction")
+    turning, across = environment_torques(loop, subject.envelope(False))
+    fastest = hypot(*loop.start.rate) * MORE
+    outside = turning.torque + above(subject.modelled_norm) + fastest * turning.per_rate
+    if not isfinite(outside + across):
+        raise NotFoundError("a torque from outside has no bound")
+    least, change = field_along(loop, params.epoch)
+    moments = np.linalg.eigvalsh(tensor(loop.craft.inertia))
+    numbers: dict[str, Any] = {
+        "inertia.low": float(moments[0]) / MORE,
+        "inertia.high": float(moments[-1]) * MORE,
+        "dipole.limit": min(params.dipole_limit),
+        "field.least": least,
+        "field.change": change,
+        "outside": outside * MORE,
+        "outside.across": across * MORE,
+    }
+    if loop.limit != "none" and isfinite(loop.saturation_limit()):
+        numbers["limit"] = loop.saturation_limit()
+    if not idle:
+        return [], numbers
+    return [WHEELS], numbers | {"stored": stored(idle[0].start.momentum, idle[0].params.axes)}
+
+
+def stored(momenta: Any, axes: Any) -> float:
+    """Return the norm of the momentum of wheels together (N m s), rounded up."""
+    return float(np.linalg.norm(np.array(momenta) @ np.array(axes))) * MORE
+
+
+def levels(wired: AttitudeLoop, rate: float) -> dict[str, Any]:
+    """Return the numbers of rates, the largest first, at which the energy falls while the field turns slower than that."""
+    count, numbers, bounds = 0, dict[str, Any](), wired.claim.numbers
+    for k in range(PARTS):
+        slow = Fraction(rate / PART**k)
+        wanted = wired.claim.subject["gains.k"] * (slow + bounds["field.change"])
+        if "limit" in bounds and bounds["limit"] <= wanted:
+            continue
+        try:
+            power = power_at(wired, slow)
+        except RefusedError:
+            continue
+        roots = largest_root(negative(power.free)), largest_root(power.limited)
+        if max(roots) >= slow * (1.0 - NEARLY):
+            continue
+        least = rounded(max(roots) * MORE, 9)
+        often = min(2 * least, (least + slow) / 2)
+        falls = [-value(power.free, often), value(power.limited, often) / value(power.seen, often)]
+        fall = min(*falls, slope(power.limited, often) / power.seen[1])
+        rise = max(highest(power.free), value(power.others, least))
+        entries = {"rate": slow, "above": least, "often": often, "fall": near(fall, 1.0 / MORE), "rise": near(rise, MORE)}
+        numbers |= {f"{name}.{count}": x for name, x in entries.items()}
+        count += 1
+    return numbers
+
+
+def near(x: Fraction, share: float) -> Fraction:
+    """Return a short number that is about a share of another one."""
+    return rounded(float(x) * share, 15)
+
+
+def negative(p: Quadratic) -> Quadratic:
+    """Return -p."""
+    x, y, z = p
+    return -x, -y, -z
+
+
+def largest_root(p: Quadratic) -> float:
+    """Return from where on a quadratic is positive and grows; infinity where it is not in the end."""
+    a, b, c = (float(x) for x in p)
+    if c <= 0.0:
+        return inf
+    middle, room = -b / (2.0 * c), b * b - 4.0 * a * c
+    return max(middle, 0.0) if room < 0.0 else max(middle + sqrt(room) / (2.0 * c), 0.0)
+
+
+def is_about(loop: ClosedLoop) -> bool:
+    """Return whether a law keeps a memory of the magnetic field alone."""
+    return loop.remembers and loop.law.lyapunov is None and "magnetic_field" in loop.law.reads
