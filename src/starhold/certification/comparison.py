@@ -7,7 +7,7 @@ from typing import Any
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop
-from starhold.certification.evidence.detumbling import DETUMBLES, bounds_of, remembering
+from starhold.certification.evidence.detumbling import DETUMBLES, bounds_of
 from starhold.certification.evidence.finding import NotFoundError
 from starhold.certification.evidence.pointing import POINTS
 from starhold.certification.evidence.recorded import sign_words
@@ -33,10 +33,11 @@ ALMOST = Fraction(1, 10**9)
 def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = None) -> list[str]:
     """Return how a claim, which the kernel has checked, differs from this loop, or covers less than another mode hands over,
     up to its ends; empty where it does not."""
-    if claim["theorem"] == DETUMBLES:
-        return [*_of_detumbling(claim, loop)]
     recorded = Loop(make_subject(loop))
-    apart = [*_programs(claim, recorded.roles, recorded.subject), *_numbers(claim, recorded)]
+    apart = [*_programs(claim, recorded.roles, recorded.subject)]
+    if claim["theorem"] == DETUMBLES:
+        return [*apart, *_of_detumbling(claim, recorded)]
+    apart += _numbers(claim, recorded)
     return [*apart, *_words(claim, recorded), *_handed_over(claim, ends)]
 
 
@@ -49,9 +50,7 @@ def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]
     return [*_programs(claim, expected["programs"], expected["subject"]), *["the limit differs"] * other]
 
 
-def _of_detumbling(claim: Mapping[str, Any], loop: ClosedLoop) -> Iterator[str]:
-    recorded = remembering(make_subject(loop))
-    yield from _programs(claim, recorded.roles, recorded.subject)
+def _of_detumbling(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     try:
         words, numbers = bounds_of(recorded.known)
     except NotFoundError as reason:

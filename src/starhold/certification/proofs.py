@@ -257,7 +257,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         "told": "outside.0" in numbers,
         "share": below(1 - _exact(numbers["share"])) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),
-        **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
+        **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
         **{name: above(_exact(numbers[key])) for name, key in ends.items()},
     }
 
@@ -277,7 +277,7 @@ def _detumbled(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str,
         "often": each("often", above),
         # A margin, because these are computed in floats.
         "spell": [0.5 * high * w * w / (x + y) * (1.0 + 1e-9) for w, x, y in zip(rates, falls, rises, strict=True)],
-        "share": [y / (x + y) * (1.0 + 1e-9) for x, y in zip(falls, rises, strict=True)],
+        "shares": [y / (x + y) * (1.0 + 1e-9) for x, y in zip(falls, rises, strict=True)],
         **{name: below(_exact(numbers[key])) for name, key in keys.items()},
         "field": above(_exact(numbers["field.least"])),
         **({"stored": below(_exact(numbers["stored"]))} if "stored" in numbers else {}),

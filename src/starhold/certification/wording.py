@@ -236,6 +236,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
+    bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
     near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"
@@ -269,7 +270,9 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    levels = zip(*(n[name] for name in ("rates", "turning", "rise", "often", "spell", "share")), strict=True)
+    if "rates" not in n:
+        return "the energy falls where the magnetic field turns in the body"
+    levels = zip(*(n[name] for name in ("rates", "turning", "rise", "often", "spell", "shares")), strict=True)
     falls = [
         f"at up to {speed(rate)} of the body above {speed(least, True)}, else it rises by up to {shown(rise, ' W', True)},"
         f" so that it is above {speed(often, True)} for at most {shown(spell, ' s', True)} and"

@@ -20,7 +20,6 @@ from starhold.errors import InputError
 from starhold.kernel.loops import WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.theorems.detumbling import Quadratic, highest, power_at, slope, value
-from starhold.laws.program import law_program
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.magnetorquers import LIMITED
@@ -42,7 +41,6 @@ def find_detumbling(subject: Subject) -> RecordedLoop:
     loop = RecordedLoop(subject)
     try:
         words, numbers = bounds_of(subject)
-        loop = remembering(subject)
         wired = AttitudeLoop(read(loop.claim(DETUMBLES, words, None, **numbers), loop.by_digest), quotients=True)
         rates = levels(wired, hypot(*subject.loop.start.rate) * MORE)
         if not rates:
@@ -51,13 +49,6 @@ def find_detumbling(subject: Subject) -> RecordedLoop:
         loop.claims.append(complete(claim, loop.by_digest, {}))
     except (NotFoundError, RefusedError, ValueError, InputError, UnreadableError) as reason:
         loop.failed[DETUMBLES] = str(reason)
-    return loop
-
-
-def remembering(subject: Subject) -> RecordedLoop:
-    """Return a loop with its law's memory among the inputs and outputs of its program. Errors as of `straight_line`."""
-    loop, flown = RecordedLoop(subject), subject.loop
-    loop.roles["law"] = loop.keep(law_program(flown.law, flown.gains, flown.known, flown.period, remembers=True))
     return loop
 
 
