@@ -214,7 +214,7 @@ def loop_of(r):
 @pytest.mark.parametrize("first", [0, pytest.param(10, marks=pytest.mark.slow)])
 def test_random_loops_keep_their_claims(first):
     proved = 0
-    for seed in range(first, 3 if not first else 60):
+    for seed in range(first, 2 if not first else 60):
         given = loop_of(np.random.default_rng(seed))
         found = find_detumbling(make_subject(build(given, given.laws[0])))
         if found.claims:

@@ -272,17 +272,17 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "rates" not in n:
         return "the energy falls where the magnetic field turns in the body"
-    levels = zip(*(n[name] for name in ("rates", "turning", "rise", "often", "spell", "shares")), strict=True)
-    falls = [
-        f"at up to {speed(rate)} of the body above {speed(least, True)}, else it rises by up to {shown(rise, ' W', True)},"
-        f" so that it is above {speed(often, True)} for at most {shown(spell, ' s', True)} and"
-        f" {shown(100.0 * share, ' %', True)} of the time"
-        for rate, least, rise, often, spell, share in levels
-    ]
+
+    def most(name: str, unit: str, size: float = 1.0) -> str:
+        return listed([shown(size * x, unit, up=True) for x in n[name]])
+
+    falls = [f"{speed(m, True)} at up to {speed(rate)}" for m, rate in zip(n["turning"], n["rates"], strict=True)]
     return (
-        f"the energy falls in each control period of {n['period']:.12g} s in which the field turns in the body fast enough,"
-        f" {'; '.join(falls)}; in a field of at least {shown(n['field'], ' T', True)} that changes by up to"
-        f" {shown(100.0 * n['field_change'], ' %')} a second, with torques from outside of up to"
+        f"the energy falls in each control period of {n['period']:.12g} s in which the field turns in the body by more than"
+        f" {listed(falls)}, and else rises by up to {most('rise', ' W')}; it turns by more than"
+        f" {most('often', '°/s', math.degrees(1.0))} for at most {most('spell', ' s')} and {most('shares', ' %', 100.0)} of"
+        f" the time; with a field of at least {shown(n['field'], ' T', True)} that changes by up to"
+        f" {shown(100.0 * n['field_change'], ' %')} a second, and torques from outside of up to"
         f" {shown(n['torque'], ' N m')} and, across the field, {shown(n['torque_across'], ' N m')}"
     )
 

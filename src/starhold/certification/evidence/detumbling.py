@@ -4,7 +4,7 @@ the field in it the kinetic energy falls."""
 from __future__ import annotations
 
 from fractions import Fraction
-from math import hypot, inf, isfinite, sqrt
+from math import inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -29,20 +29,21 @@ DETUMBLES = "detumbles"
 IDLE = "inactive-wheels"
 """The wheels of a mode in which they are inactive."""
 MORE = 1.0 + 1e-6
-PARTS, PART = 5, 3.0
-"""How many rates are tried, and the ratio of each to the next."""
+LESS, PART, LEVELS, SLOWEST = 1.3, 3.0, 3, 100.0
+"""The ratio of a rate to the next that is tried until the energy is shown to fall, and from then on; the most rates of a
+claim; the ratio of the first to the last that is tried."""
 NEARLY = 1e-3
 """The share of a rate by which the field's turning, above which the energy falls, is less at least."""
 
 
 def find_detumbling(subject: Subject) -> RecordedLoop:
-    """Find the claim for the rate at the start, and for parts of it while the field's turning, above which the energy is
-    shown to fall, is slower than the body."""
+    """Find the claim for about the largest rate that the energy at the start allows, and for parts of it, while the field's
+    turning above which the energy is shown to fall is slower than the body."""
     loop = RecordedLoop(subject)
     try:
         words, numbers = bounds_of(subject)
         wired = AttitudeLoop(read(loop.claim(DETUMBLES, words, None, **numbers), loop.by_digest), quotients=True)
-        rates = levels(wired, hypot(*subject.loop.start.rate) * MORE)
+        rates = levels(wired, fastest(subject.loop))
         if not rates:
             raise NotFoundError("the body turns too far in a control period for its dipole to oppose its rate")
         claim = loop.claim(DETUMBLES, words, None, **numbers, **rates)
@@ -66,8 +67,7 @@ def bounds_of(subject: Subject) -> tuple[list[str], dict[str, Any]]:
     if any(has_friction(f.params) for f in idle):
         raise NotFoundError("wheels are braked by friction")
     turning, across = environment_torques(loop, subject.envelope(False))
-    fastest = hypot(*loop.start.rate) * MORE
-    outside = turning.torque + above(subject.modelled_norm) + fastest * turning.per_rate
+    outside = turning.torque + above(subject.modelled_norm) + fastest(loop) * turning.per_rate
     if not isfinite(outside + across):
         raise NotFoundError("a torque from outside has no bound")
     least, change = field_along(loop, params.epoch)
@@ -88,35 +88,46 @@ def bounds_of(subject: Subject) -> tuple[list[str], dict[str, Any]]:
     return [WHEELS], numbers | {"stored": stored(idle[0].start.momentum, idle[0].params.axes)}
 
 
+def fastest(loop: ClosedLoop) -> float:
+    """Return the largest rate (rad/s) that a body has with the energy of a loop's start."""
+    J, w = tensor(loop.craft.inertia), np.array(loop.start.rate)
+    return float(np.sqrt(w @ J @ w / np.linalg.eigvalsh(J)[0])) * MORE
+
+
 def stored(momenta: Any, axes: Any) -> float:
     """Return the norm of the momentum of wheels together (N m s), rounded up."""
     return float(np.linalg.norm(np.array(momenta) @ np.array(axes))) * MORE
 
 
-def levels(wired: AttitudeLoop, rate: float) -> dict[str, Any]:
+def levels(wired: AttitudeLoop, fastest: float) -> dict[str, Any]:
     """Return the numbers of rates, the largest first, at which the energy falls while the field turns slower than that."""
-    count, numbers, bounds = 0, dict[str, Any](), wired.claim.numbers
-    for k in range(PARTS):
-        slow = Fraction(rate / PART**k)
-        wanted = wired.claim.subject["gains.k"] * (slow + bounds["field.change"])
-        if "limit" in bounds and bounds["limit"] <= wanted:
-            continue
-        try:
-            power = power_at(wired, slow)
-        except RefusedError:
-            continue
-        roots = largest_root(negative(power.free)), largest_root(power.limited)
-        if max(roots) >= slow * (1.0 - NEARLY):
-            continue
-        least = rounded(max(roots) * MORE, 9)
-        often = min(2 * least, (least + slow) / 2)
-        falls = [-value(power.free, often), value(power.limited, often) / value(power.seen, often)]
-        fall = min(*falls, slope(power.limited, often) / power.seen[1])
-        rise = max(highest(power.free), value(power.others, least))
-        entries = {"rate": slow, "above": least, "often": often, "fall": near(fall, 1.0 / MORE), "rise": near(rise, MORE)}
-        numbers |= {f"{name}.{count}": x for name, x in entries.items()}
-        count += 1
+    numbers, rate, count = dict[str, Any](), fastest, 0
+    while rate > fastest / SLOWEST and count < LEVELS:
+        level = level_at(wired, Fraction(rate))
+        numbers |= {f"{name}.{count}": x for name, x in level.items()}
+        count += bool(level)
+        rate /= PART if count else LESS
     return numbers
+
+
+def level_at(wired: AttitudeLoop, rate: Fraction) -> dict[str, Fraction]:
+    """Return the numbers of a rate; empty where the energy is not shown to fall."""
+    bounds, gain = wired.claim.numbers, wired.claim.subject["gains.k"]
+    if "limit" in bounds and bounds["limit"] <= gain * (rate + bounds["field.change"]):
+        return {}
+    try:
+        power = power_at(wired, rate)
+    except RefusedError:
+        return {}
+    root = max(largest_root(negative(power.free)), largest_root(power.limited))
+    if root >= rate * (1.0 - NEARLY):
+        return {}
+    least = rounded(root * MORE, 9)
+    often = min(2 * least, (least + rate) / 2)
+    falls = [-value(power.free, often), value(power.limited, often) / value(power.seen, often)]
+    fall = min(*falls, slope(power.limited, often) / power.seen[1])
+    rise = max(highest(power.free), value(power.others, least))
+    return {"rate": rate, "above": least, "often": often, "fall": near(fall, 1.0 / MORE), "rise": near(rise, MORE)}
 
 
 def near(x: Fraction, share: float) -> Fraction:
