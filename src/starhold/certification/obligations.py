@@ -53,6 +53,7 @@ OBLIGATIONS = {
     "entry": "the ellipsoid is reached from the set before",
     "end of the angle": "the angle in the end is as told, between samples too",
     "end of the rate": "the rate in the end is as told, between samples too",
+    "gyroscopic": "the body's own momentum turns its rate no faster than told",
     "square of the field": "the law divides by the field's square",
     "first torque of the law": "at its first measurement the law asks for no torque",
     "torque of the law": "the law's dipole is against the change of the field since the measurement before",

@@ -8,6 +8,7 @@ from math import inf, isfinite, sqrt
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from starhold.algebra.polynomial import UnreadableError
 from starhold.certification.evidence.finding import NotFoundError, complete, read
@@ -32,6 +33,8 @@ MORE = 1.0 + 1e-6
 LESS, PART, LEVELS, SLOWEST = 1.3, 3.0, 3, 100.0
 """The ratio of a rate to the next that is tried until the energy is shown to fall, and from then on; the most rates of a
 claim; the ratio of the first to the last that is tried."""
+STATES = 20_000
+"""How many rates are drawn for the largest gyroscopic acceleration."""
 NEARLY = 1e-3
 """The share of a rate by which the field's turning, above which the energy falls, is less at least."""
 
@@ -64,17 +67,19 @@ def bounds_of(subject: Subject) -> tuple[list[str], dict[str, Any]]:
     params = rods[0].params
     if params.limited != LIMITED.choices.index("together") or any(params.mounting_error):
         raise NotFoundError("the dipoles of the magnetorquers are not reduced together, or not as commanded")
-    if any(has_friction(f.params) for f in idle):
-        raise NotFoundError("wheels are braked by friction")
+    if any(has_friction(f.params) or f.params.unbalanced for f in idle):
+        raise NotFoundError("wheels are braked by friction, or out of balance")
     turning, across = environment_torques(loop, subject.envelope(False))
     outside = turning.torque + above(subject.modelled_norm) + fastest(loop) * turning.per_rate
     if not isfinite(outside + across):
         raise NotFoundError("a torque from outside has no bound")
     least, change = field_along(loop, params.epoch)
-    moments = np.linalg.eigvalsh(tensor(loop.craft.inertia))
+    J = tensor(loop.craft.inertia)
+    moments = np.linalg.eigvalsh(J)
     numbers: dict[str, Any] = {
         "inertia.low": float(moments[0]) / MORE,
         "inertia.high": float(moments[-1]) * MORE,
+        "gyroscopic": gyroscopic(J),
         "dipole.limit": min(params.dipole_limit),
         "field.least": least,
         "field.change": change,
@@ -92,6 +97,13 @@ def fastest(loop: ClosedLoop) -> float:
     """Return the largest rate (rad/s) that a body has with the energy of a loop's start."""
     J, w = tensor(loop.craft.inertia), np.array(loop.start.rate)
     return float(np.sqrt(w @ J @ w / np.linalg.eigvalsh(J)[0])) * MORE
+
+
+def gyroscopic(J: NDArray[np.float64]) -> float:
+    """Return about the largest |J^-1 (w x Jw)| / |w|^2, and a little more."""
+    w = np.random.default_rng(1).normal(size=(STATES, 3))
+    turned = np.linalg.norm(np.linalg.solve(J, np.cross(w, w @ J).T), axis=0)
+    return float((turned / (w * w).sum(axis=1)).max()) * 1.01 + 1e-6
 
 
 def stored(momenta: Any, axes: Any) -> float:

@@ -8,11 +8,11 @@ from itertools import count
 from typing import NamedTuple, TypeAlias
 
 from ..loops import AttitudeLoop, wired
-from ..numbers import demand, inverse, norm, plus, scalar, up
+from ..numbers import demand, plus, scalar, up
 from ..polynomials import apply, cross, dot, minus, poly, var, variables
 from ..programs import condition
 from ..reading import Claim
-from ..rules import Definite, Exceeds, Proof, Shown, vanish
+from ..rules import Definite, Exceeds, Proof, Shown, Squares, vanish
 from ..sentences import Statement, above, below
 
 Quadratic: TypeAlias = tuple[Fraction, Fraction, Fraction]
@@ -45,6 +45,11 @@ def detumbles(claim: Claim) -> Proof:
     yield from opposes_change(loop)
     yield "least moment", Definite(plus(loop.given, scalar(low), -1))
     yield "largest moment", Definite(plus(scalar(high), loop.given, -1))
+    # |J^-1 (w x Jw)| <= gyroscopic |w|^2.
+    w, turning = loop.w, apply(loop.J_inverse, cross(loop.w, apply(loop.J, loop.w)))
+    squares = [a * b for k, a in enumerate(w) for b in w[k:]]
+    size = numbers["gyroscopic"] * dot(w, w)
+    yield "gyroscopic", Squares(size * size - dot(turning, turning), squares, 0)
     texts = list[str]()
     for k in count():
         if f"rate.{k}" not in numbers:
@@ -108,7 +113,7 @@ def power_at(loop: AttitudeLoop, rate: Fraction) -> Power:
     demand(min(k, h, low, rate) > 0 and h * rate < 1, "the body turns too far in a period")
     # The rate at which the field turns changes by no more than turned m + begun per second.
     torque = k * (rate + change) + outside + across + (rate * numbers["stored"] if loop.wheels else 0)
-    turned, begun = rate / (1 - h * rate), up((gyroscopic(loop) * rate * rate + torque / low) / (1 - h * rate))
+    turned, begun = rate / (1 - h * rate), up((numbers["gyroscopic"] * rate * rate + torque / low) / (1 - h * rate))
     bent = linear(h / 2 * begun, h / 2 * turned)
     mean = combined(bent, linear(0, 1), 1)
     opposed = combined(product(linear(0, 1), linear(0, 1)), product(bent, bent), -1)
@@ -119,15 +124,6 @@ def power_at(loop: AttitudeLoop, rate: Fraction) -> Power:
     most, seen = numbers["dipole.limit"] * numbers["field.least"], combined(mean, UNIT, change)
     limited = combined(product(linear(most, 0), opposed), product(others, seen), -1)
     return Power(combined(others, opposed, -k), others, limited, seen)
-
-
-def gyroscopic(loop: AttitudeLoop) -> Fraction:
-    """Return a bound of |J^-1 (w x Jw)| / |w|^2."""
-    sizes = list[Fraction]()
-    for p in apply(inverse(loop.given), cross(loop.w, apply(loop.given, loop.w))):
-        rows = [[abs(p.slope(x).slope(y).number) / 2 for y in ("w1", "w2", "w3")] for x in ("w1", "w2", "w3")]
-        sizes.append(max(sum(row, Fraction(0)) for row in rows))
-    return norm(sizes)
 
 
 def linear(start: Fraction | int, rise: Fraction | int) -> Quadratic:
