@@ -8,7 +8,8 @@ from hypothesis import example, given
 from hypothesis import strategies as some
 
 from starhold.certification.certificate import Certificate, Claim, Obligation
-from starhold.certification.wording import eigenvalues, sentence, shown
+from starhold.certification.rounding import shown
+from starhold.certification.wording import eigenvalues, sentence
 from starhold.checker import Finding
 from starhold.cli.show_certificates import print_certificate, print_findings
 from starhold.studies.certificates import Tried

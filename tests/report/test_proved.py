@@ -139,6 +139,7 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "saturated-axis": {"limit": 1.0, "width": 0.1, "reach": 100.0, "boundary": 0.11},
         "control-limit": {"kind": "norm", "limit": 3.5},
         "hand-over": {"rate": 0.1, "angle": None},
+        "detumbling": {},
         "sliding": {"torque": [0.0, 0.0, 0.0], "margin": 1e-3},
     }[kind]
     claim = Claim(kind, numbers, {}, (), (Obligation("form", "exact identity", "undecided", {"reason": "why not"}),))

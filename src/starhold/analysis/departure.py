@@ -27,6 +27,8 @@ from starhold.trace.straight_line import evaluated
 
 Array: TypeAlias = NDArray[np.float64]
 CHANGES = "the loop, or the law's model of it, changes"
+HELD = {"held-torque", "held-field"}
+"""A claim with one of these is about a torque that is held between samples."""
 LOST = "the motion diverges"
 """No proof covers this: the motion is too fast for the integration, or beyond the divergence bound."""
 TURNED = "the torque is held while the body, or stored momentum, turns it by {:.2g} rad"
@@ -114,7 +116,7 @@ def departures(
     by_kind: dict[str, tuple[Departure, ...]] = {}
     for claim in _left(certificate):
         programs = claim.programs
-        paced = [] if "held-torque" in claim.assumptions else held_too_long
+        paced = held_too_long if HELD.isdisjoint(claim.assumptions) else []
         by_kind[claim.kind] = tuple(sorted({*common, *paced, *span.unmet(claim), *_set(claim, programs, span)}))
     return by_kind
 
@@ -151,6 +153,9 @@ def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departur
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
         left += span.first(total > momentum * (1.0 + 1e-9), "the total momentum exceeds the stated bound")
+    if "rates" in claim.numbers:
+        turned = np.linalg.norm(span["rate"], axis=1) > claim.numbers["rates"][0]
+        left += span.first(turned, "it turns faster than the claim is about")
     # V is at most `start` at the start, and `level` from then on; None for no bound.
     start = claim.numbers.get("start")
     level = claim.numbers.get("level", start)

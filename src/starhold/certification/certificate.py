@@ -101,7 +101,7 @@ class Claim:
 WITHOUT, ORBIT = "without:", "orbit-within:"
 """Begin the identifiers of the assumptions that a part is not there, role and name, and that forces move the orbit by no
 more than a share."""
-BESIDE = ("sampling", "control-limit", "saturated-axis")
+BESIDE = ("sampling", "control-limit", "saturated-axis", "detumbling")
 """Kinds of claims about a control loop that state no ultimate bound, and accompany one that does."""
 NOT_SOUGHT = "not sought"
 """Why a certificate lacks the claim about the loop as it flies, where none was sought."""

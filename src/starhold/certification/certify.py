@@ -12,15 +12,18 @@ from starhold.algebra.vector import dot
 from starhold.certification.assumptions import FRICTIONLESS, LINEAR, UNLIMITED, VALID_ESTIMATE, WHEELS
 from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, Claim, Obligation
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
+from starhold.certification.evidence.detumbling import is_about
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.evidence.pointing import POINTS
-from starhold.certification.proofs import HELD_AND_PUSHED, pointed, proved_claims
+from starhold.certification.proofs import HELD_AND_PUSHED, detumbled, pointed, proved_claims
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
 from starhold.certification.unmodelled import named
+from starhold.errors import InputError
 from starhold.laws.interface import Measurement
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import CLOCK, IS_VALID
 from starhold.parts.effectors.wheels import gives_allocated_torque
+from starhold.trace.straight_line import labelled
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,7 @@ INSTEAD = {
     "torque-limit": ("continuous-torque", "known-outside-torque"),
     "wheels": ("continuous-torque", FRICTIONLESS, "bounded-momentum", "known-outside-torque"),
     "inertia": ("continuous-torque", UNLIMITED, "no-outside-torque", "target-at-rest"),
+    "detumbling": ("held-field", "rods-alike", "bounded-outside-torque"),
     "sampling": (LINEAR, UNLIMITED, "no-outside-torque"),
 }
 """Further assumptions of claims, by kind."""
@@ -96,9 +100,9 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
         return [undecided("convergence", EVERYWHERE, subject, TIMED)], TIMED
     wheels = loop.wheels
     unsound = "" if wheels is None or gives_allocated_torque(wheels) else ASKEW if wheels.known_axes else LOST
-    if loop.remembers and loop.law.lyapunov is not None:
-        claims.append(undecided("convergence", EVERYWHERE, subject, REMEMBERS))
-    unflown = REMEMBERS if loop.remembers else unsound
+    if loop.remembers:
+        return _remembering(subject, wanted, unsound)
+    unflown = unsound
     if not unflown and wanted.alone:
         claim, reason = pointed(subject, wanted.like, wanted.begun)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
@@ -125,6 +129,26 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
         if "pointing" in proved or wanted.disturbance:
             claims.append(proved.get("pointing") or undecided("pointing", {"torque": wanted.disturbance}, subject, unflown))
     return claims, unflown
+
+
+def _remembering(subject: Subject, wanted: Wanted, unsound: str) -> tuple[list[Claim], str]:
+    """Return the claims about a loop whose law keeps a memory, and why none of them is about the loop as it flies."""
+    loop, claims = subject.loop, list[Claim]()
+    if loop.law.lyapunov is not None:
+        claims.append(undecided("convergence", EVERYWHERE, subject, REMEMBERS))
+    if is_about(loop):
+        claim, reason = detumbled(subject)
+        return [*claims, claim or undecided("detumbling", {}, subject, reason)], REMEMBERS
+    if unsound or not (wanted.pointing or wanted.alone or wanted.disturbance > 0.0):
+        memory = loop.law.remember(loop.gains, loop.known, loop.period)
+        return claims, unsound or (NOT_SOUGHT if any(labelled("memory", memory)) else REMEMBERS)
+    try:
+        claim, reason = pointed(subject, wanted.like, wanted.begun)
+    except (UnreadableError, InputError):
+        claim, reason = None, ""
+    if claim is not None:
+        return [*claims, claim], ""
+    return claims, f"{REMEMBERS}: {reason}" if reason else REMEMBERS
 
 
 def between_samples(subject: Subject, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:

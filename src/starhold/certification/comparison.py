@@ -7,6 +7,8 @@ from typing import Any
 
 from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop
+from starhold.certification.evidence.detumbling import DETUMBLES, bounds_of
+from starhold.certification.evidence.finding import NotFoundError
 from starhold.certification.evidence.pointing import POINTS
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
@@ -24,12 +26,18 @@ from starhold.parts.contract import DEVIATIONS
 from starhold.parts.effectors.wheel_motion import at_top_speed
 from starhold.parts.effectors.wheels import BAND, gives_allocated_torque
 
+ALMOST = Fraction(1, 10**9)
+"""A share by which the field along an orbit may be another one, for floats tell it."""
+
 
 def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = None) -> list[str]:
     """Return how a claim, which the kernel has checked, differs from this loop, or covers less than another mode hands over,
     up to its ends; empty where it does not."""
     recorded = Loop(make_subject(loop))
-    apart = [*_programs(claim, recorded.roles, recorded.subject), *_numbers(claim, recorded)]
+    apart = [*_programs(claim, recorded.roles, recorded.subject)]
+    if claim["theorem"] == DETUMBLES:
+        return [*apart, *_of_detumbling(claim, recorded)]
+    apart += _numbers(claim, recorded)
     return [*apart, *_words(claim, recorded), *_handed_over(claim, ends)]
 
 
@@ -40,6 +48,27 @@ def station_differences(claim: Mapping[str, Any], loop: ClosedLoop) -> list[str]
     numbers = {kinds[name]: rational(x) for name, x in claim["numbers"].items() if name in kinds}
     other = any(kind != loop.limit or not isfinite(limit) or x != Fraction(limit) for kind, x in numbers.items())
     return [*_programs(claim, expected["programs"], expected["subject"]), *["the limit differs"] * other]
+
+
+def _of_detumbling(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
+    try:
+        words, numbers = bounds_of(recorded.known)
+    except NotFoundError as reason:
+        yield str(reason)
+        return
+    if claim["taken"] != words:
+        yield "only one of the two has wheels"
+    # Others than these are about the body's inertia, which the kernel compares.
+    sides = {"dipole.limit": -1, "field.least": -1, "limit": -1} | dict.fromkeys(
+        ("field.change", "outside", "outside.across", "stored"), 1
+    )
+    for name, side in sides.items():
+        if name in numbers and name not in claim["numbers"]:
+            yield f"{name} is not stated"
+        elif name in numbers and side * rational(claim["numbers"][name]) < side * Fraction(numbers[name]) * (
+            1 - side * ALMOST
+        ):
+            yield f"{name} is exceeded" if side > 0 else f"{name} is lower"
 
 
 def _programs(claim: Mapping[str, Any], programs: Mapping[str, str], subject: Mapping[str, str]) -> Iterator[str]:

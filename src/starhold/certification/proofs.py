@@ -1,7 +1,7 @@
 """Claims that the kernel has proved, in the form that sentences, departures, trials and pages use."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from math import asin, pi, sqrt
@@ -9,10 +9,12 @@ from typing import Any
 
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.certificate import EXACT, EXACT_SIGN, LYAPUNOV, SQUARES, Claim, Obligation, Proof
-from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
+from starhold.certification.evidence.attitude import ANY_ANGLE
 from starhold.certification.evidence.claims import find_claims, find_taken_over
+from starhold.certification.evidence.detumbling import DETUMBLES, find_detumbling
 from starhold.certification.evidence.finding import certificate, obligations
 from starhold.certification.evidence.pointing import POINTS, find_pointed
+from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.refuted import (
     AWAY,
     EXCEEDS,
@@ -85,7 +87,14 @@ def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tup
     return None if loop is None else ({claim.kind: claim for claim in checked(loop)}, loop.failed)
 
 
-def checked(loop: Loop) -> list[Claim]:
+def detumbled(subject: Subject) -> tuple[Claim | None, str]:
+    """Return the claim about detumbling of a loop whose law opposes the change of the magnetic field, or why no evidence was
+    found."""
+    loop = find_detumbling(subject)
+    return next(iter(checked(loop)), None), loop.failed.get(DETUMBLES, "no proof was found")
+
+
+def checked(loop: RecordedLoop) -> list[Claim]:
     """Return the claims found, as the kernel reports them, except those whose check exceeds its work limit."""
     claims = list[Claim]()
     for given in loop.claims:
@@ -120,7 +129,7 @@ def steps_of(proved: Proved) -> list[Obligation]:
     return [Obligation(name, how, "proved") for name, how in steps]
 
 
-def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
+def made(proved: Proved, given: Mapping[str, Any], loop: RecordedLoop) -> Claim:
     """Return a claim with the numbers, assumptions and obligations that the kernel reports."""
     label, numbers = proved.statement.label, proved.claim.numbers.content
     witness = loop.written_by.get(given["programs"].get("lyapunov", ""), {})
@@ -144,7 +153,7 @@ def made(proved: Proved, given: Mapping[str, Any], loop: Loop) -> Claim:
     )
 
 
-def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
+def assumed(identifiers: tuple[str, ...], loop: RecordedLoop) -> tuple[str, ...]:
     """Return the assumptions of a claim beyond those that its loop meets by composition."""
     wheeled = loop.loop.wheels is not None
     satisfied = {"target-at-rest": loop.known.moving, "no-wheels": wheeled} | dict.fromkeys(IN_THE_LOOP, False)
@@ -155,7 +164,7 @@ def assumed(identifiers: tuple[str, ...], loop: Loop) -> tuple[str, ...]:
     return tuple(named)
 
 
-def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _set(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     """Return the numbers of the start set."""
     if "level" not in numbers:
         return {
@@ -174,12 +183,12 @@ def _set(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     return {"level": level, "start": level, "everything": False, **begun}
 
 
-def _limit(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _limit(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     kind = "axis" if "limit" in numbers else "norm"
     return _set(numbers, loop) | {"limit": float(numbers["limit" if kind == "axis" else "limit.norm"]), "kind": kind}
 
 
-def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _wheels(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     each = {
         name: [above(numbers[at]) if (at := f"{key}.{k}") in numbers else None for k in range(len(loop.loop.rotors))]
         for name, key in (("motors", "motors"), ("wheel_momentum", "stored"))
@@ -188,12 +197,12 @@ def _wheels(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     return _set(numbers, loop) | {"momentum": float(numbers["momentum"])} | limits
 
 
-def _inertia(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _inertia(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     tolerance = {"tolerance": below(numbers["tolerance"]) if "tolerance" in numbers else None}
     return tolerance | {name: x for name, x in _set(numbers, loop).items() if name != "level"}
 
 
-def _handed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _handed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     begun = _set(numbers, loop)
     angle = numbers.get("start.angle", Fraction(ANY_ANGLE))
     bounds = {
@@ -203,7 +212,7 @@ def _handed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     return {name: begun[name] for name in ("level", "start", "everything")} | bounds
 
 
-def _sampled(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _sampled(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     longest = numbers.get("longest", numbers.get("other"))
     return {
         "period": float(numbers["period"]),
@@ -214,7 +223,7 @@ def _sampled(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     }
 
 
-def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _slid(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     def most(name: str) -> float:
         return above(numbers[name]) if name in numbers else 0.0
 
@@ -224,7 +233,7 @@ def _slid(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
     return {"torque": [most(f"outside.{i}") for i in range(3)], **begun, **ends}
 
 
-def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
+def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     angle, rate = (below(numbers.get(f"start.{name}", numbers.get(name, Fraction(0)))) for name in ("angle", "rate"))
     most = {
         "torque": "outside",
@@ -246,8 +255,30 @@ def _pointed(numbers: Mapping[str, Fraction], loop: Loop) -> dict[str, Any]:
         "told": "outside.0" in numbers,
         "share": below(1 - numbers["share"]) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),
-        **({"momentum": float(numbers["momentum"])} if "momentum" in numbers else {}),
+        **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
         **{name: above(numbers[key]) for name, key in ends.items()},
+    }
+
+
+def _detumbled(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
+    def each(name: str, side: Callable[[Any], float]) -> list[float]:
+        return [side(x) for k in range(len(numbers)) if (x := numbers.get(f"{name}.{k}")) is not None]
+
+    rates, falls, rises = (each(name, below) for name in ("rate", "fall", "rise"))
+    high = above(numbers["inertia.high"])
+    keys = {"torque": "outside", "torque_across": "outside.across", "dipole": "dipole.limit", "field_change": "field.change"}
+    return {
+        "period": loop.loop.period,
+        "rates": rates,
+        "turning": each("above", above),
+        "rise": each("rise", above),
+        "often": each("often", above),
+        # A margin, because these are computed in floats.
+        "spell": [0.5 * high * w * w / (x + y) * (1.0 + 1e-9) for w, x, y in zip(rates, falls, rises, strict=True)],
+        "shares": [y / (x + y) * (1.0 + 1e-9) for x, y in zip(falls, rises, strict=True)],
+        **{name: below(numbers[key]) for name, key in keys.items()},
+        "field": above(numbers["field.least"]),
+        **({"stored": below(numbers["stored"])} if "stored" in numbers else {}),
     }
 
 
@@ -268,10 +299,11 @@ _NUMBERS = {
     "sampling": _sampled,
     "sliding": _slid,
     "pointing": _pointed,
+    "detumbling": _detumbled,
 }
 
 
-def refutation(proved: Proved, given: Mapping[str, Any], loop: Loop) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def refutation(proved: Proved, given: Mapping[str, Any], loop: RecordedLoop) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """Return the obligation that fails, the numbers of the claim that needs it, and the counterexample."""
     numbers, theorem = proved.claim.numbers.content, proved.claim.theorem
     compared = {name: o for name, o in obligations(given, loop.by_digest)[0].items() if isinstance(o, Exceeds)}

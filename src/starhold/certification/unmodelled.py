@@ -29,6 +29,8 @@ READ = {
 """The parts that theorems model, by role; a claim's other assumptions describe their torques and motions."""
 BOUNDED = ("pointing",)
 """Kinds of claims that include external torques and errors by their bounds."""
+DETUMBLING = "detumbling"
+"""The kind of claims about a law that opposes the change of the magnetic field."""
 SPAN = 3600.0
 """The time (s) covered by a claim with a share where there is no orbit."""
 TELLING, COMMANDED = ("sensor", "estimator"), ("actuator", "effector")
@@ -100,6 +102,15 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *turn)))
 
 
+def environment_torques(loop: ClosedLoop, envelope: Envelope) -> tuple[Push, float]:
+    """Add up the declared bounds of the environments' torques that no law is told: of those in any direction, and of those
+    at right angles to the magnetic field (N m)."""
+    torques = [(f, push) for f in loop.used("environment") if (push := _pushes(f, envelope)[0]) is not None]
+    across = [push.torque for f, push in torques if f.part.flag("ACROSS_FIELD")]
+    others = [Push(0.0), *(push for f, push in torques if not f.part.flag("ACROSS_FIELD"))]
+    return Push(*(sum(x) * MORE for x in zip(*others, strict=True))), sum(across) * MORE
+
+
 def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
     """Add up how fast the torques change at most that laws are told as they are at the attitude that these are told: `inf`
     for a part that does not say, or if a position is told that could be off."""
@@ -163,6 +174,9 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
     estimated = _estimated(loop, driven)
 
     def more(claim: Claim) -> tuple[str, ...]:
+        if claim.kind == DETUMBLING and claim.outcome == "proved":
+            envelope = envelope_of(loop, momentum, False)
+            return tuple(f"{WITHOUT}{_called(f)}" for f in _acting(loop) if not _is_in_detumbling(f, envelope, loop.period))
         if claim.kind not in BOUNDED or claim.outcome != "proved":
             return tuple(f"{WITHOUT}{name}" for name in away)
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
@@ -212,6 +226,17 @@ def _says(loop: ClosedLoop, fitted: Fitted, envelope: Envelope, estimated: bool)
     if _is_idle(loop, fitted, envelope) or torque or error:
         return True
     return not estimated and _bounded(fitted) is not None and not _is_random(_noise(fitted, loop.period))
+
+
+def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool:
+    """Whether a claim about detumbling includes a part: what it is about, environments with a bound, and all that the law
+    does not look at."""
+    part = fitted.part
+    if part.role == "sensor" and "magnetic_field" in _shown(fitted):
+        return _bounded(fitted) == NO_ERRORS and not _is_random(_noise(fitted, period))
+    if part.role == "environment":
+        return is_read(fitted) or (_pushes(fitted, envelope)[0] is not None and not moves(fitted.params))
+    return part.role in ("sensor", "estimator", "target") or part.name in ("magnetorquers", "inactive-wheels")
 
 
 def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | None]:

@@ -3,13 +3,13 @@
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import Any, cast
 
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
 from starhold.certification.certificate import FILE, ORBIT, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
+from starhold.certification.rounding import angle, shown, speed
 from starhold.laws.catalogue import file_of, known_law
 
 HEADINGS = {
@@ -22,32 +22,12 @@ HEADINGS = {
     "pointing": "pointing as it flies",
     "sampling": "torque held between samples",
     "sliding": "reaches its surface",
+    "detumbling": "loses energy",
     "circle": "ends on the circle",
     "control-limit": "within the control's limit",
     "equilibrium": "comes to rest",
     "saturated-axis": "X with limited control",
 }
-
-
-def shown(value: float, unit: str = "", up: bool = False) -> str:
-    """Show a number as it was written, if that takes at most seven digits; else with four, rounded down, or up where it
-    bounds from above, so that no more is said than is proved."""
-    written = Decimal(f"{value:.15g}")
-    if len(written.normalize().as_tuple().digits) <= 7:
-        # Converting a unit loses the last bits.
-        return f"{float(written):.7g}{unit}"
-    rounding = ROUND_CEILING if up else ROUND_FLOOR
-    return f"{float(Context(prec=4, rounding=rounding).create_decimal(Decimal(value))):g}{unit}"
-
-
-def angle(radians: float, up: bool = False) -> str:
-    """An angle in degrees."""
-    return shown(math.degrees(radians), "°", up)
-
-
-def speed(rate: float, up: bool = False) -> str:
-    """A rate in degrees a second."""
-    return shown(math.degrees(rate), "°/s", up)
 
 
 def sentence(claim: Claim, subject: Mapping[str, Any]) -> str:
@@ -256,6 +236,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
+    bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
     near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"
@@ -286,6 +267,24 @@ def _sliding(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["surface"]:
         end = f"ends within {angle(n['angle'], True)} and {speed(n['rate'], True)} of the target, at either quaternion of it"
     return f"{where} the motion reaches the surface {against} and {end}"
+
+
+def _detumbling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
+    if "rates" not in n:
+        return "the energy falls where the magnetic field turns in the body"
+
+    def most(name: str, unit: str, size: float = 1.0) -> str:
+        return listed([shown(size * x, unit, up=True) for x in n[name]])
+
+    falls = [f"{speed(m, True)} at up to {speed(rate)}" for m, rate in zip(n["turning"], n["rates"], strict=True)]
+    return (
+        f"the energy falls in each control period of {n['period']:.12g} s in which the field turns in the body by more than"
+        f" {listed(falls)}, and else rises by up to {most('rise', ' W')}; it turns by more than"
+        f" {most('often', '°/s', math.degrees(1.0))} for at most {most('spell', ' s')} and {most('shares', ' %', 100.0)} of"
+        f" the time; with a field of at least {shown(n['field'], ' T', True)} that changes by up to"
+        f" {shown(100.0 * n['field_change'], ' %')} a second, and torques from outside of up to"
+        f" {shown(n['torque'], ' N m')} and, across the field, {shown(n['torque_across'], ' N m')}"
+    )
 
 
 def _circles(n: Mapping[str, Any]) -> str:
@@ -331,6 +330,7 @@ _SENTENCES = {
     "pointing": _pointing,
     "sampling": _sampling,
     "sliding": _sliding,
+    "detumbling": _detumbling,
     "circle": _circle,
     "control-limit": _control_limit,
     "equilibrium": _equilibrium,

@@ -64,6 +64,7 @@ class Held:
         # What noise adds near the target, and what momentum makes of that.
         self.swayed = self.apart = AT_REST
         self.constant = {name: numbers[name] for name in ("outside", "error")}
+        self.constant["error"] += norm([loop.added or ZERO] * 3)
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.noise, errors = (
             [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")

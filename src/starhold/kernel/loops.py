@@ -18,7 +18,7 @@ from typing import TypeAlias
 
 from .numbers import Rows, demand, inverse, plus, scalar
 from .polynomials import Poly, apply, cross, dot, minus, poly, total, var, variables
-from .programs import Asking, Case, Exactly, Piecewise, joined, known, single
+from .programs import Asking, Case, Exactly, Piecewise, joined, known, positive, single
 from .reading import Claim
 from .rules import Definite, Shown, vanish
 
@@ -28,6 +28,8 @@ OUTSIDE, MOVING, WHEELS = "outside torque", "moving target", "wheels"
 """A loop has these only where the claim takes it with them."""
 SHORTEST, HYSTERESIS = "shortest sign", "hysteresis"
 """How the sign of the quaternion that is fed back is chosen: otherwise it never changes."""
+REMEMBERS = "memory"
+"""The law's memory, whatever is in it, adds a bounded torque to what it asks for without."""
 HANDED = "handed over"
 """The loop takes over from another one in any of the states that the claim says its set holds."""
 IS_VALID = "measurement.is_valid"
@@ -84,11 +86,18 @@ class Loop:
 class AttitudeLoop(Loop):
     """A rigid body under a law. `any_inertia`: J is made of variables; the law's own numbers stay what they are. `near`:
     such a J near the given one, J0: no entry is off by more than `tolerance` sqrt(J0_ii J0_kk). `quotients`: programs may
-    divide by the state, but not by quotients, and take no roots of it."""
+    divide by the state, but not by quotients, and take no roots of it. `remembers`: the law may keep a memory."""
 
     driven = RATES
 
-    def __init__(self, claim: Claim, any_inertia: bool = False, near: bool = False, quotients: bool = False) -> None:
+    def __init__(
+        self,
+        claim: Claim,
+        any_inertia: bool = False,
+        near: bool = False,
+        quotients: bool = False,
+        remembers: bool = False,
+    ) -> None:
         super().__init__(claim, Asking(nested=False) if quotients else Exactly())
         self.any_inertia, self.near = any_inertia or near, near
         self.q, self.w = variables("q", 0), variables("w")
@@ -99,6 +108,8 @@ class AttitudeLoop(Loop):
         self.J, self.J_inverse = self._inertia()
         # dV/dw = J (w + lean q).
         self.lean = claim.numbers["lean"] if near else Fraction(0)
+        # What the law's memory adds about each axis at most.
+        self.added = claim.numbers["memory"] if remembers and claim.taken.get(REMEMBERS) else None
         self.leaning = [w + self.lean * q for w, q in zip(self.w, self.q[1:], strict=True)]
         self.rate = [w + r for w, r in zip(self.w, self.r, strict=True)]
         spin = apply(self.J, self.rate)
@@ -181,8 +192,13 @@ class AttitudeLoop(Loop):
 
     @cached_property
     def law(self) -> list[Piecewise]:
-        """Return the torque that the law asks for, case by case."""
-        return self.read("law", 3)
+        """Return the torque that the law asks for, case by case; of one that remembers, without what its memory adds."""
+        if self.added is None:
+            return self.read("law", 3)
+        program = self.claim.programs["law"]
+        kept = [name for name in program.inputs if name.startswith("memory.")]
+        memory = {name: var(f"m{k}") for k, name in enumerate(kept)}
+        return [known(apart(cases, self.added)) for cases in self.read("law", len(program.outputs), memory)[:3]]
 
     @cached_property
     def sides(self) -> Piecewise:
@@ -249,6 +265,22 @@ class AttitudeLoop(Loop):
         yield from vanish(
             "turning", minus(self.single("turning", 4, wired("q", self.q), wired("rate", self.w)), self.turning)
         )
+
+
+def apart(cases: Piecewise, added: Fraction) -> Poly:
+    """Return a polynomial in the middle of the two that are the values of cases without a memory in them, from which no case
+    is further than a number where it holds."""
+    ends = {
+        tuple(sorted(p.terms.items())): p
+        for p in (case.value for case in cases)
+        if not any(name[0] == "m" for name in p.names)
+    }
+    demand(len(ends) == 2, "what a memory adds is not clipped on both sides")
+    middle = total(ends.values()) * Fraction(1, 2)
+    for case in cases:
+        for beyond in (case.value - middle - added, middle - case.value - added):
+            demand(positive(case.guards, beyond) is False, "a memory adds more torque than is told")
+    return middle
 
 
 def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:

@@ -22,10 +22,12 @@ ASKED: dict[str, Any] = {
 """For each body a measurement with every number an input."""
 
 
-def law_program(law: Law, gains: Any, craft: Any, period: float) -> dict[str, Any]:
-    """Return a law's command as a program; gains and craft are inputs but for choices and whole numbers. Errors as of
-    `straight_line`."""
+def law_program(law: Law, gains: Any, craft: Any, period: float, remembers: bool = False) -> dict[str, Any]:
+    """Return a law's command as a program; gains and craft are inputs but for choices and whole numbers. remembers: so is
+    the memory, and the new one stands behind the command; else it is that of the start. Errors as of `straight_line`."""
     memory = law.remember(gains, craft, period)
+    if remembers:
+        return straight_line(law.command, measurement=ASKED[law.body], gains=gains, craft=craft, memory=memory)
 
     def command(measurement: Any, gains: Any, craft: Any) -> Any:
         return law.command(measurement, gains, craft, memory)[0]

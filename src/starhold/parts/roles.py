@@ -94,9 +94,11 @@ class Body(Protocol):
 
 class Environment(Protocol):
     """A torque (N m, body), a force or a field; at least one of `torque` and `acceleration`. `MODELLED`: whether laws know
-    the torque. With a memory, `remember` and `update` renew it at each control step."""
+    the torque; `ACROSS_FIELD`: whether it is at right angles to the Earth's magnetic field. With a memory, `remember` and
+    `update` renew it at each control step."""
 
     MODELLED: bool
+    ACROSS_FIELD: bool
 
     def torque(self, state: State, params: Any, craft: Any, memory: Any, /) -> Vector:
         """The torque on the body (N m, body axes)."""

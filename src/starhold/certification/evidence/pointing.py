@@ -271,7 +271,7 @@ class Pushed:
             outside = above(exact(outside) + loop.known.modelled_norm)
         self.loop, self.words = loop, words + sign_words(loop.loop)
         bounds = loop.bounds(words)
-        wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None, **bounds), loop.by_digest))
+        wired = AttitudeLoop(read(loop.claim(POINTS, self.words, None, **bounds), loop.by_digest), remembers=True)
         self.stiffness = feedback(wired)
         demand(self.stiffness > 0.0, "the law does not rotate the body to its target")
         law = loop.loop.law
@@ -300,7 +300,7 @@ class Pushed:
     def sampled(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
         V = self.loop.crossed(None if self.even else self.stiffness, epsilon)
-        motion = Held(AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest)))
+        motion = Held(AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True))
         motion.swayed, motion.apart = self.swayed, self.apart
         return V, motion
 

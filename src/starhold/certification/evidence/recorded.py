@@ -16,8 +16,8 @@ from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
 from starhold.certification.subject import Subject, above
 from starhold.certification.unmodelled import driven_errors
-from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, SHORTEST, WHEELS, AttitudeLoop
-from starhold.kernel.polynomials import Poly
+from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, REMEMBERS, SHORTEST, WHEELS, AttitudeLoop
+from starhold.kernel.polynomials import Poly, var
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.theorems.noise import CARRIED, CORRECTED
 from starhold.laws import program
@@ -72,7 +72,7 @@ class RecordedLoop:
         """The digests of the programs that every claim is about."""
         loop, driven = self.loop, driven_errors(self.loop)
         programs = {
-            "law": self.keep(program.law_program(loop.law, loop.gains, loop.known, loop.period)),
+            "law": self.keep(program.law_program(loop.law, loop.gains, loop.known, loop.period, loop.remembers)),
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=self.plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
@@ -148,7 +148,8 @@ class RecordedLoop:
         loop, known = self.loop, self.known
         words = [OUTSIDE] if any(known.modelled) else []
         words += [MOVING] if known.moving else []
-        return words + ([WHEELS] if loop.wheels is not None else [])
+        words += [WHEELS] if loop.wheels is not None else []
+        return words + ([REMEMBERS] if loop.remembers else [])
 
     def claim(self, theorem: str, taken: list[str], V: str | None, **numbers: Any) -> dict[str, Any]:
         """Return a claim without evidence."""
@@ -199,6 +200,7 @@ class RecordedLoop:
             bounds |= {f"outside.{k}": above(x) for k, x in enumerate(known.modelled)}
         if MOVING in words:
             bounds |= {"target.rate": above(known.target_rate), "target.acceleration": above(known.target_acceleration)}
+        bounds |= {"memory": memory_torque(self)} if REMEMBERS in words else {}
         return bounds | ({"momentum": float(known.total_momentum)} if WHEELS in words else {})
 
     @property
@@ -235,6 +237,19 @@ class RecordedLoop:
         stored = np.array(loop.rotors) @ np.array(loop.wheels.axes) if loop.wheels is not None else np.zeros(3)
         least = float(np.linalg.eigvalsh(tensor(loop.craft.inertia))[0]) * (1.0 - 1e-12)
         return float(known.total_momentum) + float(np.linalg.norm(stored)) < least * float(known.target_rate)
+
+
+def memory_torque(loop: RecordedLoop) -> Fraction:
+    """Return the torque (N m) that a law's memory adds about an axis at most: half of what the values differ that it clips
+    to. RefusedError where it clips to no two values that differ by a number."""
+    wired = AttitudeLoop(read(loop.claim("points", [], None), loop.by_digest))
+    program = wired.claim.programs["law"]
+    memory = {name: var(f"m{k}") for k, name in enumerate(program.inputs) if name.startswith("memory.")}
+    most = Fraction(0)
+    for cases in wired.read("law", len(program.outputs), memory)[:3]:
+        ends = [case.value for case in cases if not any(name[0] == "m" for name in case.value.names)]
+        most = max([most, *(abs((p - ends[0]).number) / 2 for p in ends)])
+    return most
 
 
 def curvature(form: Poly, x: str) -> NDArray[np.float64]:

@@ -34,8 +34,9 @@ def points(claim: Claim) -> Proof:
     The torque that it is told may turn over at once; with told.change it is that at the attitude that it is told, and
     changes no faster than that and told.change.per.rate times the body's rate.
     With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
-    noise.attitude and noise.rate beside."""
-    loop = AttitudeLoop(claim)
+    noise.attitude and noise.rate beside. The law may keep a memory that adds a torque of no more than `memory` about each
+    axis, whatever is in it."""
+    loop = AttitudeLoop(claim, remembers=True)
     yield from loop.sound()
     motion, numbers, samples = Held(loop), claim.numbers, 0
     c, h = numbers["level"], motion.h
@@ -43,7 +44,7 @@ def points(claim: Claim) -> Proof:
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     start = yield from contents(loop, loop.lyapunov)
     region = motion.region(c)
-    limited = yield from within_limits(loop, motion.misread(region)[0])
+    limited = yield from within_limits(loop, motion.misread(region)[0] + norm([loop.added or Fraction(0)] * 3))
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
@@ -116,6 +117,7 @@ def points(claim: Claim) -> Proof:
         f" than {above(fastest)} rad/s, with the torque held for {below(h)} s, torques from outside"
         f" {most('outside')} and {enumerated(errors)}"
     )
+    text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
     assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
     assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)

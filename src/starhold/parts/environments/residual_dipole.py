@@ -25,6 +25,7 @@ CARD = Card(
 ROLE = "environment"
 NEEDS = ("two-body",)
 ABOUT = "Earth"
+ACROSS_FIELD = True
 
 
 class Params(NamedTuple):

@@ -97,14 +97,14 @@ def _table(failures: Sequence[Failure], retuned: Sequence[str]) -> Table:
 
 
 def _proved(failure: Failure) -> list[str | None]:
-    from starhold.certification.wording import shown
+    from starhold.certification.rounding import shown
 
     proof = failure.proof
     return [] if proof is None else [None if proof.angle is None else shown(math.degrees(proof.angle), up=True)]
 
 
 def _row(failure: Failure, retuned: Sequence[str], designed: bool) -> list[Any]:
-    from starhold.certification.wording import shown
+    from starhold.certification.rounding import shown
     from starhold.report.text import number_text
 
     axes = "three" if failure.controllable else f"[red]not {_directions(failure)}[/red]"

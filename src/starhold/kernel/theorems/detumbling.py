@@ -1,0 +1,160 @@
+"""The theorem about a law that opposes the change of the magnetic field: in which control periods the kinetic energy falls,
+by how much it rises at most in the others, and how often these are. Proof: docs/kernel.md, section 11."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import count
+from typing import NamedTuple, TypeAlias
+
+from ..loops import AttitudeLoop, wired
+from ..numbers import demand, plus, scalar, up
+from ..polynomials import apply, cross, dot, minus, poly, var, variables
+from ..programs import condition
+from ..reading import Claim
+from ..rules import Definite, Exceeds, Proof, Shown, Squares, vanish
+from ..sentences import Statement, above, below
+
+Quadratic: TypeAlias = tuple[Fraction, Fraction, Fraction]
+"""Coefficients of 1, m and m^2."""
+
+
+class Power(NamedTuple):
+    """Polynomials in m bound the power of a control period in which the field turns in the body at the mean rate m, of it
+    and the period before. `free`: with rods within their limit, with a negative coefficient of m^2. With rods at it the
+    power is no more than `others`, and where `free` is negative it is at most -c if `limited` is at least c `seen`."""
+
+    free: Quadratic
+    others: Quadratic
+    limited: Quadratic
+    seen: Quadratic
+
+
+def detumbles(claim: Claim) -> Proof:
+    """In each control period from the second measurement on in which, as in the two before, the body turns no faster than
+    rate.k, its kinetic energy falls if the held field turns in it by more than above.k on the average, from the sample
+    before to the one after, by fall.k times the period if by more than often.k, and else rises by no more than rise.k times
+    the period; for each k that is told. So the field turns faster than often.k for a part of any time only. Rods give
+    dipoles of up to dipole.limit each; the field is at least field.least, and changes from sample to sample by no more than
+    field.change times itself and the period; torques from outside are no more than `outside`, and others, at right angles to
+    the field, than outside.across. With wheels, these keep a momentum of up to `stored`. Torques that the law asks for are
+    given in full up to `limit`, or without it all of them."""
+    loop, numbers = AttitudeLoop(claim, quotients=True), claim.numbers
+    low, high = numbers["inertia.low"], numbers["inertia.high"]
+    yield from loop.sound()
+    yield from opposes_change(loop)
+    yield "least moment", Definite(plus(loop.given, scalar(low), -1))
+    yield "largest moment", Definite(plus(scalar(high), loop.given, -1))
+    # |J^-1 (w x Jw)| <= gyroscopic |w|^2.
+    w, turning = loop.w, apply(loop.J_inverse, cross(loop.w, apply(loop.J, loop.w)))
+    squares = [a * b for k, a in enumerate(w) for b in w[k:]]
+    size = numbers["gyroscopic"] * dot(w, w)
+    yield "gyroscopic", Squares(size * size - dot(turning, turning), squares, 0)
+    texts = list[str]()
+    for k in count():
+        if f"rate.{k}" not in numbers:
+            break
+        rate, least, often, fall, rise = (numbers[f"{name}.{k}"] for name in ("rate", "above", "often", "fall", "rise"))
+        power = power_at(loop, rate)
+        if "limit" in numbers:
+            yield f"limit {k}", Exceeds(numbers["limit"], loop.claim.subject["gains.k"] * (rate + numbers["field.change"]))
+        for name, m, c in (("falls", least, Fraction(0)), ("falls by a part", often, fall)):
+            free, limited = combined(power.free, UNIT, c), combined(power.limited, power.seen, -c)
+            yield f"energy {name} {k}", Exceeds(Fraction(0), max(value(free, m), slope(free, m)))
+            yield f"energy {name} at the limit {k}", Exceeds(min(value(limited, m), slope(limited, m), limited[2]))
+        yield f"energy rises {k}", Exceeds(rise, max(highest(power.free), value(power.others, least)))
+        more = fall + rise
+        demand(more > 0 and often > least, "the energy does not fall")
+        spell, share = high * rate * rate / 2 / more, rise / more
+        texts.append(
+            f"at up to {below(rate)} rad/s above {above(least)} rad/s, and else rises by {above(rise)} W at most, so that it"
+            f" is above {above(often)} rad/s for at most {above(spell)} s and {above(share)} of the time"
+        )
+    demand(bool(texts), "no rate is told")
+    wheels = f"wheels that keep up to {below(numbers['stored'])} N m s, " if loop.wheels else ""
+    text = (
+        "in each control period the kinetic energy falls where the field turns in the body, in the mean of it and the one"
+        f" before, faster than told: {'; '.join(texts)}; for rates in these two and the one before; with {wheels}rods of"
+        f" up to {below(numbers['dipole.limit'])} A m2, a field of at least {above(numbers['field.least'])} T that changes"
+        f" by no more than {below(numbers['field.change'])} of itself per second, and torques from outside of up to"
+        f" {below(numbers['outside'])} N m and, at right angles to the field, {below(numbers['outside.across'])} N m"
+    )
+    if "limit" in numbers:
+        text += f", and a torque of up to {below(numbers['limit'])} N m given in full to the rods"
+    assumed = ["rigid-body", "inertia-as-given", "exact-measurement", "bounded-outside-torque", "held-field", "rods-alike"]
+    assumed += [] if "limit" in numbers else ["unlimited-torque"]
+    return Statement(text, (*assumed, "idle-wheels" if loop.wheels else "no-wheels"), "detumbling")
+
+
+def opposes_change(loop: AttitudeLoop) -> Shown:
+    """Where there is a field b the law remembers it, and its torque is m x b with m = -k (b - b before)/(period |b|^2), or
+    none at the first measurement, before which no field is known."""
+    b, before, subject = variables("b"), variables("m"), loop.claim.subject
+    square, gain = dot(b, b), -subject["gains.k"] / subject["measurement.period"]
+    for name, known in (("first torque", 0), ("torque", 1)):
+        outputs = loop.read("law", 7, wired("memory.field", before) | {"memory.known": poly(known)})
+        values = [[case.value for case in cases if case.guards <= {(condition(square), True)}] for cases in outputs]
+        demand(all(len(one) == 1 for one in values), "the law switches where there is a field")
+        torque, after = [one[0] for one in values[:3]], [one[0] for one in values[3:]]
+        divisors = loop.divisors
+        demand(len(divisors) == 1, "the law does not divide by the field's square alone")
+        ((divided, divisor),) = divisors.items()
+        yield from vanish("square of the field", [divisor - square], first=known)
+        wanted = [known * gain * var(divided) * part for part in cross(minus(b, before), b)]
+        yield from vanish(f"{name} of the law", minus(torque, wanted))
+        yield from vanish("memory of the law", minus(after, [*b, poly(1)]), first=4 * known)
+
+
+def power_at(loop: AttitudeLoop, rate: Fraction) -> Power:
+    """Return what bounds the power of a period while the body turns no faster than a rate (rad/s)."""
+    numbers, subject = loop.claim.numbers, loop.claim.subject
+    k, h, low = subject["gains.k"], subject["measurement.period"], numbers["inertia.low"]
+    change, outside, across = (numbers[name] for name in ("field.change", "outside", "outside.across"))
+    demand(min(k, h, low, rate) > 0 and h * rate < 1, "the body turns too far in a period")
+    # The rate at which the field turns changes by no more than turned m + begun per second.
+    torque = k * (rate + change) + outside + across + (rate * numbers["stored"] if loop.wheels else 0)
+    turned, begun = rate / (1 - h * rate), up((numbers["gyroscopic"] * rate * rate + torque / low) / (1 - h * rate))
+    bent = linear(h / 2 * begun, h / 2 * turned)
+    mean = combined(bent, linear(0, 1), 1)
+    opposed = combined(product(linear(0, 1), linear(0, 1)), product(bent, bent), -1)
+    opposed = combined(opposed, combined(mean, product(mean, mean), h / 2), -change)
+    demand(opposed[2] > 0, "the body turns too far in a period")
+    others = linear(rate * outside + across * h * begun, across * (1 + h * turned))
+    # Rods at their limit give at least this torque, and the law asks for k times what it sees of the field's turning.
+    most, seen = numbers["dipole.limit"] * numbers["field.least"], combined(mean, UNIT, change)
+    limited = combined(product(linear(most, 0), opposed), product(others, seen), -1)
+    return Power(combined(others, opposed, -k), others, limited, seen)
+
+
+def linear(start: Fraction | int, rise: Fraction | int) -> Quadratic:
+    """Return start + rise m."""
+    return Fraction(start), Fraction(rise), Fraction(0)
+
+
+UNIT = linear(1, 0)
+
+
+def combined(p: Quadratic, q: Quadratic, c: Fraction | int) -> Quadratic:
+    """Return p + c q."""
+    x, y, z = (a + c * b for a, b in zip(p, q, strict=True))
+    return x, y, z
+
+
+def product(p: Quadratic, q: Quadratic) -> Quadratic:
+    """Return the product of two, if its degree is 2 at most."""
+    return p[0] * q[0], p[0] * q[1] + p[1] * q[0], p[0] * q[2] + p[1] * q[1] + p[2] * q[0]
+
+
+def value(p: Quadratic, m: Fraction) -> Fraction:
+    """Return the value at m."""
+    return p[0] + m * (p[1] + m * p[2])
+
+
+def slope(p: Quadratic, m: Fraction) -> Fraction:
+    """Return the derivative at m."""
+    return p[1] + 2 * m * p[2]
+
+
+def highest(p: Quadratic) -> Fraction:
+    """Return the largest value, of a negative coefficient of m^2."""
+    return p[0] - p[1] * p[1] / (4 * p[2])
