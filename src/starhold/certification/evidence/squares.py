@@ -16,6 +16,7 @@ import numpy as np
 from flint import fmpq_mat
 
 from starhold.algebra.polynomial import exact
+from starhold.certification.evidence.interior import most_definite
 from starhold.certification.matrices import fraction
 from starhold.kernel.numbers import RefusedError, times, transpose
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
@@ -26,6 +27,8 @@ T = TypeVar("T")
 TOLERANCE = 1e-11
 LIMIT = 30.0
 """The time limit of the interior point (s)."""
+LARGE = 3000
+"""The entries of a matrix beyond which the sparse interior point takes too long."""
 DIGITS = (12, 14, 9, 16)
 SINGULAR, SHORT = 1e-6, 8
 """The share of the largest eigenvalue below which a matrix is taken for singular, and the denominators of what it takes to
@@ -222,6 +225,8 @@ def optimum(
     """Return x with Ax = b and the largest last number; None without one. The first numbers are not negative, and before the
     last stand the upper triangles of matrices that are nowhere negative, `twice` what is beside the diagonal. margin: the
     last is no more than 1, the signed ones that say so, and the eigenvalues of the matrices."""
+    if margin and max(map(len, blocks)) > LARGE:
+        return most_definite(A, b, signed, blocks)
     count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
     right = [b, np.zeros(len(signed))]
     if margin:
