@@ -21,8 +21,8 @@ FEASIBLE, ENOUGH = 0.01, 0.25
 
 
 def most_definite(equal: Any, b: Any, signed: Sequence[bool], blocks: Sequence[Sequence[tuple[int, int]]]) -> Any | None:
-    """Return x with equal x = b and a large last number, which the matrices' eigenvalues and the signed numbers that say so are
-    not below; None where none is found. The columns are as for `squares.optimum`, with its `twice` 1."""
+    """Return x with equal x = b and a large last number, which the matrices' eigenvalues, and signed numbers that say so,
+    are not below; None where none is found. The columns are as for `squares.optimum`, with its `twice` 1."""
     a, count = sparse.csc_matrix(equal), equal.shape[1] - 1
     scales = np.sqrt(np.asarray(a.multiply(a).sum(1)).ravel())
     rows = sparse.diags(1.0 / np.where(scales > 0.0, scales, 1.0))

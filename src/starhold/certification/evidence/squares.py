@@ -215,8 +215,13 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
         solution = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, matrix, b, cones, settings).solve()
         return np.array(solution.x) if "Solved" in str(solution.status) or "Insufficient" in str(solution.status) else None
 
-    numbers = tuple(x.tobytes() for x in (cost, matrix.data, matrix.indices, matrix.indptr, b))
-    return once((numbers, matrix.shape, equal, signed, *sides), solve)
+    numbers = cost.tobytes(), *_bytes(matrix), b.tobytes()
+    return once((numbers, equal, signed, *sides), solve)
+
+
+def _bytes(matrix: Any) -> tuple[Any, ...]:
+    columns = sparse.csc_matrix(matrix)
+    return (*(x.tobytes() for x in (columns.data, columns.indices, columns.indptr)), columns.shape)
 
 
 def optimum(
@@ -226,7 +231,8 @@ def optimum(
     last stand the upper triangles of matrices that are nowhere negative, `twice` what is beside the diagonal. margin: the
     last is no more than 1, the signed ones that say so, and the eigenvalues of the matrices."""
     if margin and max(map(len, blocks)) > LARGE:
-        return most_definite(A, b, signed, blocks)
+        key = ((*_bytes(A), b.tobytes()), tuple(signed), tuple(map(tuple, blocks)))
+        return once(key, lambda: most_definite(A, b, signed, blocks))
     count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
     right = [b, np.zeros(len(signed))]
     if margin:
