@@ -4,15 +4,20 @@ import json
 import random
 from fractions import Fraction
 from itertools import combinations
+from unittest.mock import patch
 
 import pytest
 from flint import fmpq, fmpq_mat
 
+from starhold.kernel import numbers
 from starhold.kernel.check import check
 from starhold.kernel.numbers import (
+    WORK,
+    Account,
     RefusedError,
     cosine_below,
     definite,
+    factored,
     inverse,
     rational,
     scalar,
@@ -95,6 +100,35 @@ def test_definiteness_is_that_of_the_minors():
         assert told == (all(minors[tuple(range(n))] > 0 for n in range(1, count + 1)), all(x >= 0 for x in minors.values()))
         found.add(told)
     assert len(found) == 3
+
+
+def test_factors_with_remainders_are_of_definite_matrices():
+    """Matrices near the border, with rows of unlike size: what is factored is definite by elimination, and most that are by
+    far are factored."""
+    rng, factors, counts = random.Random(11), 0, {True: 0, False: 0}
+    for _ in range(600):
+        count = rng.randint(1, 7)
+        rows = [
+            [Fraction(rng.randint(-9, 9), rng.randint(1, 9)) for _ in range(count)] for _ in range(rng.randint(1, count + 1))
+        ]
+        shift = Fraction(rng.randint(-2, 2), 10 ** rng.randint(0, 24))
+        sizes = [Fraction(10) ** rng.randint(-30, 30) for _ in range(count)]
+        a = [
+            [sizes[i] * sizes[k] * (sum((r[i] * r[k] for r in rows), Fraction(0)) + shift * (i == k)) for k in range(count)]
+            for i in range(count)
+        ]
+        by_factors = factored(a)
+        with patch.object(numbers, "factored", lambda a: False):
+            by_elimination = numbers.definite(a)
+        assert by_elimination or not by_factors
+        counts[by_elimination] += 1
+        factors += by_factors
+    assert counts[False] > 150
+    assert 0.8 * counts[True] < factors < counts[True]
+    wide = [[Fraction((i == k) + 1, 3) for k in range(119)] for i in range(119)]
+    Account.open()
+    assert definite(wide)
+    assert WORK - Account.left < 2_000_000
 
 
 def test_cosine_is_from_below():

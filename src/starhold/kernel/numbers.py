@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from math import factorial, gcd, isqrt, lcm
+from operator import mul
 from typing import Any, TypeAlias, cast
 
 Rows: TypeAlias = list[list[Fraction]]
@@ -106,11 +107,38 @@ def added(numbers: Sequence[Fraction]) -> Fraction:
     return Fraction(sum(upper), below)
 
 
+def factored(a: Rows) -> bool:
+    """Tell whether a symmetric matrix, its diagonal scaled to about 2^128, is found to be LL' + R with whole numbers in L,
+    and in R less than 2^65 beside a diagonal of 2^80 or more: it is positive definite then."""
+    if any(row[k] <= 0 for k, row in enumerate(a)):
+        return False
+    Account.spend(len(a) ** 3 // 6, 128)
+    scales = [
+        64 + (x.denominator.bit_length() - x.numerator.bit_length() + 1) // 2 for x in (a[k][k] for k in range(len(a)))
+    ]
+    rows: list[list[int]] = []
+    for i, line in enumerate(a):
+        row: list[int] = []
+        for k, x in enumerate(line[: i + 1]):
+            places = scales[i] + scales[k]
+            scaled = (x.numerator << max(places, 0)) // (x.denominator << max(-places, 0))
+            rest = scaled - sum(map(mul, row, rows[k] if k < i else row))
+            if k == i and rest <= 2**80:
+                return False
+            # What the shift and the division leave out is together between 0 and rows[k][k] < 2^65.
+            row.append(rest // rows[k][k] if k < i else isqrt(rest - 2**80))
+        rows.append(row)
+    return True
+
+
 def definite(a: Rows, strictly: bool = True) -> bool:
-    """Tell whether a matrix is symmetric and positive definite (not strictly: nowhere negative), by elimination in whole
-    numbers (Bareiss): the pivots are the leading minors of the matrix without the rows of zeros that are met."""
+    """Tell whether a matrix is symmetric and positive definite (not strictly: nowhere negative). Where it is not so by far,
+    elimination in whole numbers (Bareiss) decides: the pivots are the leading minors of the matrix without the rows of zeros
+    that are met."""
     demand(all(len(row) == len(a) for row in a), "a matrix is not square")
     demand(a == transpose(a), "a matrix is not symmetric")
+    if factored(a):
+        return True
     # Rows and columns alike are multiplied by a positive number, which changes no sign. Rows with long numbers come last.
     scales = sorted((lcm(*(x.denominator for x in row)), k) for k, row in enumerate(a))
     rest = [[int(a[i][k] * s) * t for t, k in scales[n:]] for n, (s, i) in enumerate(scales)]

@@ -17,6 +17,7 @@ import numpy as np
 from flint import fmpq_mat
 
 from starhold.algebra.polynomial import exact
+from starhold.certification.evidence.interior import most_definite
 from starhold.certification.matrices import fraction
 from starhold.kernel.numbers import RefusedError, times, transpose
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
@@ -27,6 +28,8 @@ T = TypeVar("T")
 TOLERANCE = 1e-11
 LIMIT = 30.0
 """The time limit of the interior point (s)."""
+LARGE = 3000
+"""The entries of a matrix beyond which the sparse interior point takes too long."""
 DIGITS = (12, 14, 9, 16)
 SINGULAR, SHORT = 1e-6, 8
 """The share of the largest eigenvalue below which a matrix is taken for singular, and the denominators of what it takes to
@@ -222,8 +225,13 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
         solution = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, matrix, b, cones, settings).solve()
         return np.array(solution.x) if "Solved" in str(solution.status) or "Insufficient" in str(solution.status) else None
 
-    numbers = tuple(x.tobytes() for x in (cost, matrix.data, matrix.indices, matrix.indptr, b))
-    return once((numbers, matrix.shape, equal, signed, *sides), solve)
+    numbers = cost.tobytes(), *_bytes(matrix), b.tobytes()
+    return once((numbers, equal, signed, *sides), solve)
+
+
+def _bytes(matrix: Any) -> tuple[Any, ...]:
+    columns = sparse.csc_matrix(matrix)
+    return (*(x.tobytes() for x in (columns.data, columns.indices, columns.indptr)), columns.shape)
 
 
 def optimum(
@@ -232,6 +240,9 @@ def optimum(
     """Return x with Ax = b and the largest last number; None without one. The first numbers are not negative, and before the
     last stand the upper triangles of matrices that are nowhere negative, `twice` what is beside the diagonal. margin: the
     last is no more than 1, the signed ones that say so, and the eigenvalues of the matrices."""
+    if margin and max(map(len, blocks)) > LARGE:
+        key = ((*_bytes(A), b.tobytes()), tuple(signed), tuple(map(tuple, blocks)))
+        return once(key, lambda: most_definite(A, b, signed, blocks))
     count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
     right = [b, np.zeros(len(signed))]
     if margin:

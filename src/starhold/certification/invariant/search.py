@@ -116,16 +116,19 @@ class Floats:
     """A polynomial is evaluated in floats."""
 
     def __init__(self, p: Poly, names: Sequence[str]) -> None:
-        self._terms = [([(k, m.count(x)) for k, x in enumerate(names) if x in m], float(c)) for m, c in p.terms.items()]
+        place = {x: k for k, x in enumerate(names)}
+        self._terms = sorted((tuple(sorted(place[x] for x in m)), float(c)) for m, c in p.terms.items())
 
     def at(self, points: Any) -> Any:
         """Return its values at points (n, ...) of the names."""
-        total = np.zeros(np.shape(points)[1:])
-        for powers, c in self._terms:
-            term = c
-            for k, power in powers:
-                term = term * points[k] ** power
-            total = total + term
+        total, product, last = np.zeros(np.shape(points)[1:]), [1.0], tuple[int, ...]()
+        for m, c in self._terms:
+            # Terms in order share the products of their first factors.
+            shared = next((n for n, (j, k) in enumerate(zip(m, last, strict=False)) if j != k), min(len(m), len(last)))
+            del product[shared + 1 :]
+            for k in m[shared:]:
+                product.append(product[-1] * points[k])
+            total, last = total + c * product[-1], m
         return total
 
 

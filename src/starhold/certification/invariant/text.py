@@ -15,7 +15,7 @@ from starhold.algebra.polynomial import Cases, Polynomial, pieces
 from starhold.algebra.scalar import absolute, less, maximum, minimum, sign, where
 from starhold.certification.invariant.system import TURNED, turned
 
-LONGEST = 2_000
+LONGEST = 20_000
 """The most characters of an expression."""
 DIGITS = 3
 """The largest power of ten: floats have no more."""
@@ -114,7 +114,16 @@ class _Reader:
     def _operation(self, node: ast.BinOp) -> Any:
         if isinstance(node.op, ast.Pow):
             return self._power(self.number(node.left), node.right)
-        a, b = self.number(node.left), self.number(node.right)
+        # A long sum is nested to the left.
+        chain = [node]
+        while isinstance(node.left, ast.BinOp) and not isinstance(node.left.op, ast.Pow):
+            chain.append(node := node.left)
+        value = self.number(node.left)
+        for each in reversed(chain):
+            value = self._sized(self._joined(each, value, self.number(each.right)))
+        return value
+
+    def _joined(self, node: ast.BinOp, a: Any, b: Any) -> Any:
         self._spend(_size(a), _size(b))
         match node.op:
             case ast.Add():
