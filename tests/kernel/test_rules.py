@@ -17,10 +17,10 @@ from starhold.kernel.numbers import (
     RefusedError,
     cosine_below,
     definite,
-    factored,
     inverse,
     rational,
     scalar,
+    surely_definite,
     times,
 )  # fmt: skip
 from starhold.kernel.polynomials import horner, read_poly, var
@@ -117,8 +117,8 @@ def test_factors_with_remainders_are_of_definite_matrices():
             [sizes[i] * sizes[k] * (sum((r[i] * r[k] for r in rows), Fraction(0)) + shift * (i == k)) for k in range(count)]
             for i in range(count)
         ]
-        by_factors = factored(a)
-        with patch.object(numbers, "factored", lambda a: False):
+        by_factors = surely_definite(a)
+        with patch.object(numbers, "surely_definite", lambda a: False):
             by_elimination = numbers.definite(a)
         assert by_elimination or not by_factors
         counts[by_elimination] += 1

@@ -9,7 +9,7 @@ from typing import Any
 
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.certificate import EXACT, EXACT_SIGN, LYAPUNOV, SQUARES, Claim, Obligation, Proof
-from starhold.certification.evidence.attitude import ANY_ANGLE
+from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.detumbling import DETUMBLES, find_detumbling
 from starhold.certification.evidence.finding import certificate, obligations

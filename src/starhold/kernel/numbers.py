@@ -107,7 +107,7 @@ def added(numbers: Sequence[Fraction]) -> Fraction:
     return Fraction(sum(upper), below)
 
 
-def factored(a: Rows) -> bool:
+def surely_definite(a: Rows) -> bool:
     """Tell whether a symmetric matrix, its diagonal scaled to about 2^128, is found to be LL' + R with whole numbers in L,
     and in R less than 2^65 beside a diagonal of 2^80 or more: it is positive definite then."""
     if any(row[k] <= 0 for k, row in enumerate(a)):
@@ -137,7 +137,7 @@ def definite(a: Rows, strictly: bool = True) -> bool:
     that are met."""
     demand(all(len(row) == len(a) for row in a), "a matrix is not square")
     demand(a == transpose(a), "a matrix is not symmetric")
-    if factored(a):
+    if surely_definite(a):
         return True
     # Rows and columns alike are multiplied by a positive number, which changes no sign. Rows with long numbers come last.
     scales = sorted((lcm(*(x.denominator for x in row)), k) for k, row in enumerate(a))

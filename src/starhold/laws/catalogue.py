@@ -28,6 +28,11 @@ class Law(Part):
         return "law"
 
     @property
+    def card(self) -> Card:
+        """Title, formula, assumptions and the stability that it claims."""
+        return self.module.CARD
+
+    @property
     def body(self) -> str:
         """The name of the body that it controls: that of its file, or the one whose command it gives."""
         return getattr(self.module, "BODY", None) or next(

@@ -330,7 +330,7 @@ class Recorder:
         return Function(self._titles.new(getattr(equation, "__name__", "x")), doc, tuple(params), body, ends), kept, out
 
     @contextmanager
-    def _alone(self, mark: str) -> Generator[None]:
+    def _alone(self, mark: str = "") -> Generator[None]:
         """Record a function apart from what is open."""
         outer = self._open, self._seen, self._names
         self._open, self._seen, self._names = [], [], _Names((memory.name for memory in self.memories), mark)
