@@ -10,9 +10,12 @@ from starhold.report import body
 from starhold.report.painter import Painter
 from starhold.studies.timing import can_fork
 
-BEFORE = pytest.mark.skipif(
-    not can_fork() or len(os.sched_getaffinity(0)) < 2, reason="the process starts where there is something to draw"
-)
+
+@pytest.fixture
+def early():
+    """The process starts at once: where it can be copied, which threads of earlier tests forbid, and has a second processor."""
+    if not can_fork() or len(os.sched_getaffinity(0)) < 2:
+        pytest.skip("the process starts where there is something to draw")
 
 
 @pytest.fixture
@@ -23,8 +26,7 @@ def pictures(monkeypatch):
     return made
 
 
-@BEFORE
-def test_it_has_loaded_its_library_before_there_is_anything_to_draw(pictures, tmp_path):
+def test_it_has_loaded_its_library_before_there_is_anything_to_draw(early, pictures, tmp_path):
     pictures["none"] = partial(exec, "import sys; assert 'matplotlib.backends.backend_agg' in sys.modules; 1 / 0")
     with Painter() as painter:
         assert painter._process.is_alive()
@@ -33,8 +35,7 @@ def test_it_has_loaded_its_library_before_there_is_anything_to_draw(pictures, tm
             painter.finish()
 
 
-@BEFORE
-def test_one_that_has_died_is_told_and_not_waited_for(pictures, tmp_path):
+def test_one_that_has_died_is_told_and_not_waited_for(early, pictures, tmp_path):
     # More than a pipe holds.
     pictures["none"] = partial(exec, "#" * 1_000_000)
     with Painter() as painter:

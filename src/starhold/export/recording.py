@@ -199,7 +199,9 @@ class Recording(Recorder):
         """Record a function, unless it only hands on arguments or its result has no type of C."""
         outer, self._called_so, entry = self._called_so, {}, None
         nothing: Any = None, None, ()
-        words = equation.__code__.co_varnames[: len(values)]
+        code = equation.__code__
+        # What a function takes beyond its arguments has the name that it has for all of it.
+        words = [code.co_varnames[min(k, code.co_argcount + code.co_kwonlyargcount)] for k in range(len(values))]
         says = [str(equation.__annotations__.get(word, "")) for word in words]
         kinds: list[Any] = list(map(self.types.of, values, says))
         with self._alone():

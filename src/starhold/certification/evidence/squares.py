@@ -240,9 +240,8 @@ def optimum(
     """Return x with Ax = b and the largest last number; None without one. The first numbers are not negative, and before the
     last stand the upper triangles of matrices that are nowhere negative, `twice` what is beside the diagonal. margin: the
     last is no more than 1, the signed ones that say so, and the eigenvalues of the matrices."""
-    if margin and max(map(len, blocks)) > LARGE:
-        key = ((*_bytes(A), b.tobytes()), tuple(signed), tuple(map(tuple, blocks)))
-        return once(key, lambda: most_definite(A, b, signed, blocks))
+    if margin and twice == 1.0 and max(map(len, blocks), default=0) > LARGE:
+        return once((*_bytes(A), b.tobytes(), *signed, *map(tuple, blocks)), lambda: most_definite(A, b, signed, blocks))
     count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
     right = [b, np.zeros(len(signed))]
     if margin:
