@@ -13,7 +13,7 @@ from starhold.studies.timing import can_fork
 
 @pytest.fixture
 def early():
-    """The process starts at once: where it can be copied, which threads of earlier tests forbid, and has a second processor."""
+    """The process starts at once: it can be copied, which threads of earlier tests forbid, and has a second processor."""
     if not can_fork() or len(os.sched_getaffinity(0)) < 2:
         pytest.skip("the process starts where there is something to draw")
 
