@@ -75,6 +75,7 @@ def test_flights_are_covered_from_when_they_are_in_the_claims_set():
     assert claim.share == pytest.approx(0.9973)
 
 
+@pytest.mark.slow
 def test_the_bound_is_that_of_the_funnel_at_the_last_quarter():
     """This claim settles after the flight; what it says of 60 s is weaker, and holds of flights covered from the start."""
     near = steady(initial={"attitude": [1.0, 0.05, 0.0, -0.03]})
@@ -87,6 +88,7 @@ def test_the_bound_is_that_of_the_funnel_at_the_last_quarter():
     assert claim.within[1].proved == pytest.approx(0.3 * math.sqrt(3.0))
 
 
+@pytest.mark.slow
 def test_what_differs_from_the_claims_loop_is_not_covered():
     found = flown({"spacecraft.inertia": normal("3 %", relative=True)}, runs=3)
     assert found.laws[0].claim.left == {proved.OTHER: 3}
@@ -143,6 +145,7 @@ def test_a_false_claim_is_contradicted(tmp_path, monkeypatch):
     assert "Proved of the loop as it flies" in (tmp_path / "d" / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_more_wrongly_told_than_assumed_is_counted(monkeypatch):
     begun = proved._subject
 

@@ -73,7 +73,7 @@ def test_proofs_hold_and_take_no_time(name):
     assert all(StationOracle(content, content["claims"][0], seed).holds() for seed in range(3))
 
 
-@pytest.mark.parametrize("name", leading(MADE, 2))
+@pytest.mark.parametrize("name", leading(MADE, 1))
 def test_nothing_false_is_accepted(name):
     def true(content, claim):
         return StationOracle(content, claim).holds()
