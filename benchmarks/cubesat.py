@@ -31,8 +31,8 @@ from starhold.simulation.lane import fly
 from starhold.simulation.lanes import simulate_many
 
 GOALS = {"models": (50, 343), "everything": (40, 343)}
-"""How many times as fast as Basilisk one lane, and many lanes with one orbit on one core, are meant to be. Before lanes shared
-their step this script gave 34 and 184 (models), 27 and 141 (everything): half as fast again alone, 2.5 times 137 together."""
+"""How many times as fast as Basilisk one lane, and many lanes with one orbit on one core, are meant to be. Before lanes
+shared their step this script gave 34 and 184 (models), 27 and 141 (everything): half as fast again, and 2.5 times 137."""
 LANES, TOGETHER, ALONE, BASILISK = 2048, 300, 20_000, 1000
 """Lanes of a batch and its steps; steps of the timed runs of one lane and of Basilisk."""
 CHECKED, ATTITUDE = 1200, 1e-7
