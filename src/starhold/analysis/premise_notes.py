@@ -11,7 +11,7 @@ import numpy as np
 from starhold.algebra.quaternion import relative
 from starhold.algebra.scalar import maximum
 from starhold.algebra.several import weighted
-from starhold.algebra.vector import Vector, add, apply, dot, subtract
+from starhold.algebra.vector import Vector, add, apply, dot, most, subtract
 from starhold.analysis.meter import KINDS, TOLD, Window
 
 PREMISES = "premises"
@@ -55,15 +55,9 @@ def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
         maximum(seen.attitude, turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3]),
         maximum(seen.rate, dot(off, off)),
         maximum(seen.momentum, dot(total, total)),
-        _largest(seen.wheel, rotors),
+        maximum(seen.wheel, most(rotors)) if rotors else seen.wheel,
         maximum(seen.other, -quantities["attitude_error"][0]),
     )
-
-
-def _largest(most: Any, rotors: Any) -> Any:
-    for momentum in rotors:
-        most = maximum(most, maximum(momentum, -momentum))
-    return most
 
 
 def windows(rows: Any) -> dict[str, Window]:

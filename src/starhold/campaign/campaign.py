@@ -144,13 +144,12 @@ def fly_campaign(
             runs = table.runs
     seconds = time.perf_counter() - begun
     results = summarise(store, job, laws, options.until_decided)
+    threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
     if options.search and job.dispersions and job.required:
-        threads = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
         taken = set[str]()
         results = tuple(replace(result, brackets=brackets(job, store, result, threads, taken, notice)) for result in results)
     if options.proof:
-        count = engine.count if isinstance(engine, Threads) else os.cpu_count() or 1
-        results = tuple(replace(result, claim=look(job, result.law, count, notice)) for result in results)
+        results = tuple(replace(result, claim=look(job, result.law, threads, notice)) for result in results)
     sealed = digest(store, runs)
     totals = {
         "verdicts": {

@@ -151,7 +151,7 @@ class LawResult:
     again: tuple[Again, ...] = ()
     brackets: tuple[Bracket, ...] = ()
     claim: ByClaim | None = None
-    """What is proved, where a proof was requested."""
+    """The brackets by a claim; None unless a proof was requested."""
 
     def __repr__(self) -> str:
         judged = "".join(f"; {verdict.name} {verdict.outcome}" for verdict in self.verdicts)

@@ -20,7 +20,8 @@ from starhold.certification.unmodelled import environment_torques
 from starhold.errors import InputError
 from starhold.kernel.loops import WHEELS, AttitudeLoop
 from starhold.kernel.numbers import RefusedError
-from starhold.kernel.theorems.detumbling import Quadratic, highest, power_at, slope, value
+from starhold.kernel.polynomials import Poly
+from starhold.kernel.theorems.detumbling import highest, power_at, slope, value
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.craft import tensor
 from starhold.parts.effectors.magnetorquers import LIMITED
@@ -131,13 +132,13 @@ def level_at(wired: AttitudeLoop, rate: Fraction) -> dict[str, Fraction]:
         power = power_at(wired, rate)
     except RefusedError:
         return {}
-    root = max(largest_root(negative(power.free)), largest_root(power.limited))
+    root = max(largest_root(-power.free), largest_root(power.limited))
     if root >= rate * (1.0 - NEARLY):
         return {}
     least = rounded(root * MORE, 9)
     often = min(2 * least, (least + rate) / 2)
     falls = [-value(power.free, often), value(power.limited, often) / value(power.seen, often)]
-    fall = min(*falls, slope(power.limited, often) / power.seen[1])
+    fall = min(*falls, slope(power.limited, often) / slope(power.seen, 0))
     rise = max(highest(power.free), value(power.others, least))
     return {"rate": rate, "above": least, "often": often, "fall": near(fall, 1.0 / MORE), "rise": near(rise, MORE)}
 
@@ -147,15 +148,9 @@ def near(x: Fraction, share: float) -> Fraction:
     return rounded(float(x) * share, 15)
 
 
-def negative(p: Quadratic) -> Quadratic:
-    """Return -p."""
-    x, y, z = p
-    return -x, -y, -z
-
-
-def largest_root(p: Quadratic) -> float:
+def largest_root(p: Poly) -> float:
     """Return from where on a quadratic is positive and grows; infinity where it is not in the end."""
-    a, b, c = (float(x) for x in p)
+    a, b, c = (float(part.number) for part in p.powers("m"))
     if c <= 0.0:
         return inf
     middle, room = -b / (2.0 * c), b * b - 4.0 * a * c

@@ -26,7 +26,7 @@ def most_definite(equal: Any, b: Any, signed: Sequence[bool], blocks: Sequence[S
     a, count = sparse.csc_matrix(equal), equal.shape[1] - 1
     scales = np.sqrt(np.asarray(a.multiply(a).sum(1)).ravel())
     rows = sparse.diags(1.0 / np.where(scales > 0.0, scales, 1.0))
-    first = count - sum(map(len, blocks))
+    first = head = count - sum(map(len, blocks))
     places = [([k], [(0, 0)]) for k in range(len(signed))]
     # With G = X + margin the margin is a free number.
     shared = np.zeros((count, 1))
@@ -36,7 +36,6 @@ def most_definite(equal: Any, b: Any, signed: Sequence[bool], blocks: Sequence[S
         places.append((columns, list(pairs)))
         shared[columns, 0] = [i == k for i, k in pairs]
         first += len(pairs)
-    head = count - sum(map(len, blocks))
     free = sparse.hstack([a[:, len(signed) : head], a[:, :count] @ sparse.csc_matrix(shared)])
     program = Program([_cone(rows @ a[:, columns], pairs) for columns, pairs in places], (rows @ free).toarray(), rows @ b)
     if not program.ended():

@@ -5,18 +5,15 @@ from __future__ import annotations
 
 from fractions import Fraction
 from itertools import count
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from ..loops import AttitudeLoop, wired
 from ..numbers import demand, plus, scalar, up
-from ..polynomials import apply, cross, dot, minus, poly, var, variables
+from ..polynomials import Poly, apply, cross, dot, minus, poly, var, variables
 from ..programs import condition
 from ..reading import Claim
 from ..rules import Definite, Exceeds, Proof, Shown, Squares, vanish
 from ..sentences import Statement, above, below
-
-Quadratic: TypeAlias = tuple[Fraction, Fraction, Fraction]
-"""Coefficients of 1, m and m^2."""
 
 
 class Power(NamedTuple):
@@ -24,10 +21,10 @@ class Power(NamedTuple):
     and the period before. `free`: with rods within their limit, with a negative coefficient of m^2. With rods at it the
     power is no more than `others`, and where `free` is negative it is at most -c if `limited` is at least c `seen`."""
 
-    free: Quadratic
-    others: Quadratic
-    limited: Quadratic
-    seen: Quadratic
+    free: Poly
+    others: Poly
+    limited: Poly
+    seen: Poly
 
 
 def detumbles(claim: Claim) -> Proof:
@@ -59,9 +56,9 @@ def detumbles(claim: Claim) -> Proof:
         if "limit" in numbers:
             yield f"limit {k}", Exceeds(numbers["limit"], loop.claim.subject["gains.k"] * (rate + numbers["field.change"]))
         for name, m, c in (("falls", least, Fraction(0)), ("falls by a part", often, fall)):
-            free, limited = combined(power.free, UNIT, c), combined(power.limited, power.seen, -c)
+            free, limited = power.free + c, power.limited - power.seen * c
             yield f"energy {name} {k}", Exceeds(Fraction(0), max(value(free, m), slope(free, m)))
-            yield f"energy {name} at the limit {k}", Exceeds(min(value(limited, m), slope(limited, m), limited[2]))
+            yield f"energy {name} at the limit {k}", Exceeds(min(value(limited, m), slope(limited, m), bend(limited)))
         yield f"energy rises {k}", Exceeds(rise, max(highest(power.free), value(power.others, least)))
         more = fall + rise
         demand(more > 0 and often > least, "the energy does not fall")
@@ -107,54 +104,38 @@ def opposes_change(loop: AttitudeLoop) -> Shown:
 
 def power_at(loop: AttitudeLoop, rate: Fraction) -> Power:
     """Return what bounds the power of a period while the body turns no faster than a rate (rad/s)."""
-    numbers, subject = loop.claim.numbers, loop.claim.subject
+    numbers, subject, m = loop.claim.numbers, loop.claim.subject, var("m")
     k, h, low = subject["gains.k"], subject["measurement.period"], numbers["inertia.low"]
     change, outside, across = (numbers[name] for name in ("field.change", "outside", "outside.across"))
     demand(min(k, h, low, rate) > 0 and h * rate < 1, "the body turns too far in a period")
     # The rate at which the field turns changes by no more than turned m + begun per second.
     torque = k * (rate + change) + outside + across + (rate * numbers["stored"] if loop.wheels else 0)
     turned, begun = rate / (1 - h * rate), up((numbers["gyroscopic"] * rate * rate + torque / low) / (1 - h * rate))
-    bent = linear(h / 2 * begun, h / 2 * turned)
-    mean = combined(bent, linear(0, 1), 1)
-    opposed = combined(product(linear(0, 1), linear(0, 1)), product(bent, bent), -1)
-    opposed = combined(opposed, combined(mean, product(mean, mean), h / 2), -change)
-    demand(opposed[2] > 0, "the body turns too far in a period")
-    others = linear(rate * outside + across * h * begun, across * (1 + h * turned))
+    bent = (turned * m + begun) * (h / 2)
+    mean = m + bent
+    opposed = m * m - bent * bent - (mean + mean * mean * (h / 2)) * change
+    demand(bend(opposed) > 0, "the body turns too far in a period")
+    others = (1 + h * turned) * across * m + rate * outside + across * h * begun
     # Rods at their limit give at least this torque, and the law asks for k times what it sees of the field's turning.
-    most, seen = numbers["dipole.limit"] * numbers["field.least"], combined(mean, UNIT, change)
-    limited = combined(product(linear(most, 0), opposed), product(others, seen), -1)
-    return Power(combined(others, opposed, -k), others, limited, seen)
+    most, seen = numbers["dipole.limit"] * numbers["field.least"], mean + change
+    return Power(others - opposed * k, others, opposed * most - others * seen, seen)
 
 
-def linear(start: Fraction | int, rise: Fraction | int) -> Quadratic:
-    """Return start + rise m."""
-    return Fraction(start), Fraction(rise), Fraction(0)
-
-
-UNIT = linear(1, 0)
-
-
-def combined(p: Quadratic, q: Quadratic, c: Fraction | int) -> Quadratic:
-    """Return p + c q."""
-    x, y, z = (a + c * b for a, b in zip(p, q, strict=True))
-    return x, y, z
-
-
-def product(p: Quadratic, q: Quadratic) -> Quadratic:
-    """Return the product of two, if its degree is 2 at most."""
-    return p[0] * q[0], p[0] * q[1] + p[1] * q[0], p[0] * q[2] + p[1] * q[1] + p[2] * q[0]
-
-
-def value(p: Quadratic, m: Fraction) -> Fraction:
+def value(p: Poly, m: Fraction | int) -> Fraction:
     """Return the value at m."""
-    return p[0] + m * (p[1] + m * p[2])
+    return p.at({"m": m}).number
 
 
-def slope(p: Quadratic, m: Fraction) -> Fraction:
+def slope(p: Poly, m: Fraction | int) -> Fraction:
     """Return the derivative at m."""
-    return p[1] + 2 * m * p[2]
+    return value(p.slope("m"), m)
 
 
-def highest(p: Quadratic) -> Fraction:
-    """Return the largest value, of a negative coefficient of m^2."""
-    return p[0] - p[1] * p[1] / (4 * p[2])
+def bend(p: Poly) -> Fraction:
+    """Return the second derivative of a quadratic polynomial."""
+    return p.slope("m").slope("m").number
+
+
+def highest(p: Poly) -> Fraction:
+    """Return the largest value of a quadratic polynomial with a negative second derivative."""
+    return value(p, -slope(p, 0) / bend(p))
