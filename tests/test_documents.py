@@ -216,11 +216,11 @@ def test_commands_of_the_overview_run_from_top_to_bottom(tmp_path):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for line in commands():
-        if line.startswith("starhold serve"):
-            # It ends when its flight software does: tests/cli/test_serve_cli.py.
+        if line.startswith(("starhold serve", "starhold studio")):
+            # They end when others end them: tests/cli/test_serve_cli.py, tests/studio.
             continue
         settings = {"cwd": tmp_path, "env": {**os.environ, "PATH": path}, "capture_output": True, "text": True}
-        done = subprocess.run(line, shell=True, **settings)
+        done = subprocess.run(line, shell=True, timeout=600, **settings)
         # The template's laws are not all decided, which `certify` says by its exit code.
         assert done.returncode == (4 if line.startswith("starhold certify") else 0), (line, done.stderr)
         assert "Traceback" not in done.stderr, line
