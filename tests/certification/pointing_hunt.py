@@ -1,5 +1,5 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
-tests.certification.pointing_hunt SEED COUNT` prints what came of each."""
+tests.certification.pointing_hunt SEED COUNT [KIND]` prints what came of each; KIND: "targets" for ones that move."""
 
 import json
 import math
@@ -29,9 +29,9 @@ LANES, PERIODS, SETTLED = 96, 2000, 40.0
 how flights on target begin."""
 
 
-def random_loop(random):
+def random_loop(random, kind=""):
     """The text of a scenario of which a pointing bound may be proved: inertia, orbit, target, wheels, law, gains, period,
-    start, and the parts that disturb, measure and estimate, all at random."""
+    start, and the parts that disturb, measure and estimate, all at random; of a kind those that it has for certain."""
 
     def some(*choices):
         return choices[int(random.integers(len(choices)))]
@@ -59,7 +59,10 @@ def random_loop(random):
         lines += ['epoch = "2027-03-20T12:00:00Z"', "[environment]", f"gravity_gradient = {some('true', 'false')}"]
     attitude, rate = unit(random), some(0.0, 0.1 * w) * random.normal(size=3)
     lines += ["[initial]", f"attitude = {numbers(attitude)}", f"rate = {numbers(rate)}"]
-    lines += ["[target]", f'mode = "{some("inertial", "orbital") if orbit else "inertial"}"']
+    if kind == "targets":
+        lines += target_of(random, some, size, numbers, orbit, w)
+    else:
+        lines += ["[target]", f'mode = "{some("inertial", "orbital") if orbit else "inertial"}"']
     if wheels:
         rotor = 10.0 ** random.uniform(-4, -2) * float(np.linalg.eigvalsh(J)[0])
         lines += ["[wheels]", f'layout = "{some("orthogonal", "pyramid")}"', f'inertia = "{rotor:.6g} kg m^2"']
@@ -85,6 +88,31 @@ def random_loop(random):
     shape = shape * spread if np.allclose(shape, np.diag(np.diag(shape))) else shape
     gains = [f"k_rate = {json.dumps((d * shape).tolist())}", f"k_attitude = {json.dumps((k * shape).tolist())}"]
     return "\n".join([*lines, *gains, *([f"gyroscopic = {some(0.0, 1.0)}"] if law == "lqr" else [])]) + "\n"
+
+
+def target_of(random, some, size, numbers, orbit, w):
+    """Lines of a target that moves, by no more than the loop can follow."""
+    kind = some("scan", "yaw-steering", "ground-station", "ground-strip", "slew") if orbit else "slew"
+    given = ["[[part]]", f'type = "{kind}"']
+    if kind == "scan":
+        swing = size(0.02, 1.0) * w
+        given += [
+            f"amplitude = {size(0.05, 1.0):.6g}",
+            f"swing = {2 * math.pi / swing:.6g}",
+            f'shape = "{some("sinusoidal", "raster")}"',
+        ]
+    elif kind == "ground-station":
+        given += [f"latitude = {random.uniform(-1.5, 1.5):.6g}", f"longitude = {random.uniform(-3.0, 3.0):.6g}"]
+        given += [f"elevation = {random.uniform(0.1, 1.3):.6g}"]
+    elif kind == "ground-strip":
+        ends = random.uniform(-1.4, 1.4), random.uniform(-3.0, 3.0)
+        given += [f"{key} = {x:.6g}" for key, x in zip(("latitude", "longitude"), ends, strict=True)]
+        given += [f"to_{key} = {x + size(1e-3, 0.1):.6g}" for key, x in zip(("latitude", "longitude"), ends, strict=True)]
+        given += ["begin = 0", f"duration = {size(10.0, 300.0):.6g}"]
+    elif kind == "slew":
+        given += [f"attitude = {numbers(unit(random))}", f"rate = {size(1e-3, 0.2) * w:.6g}"]
+        given += [f"acceleration = {size(1e-4, 0.03) * w * w:.6g}"]
+    return given
 
 
 def parts_of(random, some, size, numbers, orbit, wheels, k, w, period):
@@ -226,9 +254,9 @@ def flown(loop, claim, random, lanes=128):
     return worst
 
 
-def proved_loop(seed, folder):
+def proved_loop(seed, folder, kind=""):
     """A random loop with its text and its claim; or why there is none, in place of the claim."""
-    text = random_loop(np.random.default_rng(seed))
+    text = random_loop(np.random.default_rng(seed), kind)
     try:
         scenario = parse(text, "hunted.toml", folder)
         loop = build(scenario, scenario.laws[0])
@@ -242,21 +270,21 @@ def proved_loop(seed, folder):
     return loop, text, claim
 
 
-def hunted(seed, folder):
+def hunted(seed, folder, kind=""):
     """What became of a random loop: the text, why there is no claim or "", what contradicts it or "", and shares."""
-    _, text, claim = proved_loop(seed, folder)
+    _, text, claim = proved_loop(seed, folder, kind)
     if isinstance(claim, str):
         return text, claim, "", None
     found, reached = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, seed).worst()
     return text, "", found, (claim, reached)
 
 
-def main(first, count):
+def main(first, count, of=""):
     """Print a line for each loop, and how many of each kind there were."""
     begun, tally = time.time(), dict.fromkeys(("refused", "undecided", "proved", "broken"), 0)
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            text, why, found, more = hunted(seed, Path(folder))
+            text, why, found, more = hunted(seed, Path(folder), of)
             kind, shown = why.split(":")[0] or "proved", why
             if more:
                 claim, (V, angle, rate) = more
@@ -273,4 +301,4 @@ def main(first, count):
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:3]))
+    main(*map(int, sys.argv[1:3]), *sys.argv[3:])

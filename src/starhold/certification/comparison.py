@@ -14,8 +14,8 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
-from starhold.certification.matrices import fraction
-from starhold.certification.subject import above, make_subject
+from starhold.certification.matrices import above, fraction
+from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes, samples_of
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS

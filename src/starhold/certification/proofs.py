@@ -25,7 +25,8 @@ from starhold.certification.evidence.refuted import (
     UNSETTLED,
     find_refuted,
 )
-from starhold.certification.subject import Subject, above, below
+from starhold.certification.matrices import above, below
+from starhold.certification.subject import Subject
 from starhold.kernel.check import Proved, check
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.rules import Exceeds

@@ -100,6 +100,41 @@ class Envelope(NamedTuple):
     field_error: float = 0.0
 
 
+class Orbit(NamedTuple):
+    """Bounds of an orbit, for targets that bound by it how they move: the least distance from the centre of attraction (m),
+    the largest speed (m/s), the rate (rad/s) and the acceleration (rad/s2) of the orbital frame, the gravitational parameter
+    (m3/s2), and the direction of the angular momentum at the start. Forces beside that of a point mass move the craft by no
+    more than `force` (m/s2), and the frame otherwise than in two-body motion by no more than `off_rate` (rad/s) and
+    `off_acceleration` (rad/s2)."""
+
+    nearest: float
+    speed: float
+    rate: float
+    acceleration: float
+    gravity: float
+    normal: Vector
+    force: float = 0.0
+    off_rate: float = 0.0
+    off_acceleration: float = 0.0
+
+
+class Motion(NamedTuple):
+    """Bounds of how a target moves: its rate (rad/s) and acceleration (rad/s2), `inf` for one without; how far those that it
+    gives may be off (rad/s, rad/s2); until when, since the start of the flight, all this holds (s); and whether its attitude
+    or its rate jumps at some instants, between which it holds."""
+
+    rate: float
+    acceleration: float
+    off_rate: float = 0.0
+    off_acceleration: float = 0.0
+    until: float = math.inf
+    jumps: bool = False
+
+
+AT_REST, UNLIMITED = Motion(0.0, 0.0), Motion(math.inf, math.inf)
+"""The motion of a target that rests, and of one without bounds."""
+
+
 class Push(NamedTuple):
     """A bound of the norm of a torque or of an error of the command, which may grow with the body's rate: `torque` (N m),
     and `per_rate` (N m s) times the norm of the rate (rad/s); `inf` for one without a bound. Of how fast a torque changes

@@ -24,8 +24,7 @@ from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
 from starhold.certification.evidence.terms import valued
-from starhold.certification.matrices import floats
-from starhold.certification.subject import above
+from starhold.certification.matrices import above, floats
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
