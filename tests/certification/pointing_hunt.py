@@ -1,5 +1,6 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
-tests.certification.pointing_hunt SEED COUNT [KIND]` prints what came of each; KIND: "targets" for ones that move."""
+tests.certification.pointing_hunt SEED COUNT [KIND]` prints what came of each; KIND: "targets" for ones that
+move, "shaken" for random torques."""
 
 import json
 import math
@@ -74,6 +75,8 @@ def random_loop(random, kind=""):
         lines += [f"viscous = {size(1e-6, 1e-3) * w * rotor:.6g}", f"coulomb = {size(1e-6, 1e-3) * k:.6g}"] * some(0, 1)
     law = some("lyapunov", "wheel", "wheel") if wheels else some("lyapunov", "lyapunov", "pd", "matrix-pd", "lqr", "wheel")
     lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
+    if kind == "shaken":
+        lines += ["[[part]]", 'type = "random-torque"', f"deviation = {size(1e-5, 1e-3) * k:.6g}"]
     lines += ["[simulation]", f"duration = {100.0 * period!r}", f"control_period = {period!r}"]
     lines += ["[certify]", f"disturbance = {size(1e-6, 3e-2) * k:.6g}", "[[law]]", f'type = "{law}"']
     lines += [f'quaternion_sign = "{some("as_published", "shortest", "hysteresis")}"']
@@ -180,6 +183,7 @@ class Attack(Oracle):
             *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
             self.noise(self.lanes, self.rng) if "share" in n else None,
             (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
+            (n.get("noise.torque.deviation", 0.0), n.get("noise.torque", 0.0)),
         )  # fmt: skip
         return found
 

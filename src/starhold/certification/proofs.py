@@ -253,6 +253,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         "rate_start": rate,
         **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
         **errors,
+        **({"random_torque": float(numbers["noise.torque"])} if "noise.torque" in numbers else {}),
         "told": "outside.0" in numbers,
         "share": below(1 - numbers["share"]) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from math import ceil, inf, isfinite
+from math import ceil, hypot, inf, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,10 +63,12 @@ class Pushes(NamedTuple):
 
 
 class Driven(NamedTuple):
-    """Noise-driven errors, the parts with the noise, and the parts with the errors."""
+    """Noise-driven errors, the parts with the noise, and the parts with the errors; the deviation of a random torque about
+    each axis (N m)."""
 
     recursion: Recursion
     parts: tuple[Fitted, ...]
+    torque: float = 0.0
 
 
 def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
@@ -127,15 +129,31 @@ def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
 
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
+    """Return what noise drives in a loop: errors of what its law is told, which are none where its parts do not say them,
+    and random torques from outside. None without either, and where the target depends on the law's mode."""
+    if loop.target.part.flag("BY_MODE"):
+        return None
+    told = _told_errors(loop)
+    torques = [fitted for fitted in loop.used("environment") if _noise(fitted, loop.period).torque]
+    if told is None and torques:
+        told = Driven(_as_read(Noise()), ())
+    if told is None:
+        return None
+    return told._replace(
+        parts=(*told.parts, *torques), torque=hypot(*(_noise(fitted, loop.period).torque for fitted in torques))
+    )
+
+
+def _told_errors(loop: ClosedLoop) -> Driven | None:
     """Return the noise-driven errors of an estimate, or of readings that the law uses directly; None without noise, where
-    parts do not fully declare it, where an estimator leaves other errors in, where sensors of one quantity are not read
-    together, and where the target depends on the law's mode.
+    parts do not fully declare it, where an estimator leaves other errors in, and where sensors of one quantity are not read
+    together.
     """
     estimators = loop.used("estimator")
     wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
     declared = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
-    if not sensors or not declared or loop.target.part.flag("BY_MODE"):
+    if not sensors or not declared:
         return None
     noise = Noise()
     several = getattr(estimators[0].part.module, "SEVERAL", ()) if estimators else ()
@@ -154,7 +172,8 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
         tell: Any = estimators[0].part.hook("recursion")
         recursion = None if tell is None else tell(estimators[0].params, noise, loop.period, _rate(loop))
     else:
-        recursion = _as_read(noise) if _is_random(noise) else None
+        as_it_is = noise.walk or noise.every > 1 or not _is_random(noise)
+        recursion = None if as_it_is else _as_read(noise)
     return None if recursion is None else Driven(recursion, (*sensors, *estimators))
 
 
@@ -310,12 +329,9 @@ def _is_random(noise: Noise) -> bool:
     return any(leaves(noise._replace(every=noise.every - 1)))
 
 
-def _as_read(noise: Noise) -> Recursion | None:
-    """Return the errors of readings that the law uses directly; a random-walk bias, and an attitude that is held, are
-    unbounded.
-    """
-    if noise.walk or noise.every > 1:
-        return None
+def _as_read(noise: Noise) -> Recursion:
+    """Return the errors of readings that the law uses directly, without a random-walk bias and held attitudes, which are
+    unbounded."""
 
     def read(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         misread = apply(noise.attitude, random[2]), scale(noise.rate, random[0])

@@ -222,9 +222,8 @@ def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "angle" not in n:
         return f"a torque from outside of up to {shown(n['torque'], ' N m')} leaves the body near the target"
-    start = f"rest at up to {angle(n['slew_angle'])}"
-    if n["rate_start"]:
-        start = f"up to {angle(n['slew_angle'])} at up to {speed(n['rate_start'])}"
+    begun = f"up to {angle(n['slew_angle'])}"
+    start = f"{begun} at up to {speed(n['rate_start'])}" if n["rate_start"] else f"rest at {begun}"
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
     beside = " beside those that the law is told" if n["told"] else ""
 
@@ -233,8 +232,9 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
         more = f" and {shown(growing, ' N m s')} times the body's rate" if growing else ""
         return f"of up to {shown(n[name], ' N m')}{more}"
 
-    bounds = [f"torques from outside {pushed('torque')}{beside}"]
-    bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
+    random = f", random ones of up to {shown(n['random_torque'], ' N m')}" if "random_torque" in n else ""
+    bounds = [f"torques from outside {pushed('torque')}{beside}{random}"]
+    bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []

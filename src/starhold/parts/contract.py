@@ -63,7 +63,8 @@ class Noise(NamedTuple):
     """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), which
     is new every so many control periods, and at each control step of the rate (rad/s) and of the change of a gyro's bias
     until the next (rad/s); the deviation about each axis of that of the magnetic field (T); of the attitudes of further
-    sensors (3, 3; rad), new at the same steps."""
+    sensors (3, 3; rad), new at the same steps. Of an environment the deviation about each axis of a torque (N m) that is new
+    at each control step and held until the next."""
 
     attitude: Matrix = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     every: int = 1
@@ -71,6 +72,7 @@ class Noise(NamedTuple):
     walk: float = 0.0
     field: float = 0.0
     more: tuple[Matrix, ...] = ()
+    torque: float = 0.0
 
 
 class Recursion(NamedTuple):
