@@ -12,10 +12,13 @@ from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import differences
 from starhold.certification.evidence import noise
 from starhold.certification.evidence.attitude import Loop
+from starhold.certification.evidence.finding import read
 from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import driven_errors
 from starhold.certification.wording import sentence
 from starhold.kernel.check import check
+from starhold.kernel.held import Held
+from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.theorems.noise import DEVIATION
 from starhold.laws import lyapunov
@@ -123,3 +126,19 @@ def test_flights_end_as_near_as_is_proved():
     assert "random ones of up to 0.0006491 N m" in sentence(claim, certificate.subject)
     # A claim of half of it would be broken.
     assert 0.5 < flown(loop, claim, np.random.default_rng(1)) <= 1.0
+
+
+def test_it_is_a_push_but_for_what_it_does_linearly():
+    """In levels and in what is not linear it is a torque from outside, of its radius; near the target noise has the rest."""
+    loop, (claim,) = flying("shaken"), flying("shaken").claims
+    most, outside = (Fraction(str(claim["numbers"][name])) for name in (TORQUE, "outside"))
+    bounded = claim["numbers"] | {TORQUE: "0", "outside": str(outside + most)}
+    end = Fraction(claim["evidence"]["levels"][-1]["end"])
+    tubes = []
+    for numbers in (claim["numbers"], bounded):
+        held = Held(AttitudeLoop(read(claim | {"numbers": numbers}, loop.by_digest), remembers=True))
+        tubes.append((held, held.tube(held.region(end))))
+    assert tubes[0][1].push == tubes[1][1].push > most
+    assert tubes[0][1].drift == tubes[1][1].drift
+    sizes = [[b for _, b in held.linear(region)] for held, region in tubes]
+    assert [y - x for x, y in zip(*sizes, strict=True)] == [most, most, 0]
