@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import product
 from typing import NamedTuple
 
 from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
 from .numbers import Rows, beside, inverse, plus, scalar, times
 from .regions import STATE, with_momentum
+
+MOMENTA = ("h1", "h2", "h3")
+HALF_ROOT = Fraction(7072, 10000)
+"""At least the root of 1/2."""
+AROUND = [
+    *([c * HALF_ROOT for c in signs] for signs in product((-1, 1), repeat=3)),
+    *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
+]
+"""The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
 class Near(NamedTuple):

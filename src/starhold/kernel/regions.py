@@ -12,8 +12,9 @@ from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
-SPEED, ANGLE, PULL = "|w", "|q", "|u"
-"""Under which the sizes have those of |w| and |q|, and of the acceleration that is linear in the state where it is known."""
+SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
+"""Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
+a tube of the torque that an inertia near the given one adds."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
 """The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
@@ -159,6 +160,11 @@ def growing(parts: list[Poly]) -> list[Poly]:
 def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
     """Return values by names."""
     return dict(zip(names, values, strict=True))
+
+
+def beyond(wide: list[Fraction], sizes: Sizes) -> list[Fraction]:
+    """Return by how much bounds of the rates are more than those in a region."""
+    return [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
 
 
 def stretch(rows: Rows) -> Fraction:
