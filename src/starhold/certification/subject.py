@@ -61,8 +61,8 @@ class Subject:
         return given._replace(moment=given.moment + self.off)
 
     def against(self, noisy: bool) -> Pushes:
-        """Return the bounds of what acts on the loop and is told to no law, the gravity gradient on what the inertia is off by
-        included."""
+        """Return the bounds of what acts on the loop and is told to no law. The gravity gradient on what the inertia is off by
+        is in it."""
         bounds = pushes(self.loop, self.envelope(noisy))
         return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
 

@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from .loops import AXES, NONE, AttitudeLoop
-from .near import AROUND, MOMENTA, near_target, spinning
+from .near import CHANGE, MOMENTA, between, near_target
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
 from .regions import (
@@ -38,14 +38,13 @@ from .regions import (
     least_form,
     lengths,
     named,
+    outweighed,
     settled,
     stretch,
     with_momentum,
 )  # fmt: skip
 
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
-CHANGE = "told.change", "told.change.per.rate"
-"""How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
 
 
 class Held:
@@ -216,10 +215,14 @@ class Held:
         return norm(sizes) if letter == "e" else max(sizes, default=Fraction(0))
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
-        """Return bounds in a tube of the torque from outside and of the error of the command; the target's rate adds to the
-        body's."""
+        """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
         return {"outside": outside + sizes[LOAD], "both": outside + error + sizes[LOAD]}
+
+    def load(self, sizes: Sizes, acceleration: Fraction) -> Fraction:
+        """Return how far the torque that the body takes is from that of the given inertia."""
+        w, r = sizes[SPEED], self.size("r")
+        return self.off * (acceleration + self.size("a") + w * r + (w + r) ** 2)
 
     def changes(self, sizes: Sizes, turning: int = 1) -> dict[str, Fraction]:
         """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
@@ -264,7 +267,7 @@ class Held:
         odd = [most(p, near) for p in self.odd]
         asks = {f"u{k + 1}": min(most(self.pull[k], sizes), even[k] + odd[k]) for k in AXES}
         begun = [x + most(p, near) for x, p in zip(even, self.speeding, strict=True)]
-        r, (steady, uneven) = self.size("r"), self.misread(region)
+        steady, uneven = self.misread(region)
         rigid = sum((felt(within_tube, x, sizes) * self.size(x) for x, within_tube in self.rigid.items()), Fraction(0))
         steady, uneven = steady + rigid + self.lasting, uneven + rigid + self.lasting
 
@@ -278,20 +281,18 @@ class Held:
             push = steady + self.pushed(within_tube)["both"] + stale
             slopes = [[most(p.slope(name), within_tube) for name in STATE[RATE]] for p in self.bend]
             columns = zip(begun, reach(slopes, beyond(wide, sizes)), self.widths, strict=True)
-            faster, w = [u + more + push * n for u, more, n in columns], within_tube[SPEED]
-            # How fast the body turns and gathers speed, and what of the inertia is not as given.
-            load = self.off * (norm(faster) + stale * self.light + self.size("a") + w * r + (w + r) ** 2)
-            return [*(sizes[x] + self.h * more for x, more in zip(STATE[RATE], faster, strict=True)), load]
+            faster = [u + more + push * n for u, more, n in columns]
+            wide = [sizes[x] + self.h * more for x, more in zip(STATE[RATE], faster, strict=True)]
+            return [*wide, self.load(within_tube, norm(faster) + stale * self.light)]
 
         *wide, load = settled(reached, [*(sizes[name] for name in STATE[RATE]), ZERO])
         far = within(wide, load)
         turned = self.h / 2 * far[SPEED]
         far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | asks
         demand(not self.even or region.least > turned, "motions pass a half turn")
-        drift = beyond(wide, sizes)
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
         bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
-        return Tube(region, far, drift, turned, steady, pushed, stale, uneven, bent)
+        return Tube(region, far, beyond(wide, sizes), turned, steady, pushed, stale, uneven, bent)
 
     def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
@@ -313,6 +314,8 @@ class Held:
         rest = calm + slower * norm(away) + share * fastest(last, tube.sizes, self.speeds(tube.sizes))
         # What pushes do to V grows with what the state does in the period: linearly, and what is left.
         drift = self.astray(tube)
+        # Of the acceleration that an inertia resists the part that is linear in the state is no push.
+        kept = push - tube.sizes[LOAD] + self.load(tube.sizes, norm(drift) / h + tube.stale * self.light)
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
         rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
         # So does what V' has of the rates, which pushes change.
@@ -322,12 +325,13 @@ class Held:
         rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
         onward = self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0))
         growing = [[h / 2 * y for y in row] for row in times(self.felt, onward)]
-        growing += [[norm(away) / (2 * push) * y for y in row] for row in self.steepness]
+        growing += [[norm(away) / (2 * kept) * y for y in row] for row in self.steepness]
         # |a| + |b| + |c| <= sqrt(1 + 2/w) |(a, wb, wc)| with w = sqrt(WEIGHT).
         F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        return least_form(falling, region), over, F, push * root(1 + 2 / WEIGHT), rest
+        more = root(1 + 2 / WEIGHT)
+        return outweighed(least_form(falling, region), self.off * more, F, self.near.rates), over, F, kept * more, rest
 
     def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""
@@ -344,10 +348,7 @@ class Held:
 
     def corners(self) -> list[Rows]:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
-        if not self.loop.wheels:
-            return [self.near.A]
-        every = ([x * self.size("h") for x in corner] for corner in AROUND)
-        return [plus(self.near.A, self.near.spun(*spinning(self.loop, at))) for at in every]
+        return between(self.near, self.loop, self.size("h")) if self.loop.wheels else [self.near.A]
 
     @property
     def away(self) -> Radii:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from .loops import AXES, RATES, TURNS
-from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, up, whole
+from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, times, transpose, up, whole
 from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
@@ -101,6 +101,14 @@ def least_form(parts: Factored, region: Region) -> Rows:
     for i, row in enumerate(radius):
         middle[i][i] -= up(reach([row], [sizes[name] for name in STATE])[0] / sizes[STATE[i]])
     return middle
+
+
+def outweighed(Q: Rows, c: Fraction, F: Rows, M: Rows) -> Rows:
+    """Return the matrix of a form that is no more than x.Qx - c |Fx| |Mx|: 2 |Fx| |Mx| <= s |Fx|^2 + |Mx|^2 / s."""
+    if not c:
+        return Q
+    s = stretch(M) / stretch(F)
+    return plus(plus(Q, times(transpose(F), F), -c * s / 2), times(transpose(M), M), -c / (2 * s))
 
 
 def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:

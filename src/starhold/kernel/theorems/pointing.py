@@ -118,9 +118,16 @@ def points(claim: Claim) -> Proof:
         f" {most('outside')} and {enumerated(errors)}"
     )
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
-    text += ", an inertia within the tolerance" if motion.off else ""
+    text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
-    assumed = ["rigid-body", "inertia-near" if motion.off else "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
+    assumed = [
+        "rigid-body",
+        "inertia-near" if motion.off else "inertia-as-given",
+        "bounded-push",
+        "held-torque",
+        *noise.assumptions,
+        *limited.assumptions,
+    ]
     assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
