@@ -260,9 +260,10 @@ def main(first, count, tolerance=None):
             kind, shown = why.split(":")[0] or "proved", why
             if more:
                 claim, (V, angle, rate) = more
+                kept = f"share {claim.numbers['share']} off {claim.numbers.get('tolerance', 0.0)}"
                 n = claim.numbers
                 ends = f"{math.degrees(n['angle']):.3g} of {math.degrees(n['slew_angle']):.3g} deg"
-                shown = f"V {V:.3f} angle {angle:.3f} rate {rate:.3f}, {ends}, share {n['share']} off {n.get('tolerance')} {found and 'BROKEN ' + found}"
+                shown = f"V {V:.3f} angle {angle:.3f} rate {rate:.3f}, {ends}, {kept} {found and 'BROKEN ' + found}"
             tally[kind] += 1
             tally["broken"] += bool(found)
             law = text.rsplit('type = "', 1)[1].split('"')[0]

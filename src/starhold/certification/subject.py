@@ -60,10 +60,9 @@ class Subject:
         given = envelope_of(self.loop, above(self.total_momentum), noisy)
         return given._replace(moment=given.moment + self.off)
 
-    def against(self, noisy: bool) -> Pushes:
-        """Return the bounds of what acts on the loop and is told to no law. The gravity gradient on what the inertia is off by
-        is in it."""
-        bounds = pushes(self.loop, self.envelope(noisy))
+    def against(self, envelope: Envelope) -> Pushes:
+        """Return bounds of what acts on the loop and is told to no law, the pull on what the inertia is off by included."""
+        bounds = pushes(self.loop, envelope)
         return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
 
     @property

@@ -241,7 +241,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
         kinds = [SHARE in like]
     for noisy in kinds:
-        against = loop.known.against(noisy)
+        against = loop.known.against(loop.known.envelope(noisy))
         try:
             if any(pushed.find_largest(*one) for pushed in ways(loop, against, noisy, tried[0]) for one in tried):
                 return True
