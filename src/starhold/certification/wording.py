@@ -215,8 +215,7 @@ OFF = "every entry of the inertia off by up to {} of sqrt(J_ii J_jj)"
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["tolerance"] is None:
         return f"{place(n, subject)} it converges whatever the inertia of the body really is"
-    share = shown(100.0 * n["tolerance"], " %")
-    return f"{place(n, subject)} it converges with {OFF.format(share)}".strip()
+    return f"{place(n, subject)} it converges with {OFF.format(shown(100.0 * n['tolerance'], ' %'))}".strip()
 
 
 def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
