@@ -98,7 +98,7 @@ PROVED = [104, 100, 105, 106, 107, 109, 202, 203]
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", PROVED)
 def test_no_flight_breaks_the_claim_of_a_loop_that_follows_a_target(seed, tmp_path):
-    _, why, found, more = hunted(seed, tmp_path, "targets")
+    _, why, found, more = hunted(seed, tmp_path, kind="targets")
     assert (why, found) == ("", "")
     claim, shares = more
     assert claim.left_out == []
