@@ -198,9 +198,9 @@ class Fleet:
                 fast = np.linalg.norm(w + around.target(q, t)[0], axis=0)
                 pushed, error = (x + c * fast for x, c in zip((self.outside, self.error), self.growing, strict=True))
                 command = around.command(self.law, q, w, t, unit) + error * unit
-                random = self.rng.normal(scale=self.around.shaken[0], size=w.shape) if self.around.shaken[0] else 0.0
-                long = np.linalg.norm(random, axis=0)
-                random = random * np.minimum(1.0, self.around.shaken[1] / np.maximum(long, 1e-300))
+                # Nothing is drawn where there is none, so that other flights stay as they are.
+                random = self.rng.normal(scale=self.around.shaken[0], size=w.shape) if self.around.shaken[0] else 0.0 * w
+                random = random * np.minimum(1.0, self.around.shaken[1] / np.maximum(np.linalg.norm(random, axis=0), 1e-300))
                 for k in range(parts):
                     outside = pushed * unit + around.loaded(unit, fast, part) + random
                     q, w = around.after(q, w, t + (k + 0.5) * part, command, outside, part)
