@@ -33,7 +33,8 @@ from starhold.trace.machine import widest
 
 GOALS = {"models": (50, 343), "everything": (40, 343)}
 """How many times as fast as Basilisk one lane, and many lanes with one orbit on one core, are meant to be. Before lanes
-shared their step this script gave 34 and 184 (models), 27 and 141 (everything): half as fast again, and 2.5 times 137."""
+shared their step this script gave 34 and 184 (models), 27 and 141 (everything): half as fast again, and 2.5 times 137.
+Then the lanes' times were differences that counted making a batch ready too, which is 3 to 4 ns of a step of a lane here."""
 LANES, TOGETHER, ALONE, BASILISK = 2048, 300, 20_000, 1000
 """Lanes of a batch and its steps; steps of the timed runs of one lane and of Basilisk."""
 CHECKED, ATTITUDE = 1200, 1e-7
