@@ -61,7 +61,7 @@ def noted(seen: Any, quantities: Mapping[str, Any], now: Any, ends: Any) -> Any:
 
 
 def table(seen: Any, period: float, every: int) -> dict[str, Metric]:
-    """Return the metrics of notes at these rows, of samples every so many control periods (s)."""
+    """Return the metrics of notes at these rows, of samples at intervals of `every` control periods (s)."""
     if not seen:
         return {}
     peaks = Metric("rad/s", "root", (seen.peak_rate,)), Metric("rad/s^2", "most", seen.peak_acceleration)

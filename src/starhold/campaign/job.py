@@ -58,7 +58,7 @@ class Job:
     source: Source
     table: CampaignTable
     progress: Callable[[str, int], None] | None = None
-    """Called with a law and how many more of its runs were flown, as a block goes on; not from other processes."""
+    """Called with a law and how many more of its runs were flown, while a block is flown; not from other processes."""
     extras: tuple[str, ...] = ()
     """Names of metrics that are measured beside those that the campaign asks for."""
     _lanes: dict[str, Lanes] = field(default_factory=dict[str, Lanes])

@@ -37,9 +37,9 @@ from starhold.studies.body import Issued, study_of
 Array = NDArray[np.float64]
 Notice = Callable[..., None]
 MOST, BLOCK = 20_000, 512
-"""The first so many runs of a campaign are looked at, in blocks of so many."""
+"""Runs of a campaign that are compared with the claim, from the first on, and those of a block."""
 APART = 1_000
-"""The first so many runs, where each has a loop of its own."""
+"""Runs that are compared where each has a loop of its own."""
 SLACK = 1e-6
 """The share of a bound by which the integration may take a flight beyond it, or beyond a premise."""
 NEARLY = 0.9

@@ -119,8 +119,8 @@ class ByClaim:
         return self.runs - sum(self.left.values())
 
     def is_rare(self, failures: int, runs: int) -> bool:
-        """Whether so many of the runs may be outside the share: the probability of as many is more than `CHANCE`. Each run
-        has its own noise, however the dispersions are drawn."""
+        """Whether `failures` of the runs may be outside the share: the probability of as many is more than `CHANCE`. Each
+        run has its own noise, however the dispersions are drawn."""
         if self.share is None or not failures:
             return not failures
         from starhold.campaign.verdicts import failure_bounds

@@ -39,7 +39,7 @@ def examine_part(part: Part) -> Iterator[Verdict]:
 
 
 def find_part(given: str) -> Part:
-    """The part that is installed under a name, or stands in a file. InputError where there is none."""
+    """The part that is installed under a name, or is in a file. InputError where there is none."""
     installed = {part.name: part for role in ("body", *ROLES) for part in parts(role).values()}
 
     def read(path: Path) -> Part:

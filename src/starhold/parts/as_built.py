@@ -168,7 +168,7 @@ def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dic
 
 
 def kept(sensor: Any, seen: Any) -> Any:
-    """The memory of a sensor for the next control step, with what it has seen."""
+    """A sensor's memory for the next control step, which includes this reading."""
     return Waiting(sensor, seen) if seen else sensor
 
 

@@ -110,7 +110,8 @@ def highest_speed(position: Vector, velocity: Vector, gravity: float) -> float:
 
 
 def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) -> float:
-    """When (s) the motion first comes down to this distance (m) from the centre, infinity for never. The start is beyond."""
+    """When (s) the motion first comes down to this distance (m) from the centre, infinity if never. The motion starts beyond
+    it."""
     distance, energy, radial, _ = _invariants(position, velocity, gravity)
     if lowest(position, velocity, gravity) >= radius:
         return math.inf

@@ -71,7 +71,7 @@ def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
 
 
 def sun(time: Scalar, params: Numbers) -> Sun:
-    """The Sun so many seconds after the start."""
+    """The Sun at a time (s) after the start."""
     if isinstance(params, series.Solar):
         return Sun(*series.sun_at(time, params))
     c, s = cosine_sine(params.anomaly + _ANOMALY[1] / (360.0 * DAY) * time)

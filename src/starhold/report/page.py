@@ -171,7 +171,7 @@ def _bytes(numbers: Any) -> str:
 
 
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
-    """State the conditions under which each claim of the page stands."""
+    """State the conditions under which each claim of the page remains valid."""
     claims: list[dict[str, Any]] = []
     for number, flight in enumerate(flights):
         if flight.name not in laws:

@@ -75,7 +75,7 @@ class ElementSet(NamedTuple):
         return date_of(import_module("sgp4.conveniences").sat_epoch_datetime(self.satellite()))
 
     def state(self, epoch: Date, later: float = 0.0) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s) so many seconds after an epoch (UTC), in the mean equator and equinox of that
+        """Position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of that
         epoch. ValueError where SGP4 has none."""
         days = days_of(epoch)
         error, position, velocity = self.satellite().sgp4(2451545.0, days + later / 86400.0)
@@ -114,7 +114,7 @@ class Ephemeris(NamedTuple):
         return self.rows[-1][0]
 
     def state(self, epoch: Date, later: float = 0.0) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s) so many seconds after an epoch (UTC), in the mean equator and equinox of that
+        """Position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of that
         epoch: the polynomial through the nearest positions and velocities. ValueError where there are no states."""
         from scipy.interpolate import KroghInterpolator
 

@@ -47,7 +47,8 @@ class Weighed(NamedTuple):
 
     @classmethod
     def of(cls, reading: Reading, rows: Array, times: Array, steps: int, noise: Noise) -> Weighed:
-        """A reading at times up to so many control steps: predictions between instants are those of a cubic through four."""
+        """A reading at times within `steps` control steps: predictions between instants are those of a cubic through
+        four."""
         count = 1 if (times == np.round(times)).all() else min(4, steps + 1)
         first = np.clip(np.floor(times).astype(int) - (count - 1) // 2, 0, steps + 1 - count)
         off = times - first

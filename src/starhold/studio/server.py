@@ -162,7 +162,7 @@ class Studio:
         return _malformed() if given is None else JSONResponse(await self._checked(given["text"]))
 
     async def _checked(self, text: str) -> dict[str, Any]:
-        """Return what a check tells of a text; or the files that it would run and the user did not yet allow."""
+        """Return the result of checking a text, or the files that it would run and that the user has not yet allowed."""
         files = [file for file in editing.files_run(text) if file not in self.run]
         return {"asks": files} if files else await run_in_threadpool(self.checker.check, text, self.where, self.folder)
 

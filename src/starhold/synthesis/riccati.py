@@ -95,7 +95,7 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
     """Return the regulator of positive definite Q and R, right to the last digit for the numbers given.
 
     Newton's method in Kleinman's form (IEEE Transactions on Automatic Control 13, 1968): each step solves a Lyapunov
-    equation for the cost P of a stable feedback and goes on with the feedback of P, which decreases and in the end
+    equation for the cost P of a stable feedback and continues with the feedback of P, which decreases and in the end
     converges quadratically. ValueError where numbers overflow or no solution is reached."""
     from flint import ctx
 

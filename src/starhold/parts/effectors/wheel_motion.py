@@ -76,7 +76,7 @@ def mounted(wheels: Wheels, errors: Sequence[Vector]) -> Wheels:
 
 
 def as_known(wheels: Wheels) -> Wheels:
-    """The wheels with the axes for which laws and allocation take them."""
+    """The wheels, with the axes that laws and allocation assume."""
     return wheels._replace(axes=wheels.known_axes, known_axes=()) if wheels.known_axes else wheels
 
 

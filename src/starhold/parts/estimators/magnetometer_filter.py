@@ -1,5 +1,5 @@
-"""Attitude, and rate or a gyro's bias, from the magnetic field alone, by an extended Kalman filter that begins anew where
-the fields measured contradict it: for a body that tumbles, and of which nothing is known."""
+"""Attitude, and rate or a gyro's bias, from the magnetic field alone, by an extended Kalman filter that restarts where the
+fields measured contradict it: for a body that tumbles, and of which nothing is known."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ HOUR = 3600.0
 MEAN = 100.0
 """Measurements over which squares of what they are off are averaged."""
 DOUBT, TRUST = 2.0, 1.25
-"""The filter begins anew where that mean, 1 of a good filter, is above the first, and is not valid above the second."""
+"""The filter restarts where that mean, 1 for a consistent filter, is above the first, and is not valid above the second."""
 SPREAD = 0.5
 """The sine of the angle by which the field must have turned, in inertial axes, since the filter began."""
 TINY = 1e-12
