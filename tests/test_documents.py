@@ -281,7 +281,7 @@ def test_a_formula_that_is_not_the_law_is_not_found():
 @pytest.mark.slow
 def test_example_of_parts_flies(tmp_path):
     """The scenario of the page about scenario files, with what it says is recorded."""
-    (example,) = (text for text in blocks("docs/scenarios.md", "toml") if "[[part]]" in text)
+    (example,) = (text for text in blocks("docs/scenarios.md", "toml") if "complementary-filter" in text)
     path = tmp_path / "my.toml"
     path.write_text(example, encoding="utf-8")
     scenario = load(str(path))
@@ -303,7 +303,7 @@ WITH_EFFECTORS = {
 
 @pytest.mark.slow
 def test_mission_of_the_page_about_modes_flies():
-    example, rods, _ = blocks("docs/modes.md", "toml")
+    example, rods, _ = (text for text in blocks("docs/modes.md", "toml") if "[[law.mode]]" in text)
     scenario = sh.scenario(tomllib.loads(example))
     (flight,) = sh.compare(scenario)
     assert [one.mode for one in flight.modes] == ["detumble", "sun", "nadir"]
