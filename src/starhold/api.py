@@ -184,8 +184,8 @@ def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> l
 
 @shortly
 def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Certificate]:
-    """Prove what can be of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate has an
-    `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tried by ten thousand flights."""
+    """Prove what can be proved of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate
+    has an `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tested by ten thousand flights."""
     from starhold.studies.certificates import certify_scenario
 
     return [tried.certificate for tried in certify_scenario(reading.open_scenario(scenario), law)]
@@ -260,8 +260,8 @@ def export_requirements(
 
 @shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
-    """Return what is left after the loss of any one or two wheels, under a law, or the first; proof: how near its target the
-    loop is proved to stay after each, too, which takes seconds each."""
+    """Return the control left after the loss of any one or two wheels, under a law, or the first; proof: how near its target
+    the loop is proved to stay after each, too, which takes seconds each."""
     return studied("failures", scenario, law, proof=proof)
 
 

@@ -41,7 +41,7 @@ class Watched(NamedTuple):
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], now: Any, ends: Any) -> Any:
-    """Return the notes after an instant; nothing where no transient is asked for."""
+    """Return the notes after an instant; nothing if no transient is measured."""
     if not seen:
         return seen
     q, left, rate = (quantities[name] for name in ("attitude_error", "rate_error", "rate"))

@@ -1,4 +1,4 @@
-"""Brackets by the claim about a loop as it flies: each flight is looked at for when it has the claim's premises, and from
+"""Brackets by the claim about a loop as it flies: for each flight it is found when it meets the claim's premises, and from
 then on the claim bounds it.
 
 A flight has them from the start where it starts in the claim's set, or from a window of time on in which its angles and
@@ -51,9 +51,9 @@ OUTSIDE, OTHER, MOVED = "do not come into its set", "fly another loop", "have mo
 
 
 class Looked(NamedTuple):
-    """Flights (lanes,) are looked at for this: from which control step on they are in the claim's set with an estimate that
-    has settled, -1 for never; whether their momentum is within its bound from then on; whether the law is told more wrongly
-    than is assumed; whether they fly the claim's loop; and their metrics from then on."""
+    """This is found of flights (lanes,): from which control step on they are in the claim's set with an estimate that has
+    settled, -1 for never; whether their momentum is within its bound from then on; whether the law is told more wrongly than
+    is assumed; whether they fly the claim's loop; and their metrics from then on."""
 
     begun: Array
     kept: NDArray[np.bool_]

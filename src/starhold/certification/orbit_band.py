@@ -17,7 +17,7 @@ from starhold.parts.orbit import angular_momentum, highest, highest_speed, lowes
 from starhold.parts.part import Fitted
 
 ROOM = 1.4
-"""Forces move an orbit by this multiple of their share of the point mass's force: flights with oblateness come to 1.34."""
+"""Forces move an orbit by this multiple of their share of the point mass's force: flights with oblateness reach 1.34."""
 MORE = 1.0 + 1e-9
 
 

@@ -236,7 +236,7 @@ class Counted:
 
 
 class _Clock:
-    """A control step that notes whether it is looked at."""
+    """A control step that notes whether it is read."""
 
     reader, seen = "itself", False
 

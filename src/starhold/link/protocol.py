@@ -162,7 +162,7 @@ class Decoder:
             if fits and len(buffer) < end + TAIL.size:
                 return
             if not fits or TAIL.unpack_from(buffer, end)[0] != zlib.crc32(buffer[:end]):
-                # The next frame may begin within what was taken for one.
+                # The next frame may begin within what looked like one.
                 del buffer[:1]
                 self._skipping = True
                 yield Fault.MALFORMED if version == VERSION or zero != 0 else Fault.VERSION

@@ -50,7 +50,7 @@ DELAY = Parameter(
 LONGEST = 64
 """Control periods that a dead time may last."""
 ALMOST = 1e-9
-"""A dead time this near to a control period's multiple, in control periods, is taken for it."""
+"""A dead time is rounded to a multiple of the control period if it is this near to one, in control periods."""
 
 
 def resolution(unit: str) -> Parameter:
@@ -84,7 +84,7 @@ def axes_of(mounting: Vector, errors: Matrix | Vector) -> Axes:
 
 
 def along(axes: Axes, vector: Vector) -> Vector:
-    """A vector as it is along the axes of a sensor."""
+    """The components of a vector along the actual axes of a sensor."""
     return apply(axes, vector) if axes else vector
 
 

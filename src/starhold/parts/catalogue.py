@@ -219,7 +219,7 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
 
 
 def read_module(path: Path) -> ModuleType:
-    """A file of Python run as a module, again where its text has changed. Errors as of `from_file`."""
+    """Run a Python file as a module, again if its text has changed. Errors as of `from_file`."""
     given, path = path, _real(path)
     source = read_bytes(path)
     # The suffix as given counts too: a link that is called a table is not run.

@@ -122,7 +122,7 @@ def date_text(epoch: Date) -> str:
 
 def sidereal(days: float) -> float:
     """The turns, from 0 to 1, by which the meridian of Greenwich is ahead of the equinox: mean sidereal time, of days since
-    J2000 (Meeus, Astronomical Algorithms, 12.4). Universal Time is taken for UT1, which is right to 0.9 s."""
+    J2000 (Meeus, Astronomical Algorithms, 12.4). UTC is used as UT1, from which it differs by less than 0.9 s."""
     centuries = days / 36525.0
     more = (280.46061837 + 0.000387933 * centuries**2) / 360.0 + (SIDEREAL - 1.0) * days
     return (days % 1.0 + more) % 1.0

@@ -161,7 +161,7 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
 
 
 def _script(program: Program) -> dict[str, str]:
-    """A program's text, and the functions in it to call."""
+    """A program's text, and the names of the functions in it that are called."""
     text = JavaScript(program)
     return {"text": str(text), "name": text.name}
 

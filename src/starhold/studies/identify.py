@@ -51,7 +51,7 @@ class Identified:
     """A fit gives these. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance,
     and what is undetermined; residuals: by reading times and residuals (n, size) in deviations; readings: the rows that were
     read, and those of the fit; whiteness: by residual the p-value of Ljung and Box; chi2: the sum of squared residuals, with
-    its degrees of freedom; units: of the readings; notes: sentences about what is left out."""
+    its degrees of freedom; units: of the readings; notes: sentences about omissions."""
 
     scenario: Scenario
     free: Free
@@ -103,7 +103,7 @@ class Identified:
         return {place.key: np.array(value).tolist() for place, value in zip(self.free.places, shaped, strict=True)}
 
     def learnt(self) -> Scenario:
-        """The scenario with the numbers that were found, and a campaign over what is left uncertain about them."""
+        """The scenario with the estimated numbers, and a campaign over their remaining uncertainty."""
         changed = self.scenario.with_(self.fitted())
         return self.posterior.over(changed, self.free, self.values)
 

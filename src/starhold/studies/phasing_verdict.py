@@ -30,12 +30,12 @@ NEAR = 0.35
 CLEAR = 0.15
 """A number has a sign from this share of the largest of its vector on."""
 TINY, FLOOR = 0.02, 0.1
-"""A vector below the first share of the expected one is none; up to the second share what is seen may be none."""
+"""An observed vector below the first share of the expected one counts as absent; up to the second it may be absent."""
 FAR = 3.0
 """A vector this many times longer or shorter than it should be has another size."""
 SIGNS = {"+": 1.0, "-": -1.0, "\N{MINUS SIGN}": -1.0, "0": 0.0}
 SHOWN = 12
-"""Explanations that are listed."""
+"""The most explanations that are listed."""
 ALIKE = 1
 """Decimals of a vector, relative to its largest number, by which stages are distinguished in the search."""
 

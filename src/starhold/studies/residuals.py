@@ -20,7 +20,7 @@ SINGULAR = 1e-9
 LAGS = 20
 """Lags of the test of Ljung and Box."""
 TURNS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.6, 0.8, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0))
-"""A sensor that sees nothing at the start is looked at in these attitudes."""
+"""The attitudes in which a sensor is tried that sees nothing at the start."""
 
 
 class Noise(NamedTuple):
@@ -112,7 +112,7 @@ class _Varied(Silent):
 def noise_of(loop: ClosedLoop, reading: Reading) -> Noise | None:
     """The noise that the sensor of a reading states; None for none."""
     setup, carry = loop.setup(), loop.carry()
-    # A sensor that sees nothing there shows no noise: it is looked at in other attitudes, and on the other side.
+    # A sensor that sees nothing there shows no noise: it is tried in other attitudes, and on the other side.
     for turn, side in product(TURNS, (1.0, -1.0)):
         attitude = multiply(carry.state.attitude, turn)
         state = carry.state._replace(attitude=attitude, position=tuple(side * x for x in carry.state.position))

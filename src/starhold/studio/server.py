@@ -86,7 +86,7 @@ def _host(request: Request) -> str:
 
 
 async def _body(receive: Receive) -> bytes | None:
-    """The whole body of a request, however it comes; None where it is too long."""
+    """The whole body of a request, chunked or not; None if it is too long."""
     body = b""
     while True:
         message = await receive()
@@ -232,7 +232,7 @@ def _malformed() -> Response:
 
 
 async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
-    """Answer with what work on files comes to."""
+    """Answer with the outcome of work on files."""
     try:
         return JSONResponse(await run_in_threadpool(work))
     except RefusedError as refused:

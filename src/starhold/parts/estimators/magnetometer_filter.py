@@ -285,7 +285,7 @@ def corrected(now: Memory, shown: Vector, true: Vector, params: Numbers) -> Memo
     """The estimate corrected by a field, which an error of the attitude turns: off = B x error."""
     foretold = to_body(now.attitude, true)
     off, row = subtract(shown, foretold), skew(foretold)
-    # Of the field as it is foretold with the errors of attitude and of bias or rate.
+    # Of the predicted field with the errors of attitude and of bias or rate.
     of_turn, of_slow = product(row, now.turn), product(row, now.mixed)
     sure = inverse(symmetric(along_diagonal(product(of_turn, transpose(row)), params.seen)))
     turning, slowing = product(transpose(of_turn), sure), product(transpose(of_slow), sure)
