@@ -60,7 +60,7 @@ class Job:
     progress: Callable[[str, int], None] | None = None
     """Called with a law and how many more of its runs were flown, while a block is flown; not from other processes."""
     extras: tuple[str, ...] = ()
-    """Names of metrics that are measured beside those that the campaign asks for."""
+    """Names of metrics that are measured in addition to the campaign's own."""
     _lanes: dict[str, Lanes] = field(default_factory=dict[str, Lanes])
     _meters: dict[str, Meter] = field(default_factory=dict[str, Meter])
 

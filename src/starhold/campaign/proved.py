@@ -87,7 +87,7 @@ class Subject(NamedTuple):
 
 
 def look(job: Job, law: str, threads: int, notice: Notice | None = None) -> ByClaim:
-    """Return what is proved of a law beside the flights of its campaign, which are flown once more. notice: called with the
+    """Compare what is proved of a law with the flights of its campaign, which are flown once more. notice: called with the
     law and how many more are flown, and what for."""
     watching = Job(job.source, job.table, extras=(PREMISES,))
     lanes = watching.lanes(law)

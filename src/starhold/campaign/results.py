@@ -101,7 +101,7 @@ class Within:
 
 @dataclass(frozen=True)
 class ByClaim:
-    """A claim about a law's loop as it flies stands beside its flights. text: the claim, or why nothing is claimed of them;
+    """A claim about a law's loop as it flies, compared with its flights. text: the claim, or why nothing is claimed of them;
     runs: flights that were compared with it; left: how many do not meet its premises, by the reason; share: of flights of
     which the claim holds, None for all; misled: in how many of the others the law was told more wrongly than the claim
     assumes for this share, None where what it is told is not recorded; within: the metrics that it bounds."""

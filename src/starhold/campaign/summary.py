@@ -27,7 +27,7 @@ MOST_DRIVEN = 200_000
 KINDS: Mapping[str, Any] = {"morris": sensitivity.morris, "saltelli": sensitivity.sobol}
 """The functions that compute sensitivity indices, by the samplings designed for them."""
 FAILURES = 3
-"""The number of failed runs worth flying again, beside the worst of each requirement."""
+"""The number of failed runs worth flying again, in addition to the worst of each requirement."""
 
 
 def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool = False) -> tuple[LawResult, ...]:

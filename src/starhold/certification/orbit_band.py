@@ -1,4 +1,4 @@
-"""How far forces beside that of a point mass move an orbit, and what that does to a frame that turns with it.
+"""How far forces other than that of a point mass move an orbit, and what that does to a frame that turns with it.
 
 In the orbital frame, radial r, along the motion t and normal n, a force f per mass gives h' = r f_t and turns the frame
 about the radial direction by r f_n/h, beside h/r2 about the normal. A target that knows two-body motion alone gives h/r2
@@ -33,7 +33,7 @@ class Band(NamedTuple):
 
 
 def movers(loop: ClosedLoop) -> list[Fitted]:
-    """Return the parts that move the orbit beside the point mass, and tell by how much."""
+    """Return the parts that move the orbit besides the point mass, and tell by how much."""
     return [f for f in loop.used("environment") if f.part.hook("perturbation") is not None]
 
 

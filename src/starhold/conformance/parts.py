@@ -214,7 +214,7 @@ def draws_in_its_range(part: Part) -> None:
 
 def keeps_what_it_says(part: Part) -> None:
     """No torque is larger than its `bound` or changes faster than its `torque_change`, no error is larger than its `error`,
-    beside its `noise`, and no motion of a target than its `motion`."""
+    besides its `noise`, and no motion of a target than its `motion`."""
     tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
     # A body has an equation of this name.
     tell_motion = part.hook("motion") if part.role == "target" else None

@@ -1,6 +1,6 @@
 """Sensors as they are built: mounted a little otherwise than law and filter take them, with axes of another scale that are
-not at right angles, in steps and within limits, read late and a little beside the control instant. What is not asked for
-leaves a sensor's equations as they are."""
+not at right angles, in steps and within limits, read late and a little off the control instant. What is not asked for leaves
+a sensor's equations as they are."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ DEMANDED: dict[str, tuple[str, ...]] = {
     "target": ("Params", "examples", "goal"),
     "actuator": ("Params", "examples"),
 }
-"""The attributes that a part of each role must define, beside `CARD` and `ROLE`."""
+"""The attributes that a part of each role must define, besides `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
 """Equations that parts of a role have at least one of."""
 BOUNDS: dict[str, tuple[str, ...]] = {

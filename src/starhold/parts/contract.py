@@ -42,7 +42,7 @@ class NoParams(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """The largest errors that a sensor makes, beside its noise: of the attitude (rad), of the rate (rad/s) and of the
+    """The largest errors that a sensor makes besides its noise: of the attitude (rad), of the rate (rad/s) and of the
     magnetic field (T) that it gives, in norm; `inf` for one without a bound. `bias`: the part of that of the rate that stays
     as it is in body axes (rad/s), which a filter takes out; it takes out no other error."""
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 KINDS = ("tle", "omm", "oem")
 BESIDE = ("epoch", "ephemeris")
-"""Keys of [orbit] that may stand beside a file."""
+"""Keys of [orbit] that may accompany a file."""
 FRAMES = (OF_J2000, "ICRF", "GCRF", OF_DATE, "TEME")
 """Reference frames of an ephemeris that are read. ICRF and GCRF are treated as EME2000, from which they differ by 0.02"."""
 NEAREST = 6

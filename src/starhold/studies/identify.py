@@ -129,7 +129,7 @@ def study(
 
 
 class Fit:
-    """Telemetry beside the predictor of a scenario. One predictor serves any number of flights."""
+    """Telemetry with the predictor of a scenario. One predictor serves any number of flights."""
 
     def __init__(self, scenario: Scenario, predictor: Predictor, telemetry: Telemetry, kind: str = "recorded") -> None:
         """kind: of the commands, see COMMANDS."""

@@ -1,4 +1,4 @@
-"""Recorded sensor data are replayed: what a scenario's estimator and law make of them, beside what was recorded."""
+"""Recorded sensor data are replayed: what a scenario's estimator and law make of them, compared with what was recorded."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """A computed quantity beside a recorded one, at the times (n,) in s at which that was recorded: both (n, k), and of each
+    """A computed quantity with the recorded one, at the times (n,) in s at which that was recorded: both (n, k), and of each
     sample the size of the difference and the one that is allowed, (n,), in the quantity's unit, as angles (rad) for
     attitudes."""
 

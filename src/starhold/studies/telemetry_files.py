@@ -66,7 +66,7 @@ class ColumnsTable(Table):
 
 
 class MappingTable(Table):
-    """How a file is read. missing: words for no number, beside nothing and nan; interval: from one row to the next."""
+    """How a file is read. missing: words for no number, besides nothing and nan; interval: from one row to the next."""
 
     kind: Literal["", "csv", "parquet", "aem", "netcdf"] = ""
     separator: str = ","

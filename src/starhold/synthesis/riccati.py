@@ -116,7 +116,7 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
 
 def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
     """Return the closed form for the weights' diagonals about the principal axes. With any symmetric positive definite gains
-    the motion is that of a damped spring, hence stable, whatever the weights beside the diagonals are."""
+    the motion is that of a damped spring, hence stable, whatever the off-diagonal weights are."""
     from flint import arb_mat
 
     with np.errstate(all="ignore"):

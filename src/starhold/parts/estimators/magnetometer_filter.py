@@ -302,6 +302,6 @@ def corrected(now: Memory, shown: Vector, true: Vector, params: Numbers) -> Memo
 
 
 def examples() -> list[Params]:
-    """A magnetometer beside a MEMS gyro, and an attitude that is known at the start."""
+    """A magnetometer with a MEMS gyro, and an attitude that is known at the start."""
     small = Params(2e-7, math.radians(0.3) / 60.0, math.radians(5.0) / HOUR)
     return [small, small._replace(rate=0.02, start=(0.6, 0.0, 0.8, 0.0), start_deviation=0.02)]

@@ -113,7 +113,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """The largest error beside noise of a reading that is always new, wherever there is no ground."""
+    """The largest error besides noise of a reading that is always new, wherever there is no ground."""
     late = as_built.is_given(params.interval, params.jitter, params.delay)
     if params.outage != NEVER or params.limit < math.inf or late:
         return UNBOUNDED
