@@ -28,7 +28,7 @@ def faults(path):
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         name = getattr(node, FIELDS.get(type(node), "name"), None)
         if isinstance(name, str) and name in BARE:
-            yield f"{node.lineno}: {name}"
+            yield f"{getattr(node, 'lineno', 0)}: {name}"
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
             text = ast.get_docstring(node) or ""
             if FRAGMENT.match(text):
