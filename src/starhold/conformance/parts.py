@@ -327,9 +327,9 @@ def _draws(part: Part) -> bool:
     places: list[int] = []
 
     class Watched(Dice):
-        def vector(self, place: int, deviation: Any) -> Any:
+        def vectors(self, place: int, *deviations: Any) -> Any:
             places.append(place)
-            return super().vector(place, deviation)
+            return super().vectors(place, *deviations)
 
     loop = loop_with(part, part.examples()[0])
     fitted = next(f for f in loop.parts if f.part == part)

@@ -128,13 +128,13 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     state, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 9)
     bias = add(memory.bias, memory.wander) if params.wander else memory
     seen = as_built.along(params.axes, state.rate)
-    shown = add(add(scale(params.factor, seen), bias), dice.vector(0, params.deviation))
+    noise, walk, *added = dice.vectors(0, params.deviation, params.walk, *params.wander[1:])
+    shown = add(add(scale(params.factor, seen), bias), noise)
     reading = Reading(as_built.shown(shown, params.step, params.limit))
     if not params.wander:
-        return reading, as_built.kept(add(memory, dice.vector(3, params.walk)), waiting)
-    stays, added = params.wander
-    wander = add(scale(stays, memory.wander), dice.vector(6, added))
-    return reading, as_built.kept(Wandering(add(memory.bias, dice.vector(3, params.walk)), wander), waiting)
+        return reading, as_built.kept(add(memory, walk), waiting)
+    wander = add(scale(params.wander[0], memory.wander), added[0])
+    return reading, as_built.kept(Wandering(add(memory.bias, walk), wander), waiting)
 
 
 def error(params: Params) -> Errors:
