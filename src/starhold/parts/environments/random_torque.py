@@ -47,5 +47,5 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """A torque as the published noise study has it, and none."""
+    """The torque of the published noise study, and none."""
     return [Params(1e-4), Params(0.0)]
