@@ -54,9 +54,9 @@ def test_deviations_are_hardly_above_those_of_the_motion():
 @pytest.mark.parametrize("name", leading(["shaken", "noisy"]))
 def test_a_random_torque_takes_the_motion_out_of_its_radii_no_more_often_than_is_claimed(name, monkeypatch):
     """Alone, and with the noise of a filter, in many spans of 2000 samples."""
+    loop = flying(name).loop
     monkeypatch.setattr(noise, "RARELY", Fraction(3, 10))
     monkeypatch.setattr(noise, "samples_of", lambda loop: 2000)
-    loop = flying(name).loop
     loop = loop if name == "shaken" else loop.with_parts(fit("environment", "random-torque", 2e-6))
     found = Loop(make_subject(loop))
     numbers, evidence = radii_of(found)
