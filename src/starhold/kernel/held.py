@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import product
 
 from .loops import AXES, NONE, AttitudeLoop
@@ -347,8 +347,8 @@ class Held:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
         if not self.loop.wheels:
             return [self.near.A]
-        every = ([x * self.size("h") for x in corner] for corner in AROUND)
-        return [plus(self.near.A, self.near.spun(*spinning(self.loop, at))) for at in every]
+        ways = [self.near.spun(*spinning(self.loop, way)) for way in scalar(self.size("h"))]
+        return [reduce(lambda A, one: plus(A, *one), zip(ways, corner, strict=True), self.near.A) for corner in AROUND]
 
     @property
     def away(self) -> Radii:
