@@ -278,7 +278,7 @@ class Pushed:
         self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
-        self.largest, self.refused = (0.0, 0.0, ""), dict[tuple[Any, ...], str]()
+        self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
         self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
@@ -312,9 +312,11 @@ class Pushed:
         """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
         a start that moves; both are in decreasing order."""
         for angle, rates in self.starts(angles, rate, limits, beyond):
-            if any(self.kept(self.find, angle, one, limits) for one in rates):
-                self.loop.failed |= {POINTS: self.largest[-1]} if self.largest[-1] else {}
-                return True
+            for one in rates:
+                if self.kept(self.find, angle, one, limits):
+                    *_, nearest = min((start for start in self.larger if start[:2] > (angle, one)), default=("",))
+                    self.loop.failed |= {POINTS: nearest} if nearest else {}
+                    return True
         return False
 
     def starts(
@@ -343,11 +345,11 @@ class Pushed:
         return not self.refused[key]
 
     def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
-        """Return whether a start is taken, and keep why the largest is not."""
+        """Return whether a start is taken, and keep why it is not."""
         if tried(angle, rate, limits):
             return True
         start = f"from {degrees(angle):.3g} deg at {degrees(rate):.3g} deg/s: "
-        self.largest = max(self.largest, (angle, rate, start + self.loop.failed[POINTS]))
+        self.larger.append((angle, rate, start + self.loop.failed[POINTS]))
         return False
 
     def begun(
