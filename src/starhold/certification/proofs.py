@@ -13,7 +13,6 @@ from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.detumbling import DETUMBLES, find_detumbling
 from starhold.certification.evidence.finding import certificate, obligations
-from starhold.certification.evidence.pointing import POINTS, find_pointed
 from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.refuted import (
     AWAY,
@@ -25,6 +24,7 @@ from starhold.certification.evidence.refuted import (
     UNSETTLED,
     find_refuted,
 )
+from starhold.certification.evidence.starts import POINTS
 from starhold.certification.subject import Subject, above, below
 from starhold.kernel.check import Proved, check
 from starhold.kernel.numbers import Account, RefusedError
@@ -63,6 +63,9 @@ def proved_claims(
     """
     loop = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
+        # Loaded here, because its matrices need a large library.
+        from starhold.certification.evidence.pointing import find_pointed
+
         find_pointed(loop, begun=begun)
     find_refuted(loop, turn, rate)
     claims = met(checked(loop))
@@ -74,6 +77,8 @@ def proved_claims(
 def pointed(subject: Subject, like: Claim | None = None, begun: float | None = None) -> tuple[Claim | None, str]:
     """Return the pointing claim of a loop as it flies, or why no evidence was found. like: the claim of another loop, for
     the same start set and limits; begun: the rate (rad/s) at which motions begin."""
+    from starhold.certification.evidence.pointing import find_pointed
+
     loop = Loop(subject)
     find_pointed(loop, None if like is None or like.proof is None else like.proof.claim["numbers"], begun)
     return next(iter(checked(loop)), None), loop.failed.get(POINTS, "no proof was found")

@@ -4,6 +4,7 @@ The step of Helmberg, Kojima and Monteiro with Mehrotra's corrector. Its dense s
 one for each entry of a matrix, so a matrix of 119 rows takes seconds an iteration.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -38,8 +39,11 @@ def most_definite(equal: Any, b: Any, signed: Sequence[bool], blocks: Sequence[S
         first += len(pairs)
     free = sparse.hstack([a[:, len(signed) : head], a[:, :count] @ sparse.csc_matrix(shared)])
     program = Program([_cone(rows @ a[:, columns], pairs) for columns, pairs in places], (rows @ free).toarray(), rows @ b)
-    if not program.ended():
-        return None
+    with warnings.catch_warnings():
+        # The kernel decides of what an ill-conditioned matrix gives.
+        warnings.simplefilter("ignore", linalg.LinAlgWarning)
+        if not program.ended():
+            return None
     x = np.empty(count + 1)
     x[len(signed) : head], x[-1] = program.f[:-1], program.f[-1]
     for (columns, pairs), cone in zip(places, program.cones, strict=True):
