@@ -307,6 +307,8 @@ def run_command() -> int:
     """Run the command in `sys.argv`, and return its exit code."""
     # Set before NumPy loads: on matrices as small as a law's, the threads of its library only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Nor are plugins of the library that reads tables sought in all installed packages.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     warnings.formatwarning = _as_line

@@ -58,10 +58,7 @@ class Entries(NamedTuple):
         return matrix((self.values, (self.rows, self.columns)), self.shape)
 
 
-def entries_of(matrix: Any) -> Entries:
-    """Return the entries of a dense matrix, or of one of `scipy.sparse`, that are not zero or stored."""
-    if isinstance(matrix, np.ndarray):
-        rows, columns = matrix.nonzero()
-        return Entries(rows, columns, matrix[rows, columns], (matrix.shape[0], matrix.shape[1]))
-    stored = matrix.tocoo()
-    return Entries(stored.row, stored.col, stored.data, stored.shape)
+def entries_of(matrix: NDArray[np.float64]) -> Entries:
+    """Return the entries of a dense matrix that are not zero."""
+    rows, columns = matrix.nonzero()
+    return Entries(rows, columns, matrix[rows, columns], (matrix.shape[0], matrix.shape[1]))

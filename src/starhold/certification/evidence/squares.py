@@ -216,7 +216,7 @@ def interior_point(cost: Any, A: Entries, b: Any, equal: int, signed: int, sides
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.time_limit = False, LIMIT
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    matrix, none = A.compressed(), Entries([], [], [], (len(cost),) * 2).compressed()
+    matrix, none = A.compressed(), Entries([], [], [], (len(cost), len(cost))).compressed()
 
     def solve() -> Any | None:
         solution = clarabel.DefaultSolver(none, cost, matrix, b, cones, settings).solve()

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from starhold.certification.evidence.sparse import entries_of
+from starhold.certification.evidence.sparse import Entries
 from starhold.certification.evidence.squares import degree, optimum, sparse_of, text
 from starhold.certification.evidence.terms import (
     identity,
@@ -167,8 +167,10 @@ class Guess:
             sizes = np.abs(np.diag(triangle))
             kept = np.sort(order[: int((sizes > 1e-10 * sizes[0]).sum())])
             equal, b = equal[kept], b[kept]
+        stored = equal.tocoo()
+        entries = Entries(stored.row, stored.col, stored.data, stored.shape)
         try:
-            x = optimum(entries_of(equal), b, [True] * len(self.strict), [block.pairs for block in self.blocks], 1.0)
+            x = optimum(entries, b, [True] * len(self.strict), [block.pairs for block in self.blocks], 1.0)
         except BaseException as fault:  # a panic of the solver is one
             if isinstance(fault, (KeyboardInterrupt, SystemExit)):
                 raise
