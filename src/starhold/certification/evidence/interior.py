@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.certification.evidence.sparse import Entries
+
 sparse: Any = import_module("scipy.sparse")
 linalg: Any = import_module("scipy.linalg")
 Array = NDArray[np.float64]
@@ -21,10 +23,10 @@ FEASIBLE, ENOUGH = 0.01, 0.25
 """The residual of the equations, and the gap, as shares of the margin, at which the search ends."""
 
 
-def most_definite(equal: Any, b: Any, signed: Sequence[bool], blocks: Sequence[Sequence[tuple[int, int]]]) -> Any | None:
+def most_definite(equal: Entries, b: Any, signed: Sequence[bool], blocks: Sequence[Sequence[tuple[int, int]]]) -> Any | None:
     """Return x with equal x = b and a large last number, which the matrices' eigenvalues, and signed numbers that say so,
     are not below; None where none is found. The columns are as for `squares.optimum`, with its `twice` 1."""
-    a, count = sparse.csc_matrix(equal), equal.shape[1] - 1
+    a, count = equal.scipy(), equal.shape[1] - 1
     scales = np.sqrt(np.asarray(a.multiply(a).sum(1)).ravel())
     rows = sparse.diags(1.0 / np.where(scales > 0.0, scales, 1.0))
     first = head = count - sum(map(len, blocks))

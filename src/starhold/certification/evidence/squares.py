@@ -242,7 +242,7 @@ def optimum(
         from starhold.certification.evidence.interior import most_definite
 
         key = A.compressed().key(), b.tobytes(), *signed, *map(tuple, blocks)
-        return once(key, lambda: most_definite(A.scipy(), b, signed, blocks))
+        return once(key, lambda: most_definite(A, b, signed, blocks))
     count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
     right = [b, np.zeros(len(signed))]
     if margin:
