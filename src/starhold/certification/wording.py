@@ -209,13 +209,13 @@ def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{place(n, subject)} {while_}, {' and '.join(parts)}{_followed(subject)}"
 
 
+OFF = "every entry of the inertia off by up to {} of sqrt(J_ii J_jj)"
+
+
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["tolerance"] is None:
         return f"{place(n, subject)} it converges whatever the inertia of the body really is"
-    share = shown(100.0 * n["tolerance"], " %")
-    return (
-        f"{place(n, subject)} it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)".strip()
-    )
+    return f"{place(n, subject)} it converges with {OFF.format(shown(100.0 * n['tolerance'], ' %'))}".strip()
 
 
 def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -236,6 +236,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
+    bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []
     bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""

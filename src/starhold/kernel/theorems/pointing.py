@@ -35,7 +35,7 @@ def points(claim: Claim) -> Proof:
     changes no faster than that and told.change.per.rate times the body's rate.
     With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
     noise.attitude and noise.rate beside. The law may keep a memory that adds a torque of no more than `memory` about each
-    axis, whatever is in it."""
+    axis, whatever is in it. With a `tolerance` the inertia is one near the given one."""
     loop = AttitudeLoop(claim, remembers=True)
     yield from loop.sound()
     motion, numbers, samples = Held(loop), claim.numbers, 0
@@ -118,8 +118,16 @@ def points(claim: Claim) -> Proof:
         f" {most('outside')} and {enumerated(errors)}"
     )
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
+    text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
-    assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
+    assumed = [
+        "rigid-body",
+        "inertia-near" if motion.off else "inertia-as-given",
+        "bounded-push",
+        "held-torque",
+        *noise.assumptions,
+        *limited.assumptions,
+    ]
     assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
