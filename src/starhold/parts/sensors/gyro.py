@@ -154,7 +154,7 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """A MEMS gyro, one that has a bias alone, one that is exact, and one as it is built, late and at uneven instants."""
+    """A MEMS gyro, one that has a bias alone, one that is exact, and one with errors of manufacture, a delay and jitter."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
     skewed = ((1e-3, 0.0, 5e-4), (0.0, -2e-3, 0.0), (0.0, 3e-4, 0.0))
     built = mems._replace(
