@@ -14,7 +14,7 @@ from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, C
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.detumbling import is_about
 from starhold.certification.evidence.isotropic import ISOTROPIC
-from starhold.certification.evidence.pointing import POINTS
+from starhold.certification.evidence.starts import POINTS
 from starhold.certification.proofs import HELD_AND_PUSHED, detumbled, pointed, proved_claims
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
 from starhold.certification.unmodelled import named

@@ -10,9 +10,9 @@ from starhold.algebra.polynomial import exact
 from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop
 from starhold.certification.evidence.detumbling import DETUMBLES, bounds_of
 from starhold.certification.evidence.finding import NotFoundError
-from starhold.certification.evidence.pointing import POINTS
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
+from starhold.certification.evidence.starts import POINTS
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import fraction

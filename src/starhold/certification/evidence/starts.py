@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from starhold.certification.assumptions import as_it_starts
 from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.finding import NotFoundError, evidence, read
+from starhold.certification.evidence.sparse import entries_of
 from starhold.certification.evidence.squares import DEFINITE, cofactors, equations, free, interior_point, posed, settled
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
@@ -59,7 +60,8 @@ def likely(o: Squares, scales: Mapping[str, float]) -> float | None:
     others = [c * relation for relation, parts in zip(o.modulo, cofactors(o, p, len(o.z)), strict=True) for c in parts]
     z = o.z if o.least else free([p, *known, *others], o.z)
     problem = posed(p, known, others, z)
-    A, b, _ = equations(problem, scales)
+    entries, b, _ = equations(problem, scales)
+    A = entries.scipy()
     head, count = A.shape[1] - len(problem.pairs), len(problem.pairs)
     grams = A[:, head:]
     places: list[int] = list(grams.indices)
@@ -80,5 +82,5 @@ def likely(o: Squares, scales: Mapping[str, float]) -> float | None:
     ]
     right = np.concatenate([b[equal] / unit, np.zeros(problem.signed), np.ones(1), b[places] * weights / unit])
     cost = -np.eye(head + 1)[head]
-    x = interior_point(cost, np.vstack(rows), right, len(equal), problem.signed + 1, [len(z)])
+    x = interior_point(cost, entries_of(np.vstack(rows)), right, len(equal), problem.signed + 1, [len(z)])
     return None if x is None else float(x[-1])
