@@ -65,7 +65,7 @@ def make_subject(
     rate, acceleration = _target_bounds(loop)
     axes, norm = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0)
     if loop.has("gravity-gradient"):
-        axes, norm = _gravity_gradient_bounds(loop)
+        axes, norm = gravity_gradient_bounds(loop)
     # The subject is what its file says.
     axes, (norm, rate, acceleration) = (
         tuple(exact(above(x)) for x in bounds) for bounds in (axes, (norm, rate, acceleration))
@@ -214,7 +214,7 @@ def perigee(loop: ClosedLoop) -> tuple[arb, arb, arb, arb]:
     return h2 / gravity / (1 + eccentricity), h2.sqrt(), eccentricity, gravity
 
 
-def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
+def gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
     """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m)."""
     nearest, _, _, gravity = perigee(loop)
     # A part more, for the inertia with the rotors is what is flown up to rounding.

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
-from itertools import product
 
 from .loops import AXES, NONE, AttitudeLoop
-from .near import near_target, spinning
+from .near import around, near_target
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
+from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
 from .regions import (
     ANGLE,
@@ -46,21 +46,15 @@ WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 MOMENTA = ("h1", "h2", "h3")
 CHANGE = "told.change", "told.change.per.rate"
 """How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
-HALF_ROOT = Fraction(7072, 10000)
-"""At least the root of 1/2."""
-AROUND = [
-    *([c * HALF_ROOT for c in signs] for signs in product((-1, 1), repeat=3)),
-    *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
-]
-"""The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
 class Held:
     """A loop with its torque held for a period, and V = s (1 - q0) + x.Gx."""
 
-    def __init__(self, loop: AttitudeLoop) -> None:
+    def __init__(self, loop: AttitudeLoop, plan: Plan | None = None) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
+        self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
         # What noise adds near the target, and what momentum makes of that.
         self.swayed = self.apart = AT_REST
         self.constant = {name: numbers[name] for name in ("outside", "error")}
@@ -192,18 +186,26 @@ class Held:
         sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)}
         return Region(X, sizes | self.others, least)
 
-    def misread(self, region: Region) -> tuple[Fraction, Fraction]:
-        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
-        far from there and what errors that noise drives add linearly on target."""
-        if not self.turned + self.rated + self.led + self.hurried:
-            return Fraction(0), Fraction(0)
+    def told(self, true: Sizes) -> tuple[Sizes, Sizes]:
+        """Return how far off what the law is told is at most, by its letters, and its sizes, for those that are true."""
         r, a = self.size("r"), self.size("a")
         turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
         wrong = {"q": self.turned / 2, "w": self.rated + turn["r"]} | turn
         wrong["h"] = stretch(self.loop.given) * self.rated
         # A torque that turns over at once is what the law is told.
         wrong["e"] = self.change[1] * self.turned if self.change else Fraction(0)
-        sizes = {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in region.sizes.items()}
+        return wrong, {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in true.items()}
+
+    def planned(self, sizes: Sizes) -> Fraction:
+        """Return how far the torque is at most from the moves of a plan, if there is one."""
+        return self.plan.error(self.told(sizes)[1]) if self.plan else ZERO
+
+    def misread(self, region: Region) -> tuple[Fraction, Fraction]:
+        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
+        far from there and what errors that noise drives add linearly on target."""
+        if not self.turned + self.rated + self.led + self.hurried:
+            return Fraction(0), Fraction(0)
+        wrong, sizes = self.told(region.sizes)
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
@@ -222,7 +224,7 @@ class Held:
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds of the torque from outside and of the error of the command at rates, to which the target's adds."""
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
-        return {"outside": outside, "both": outside + error}
+        return {"outside": outside, "both": outside + error + self.planned(sizes)}
 
     def changes(self, sizes: Sizes, turning: int = 1) -> dict[str, Fraction]:
         """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
@@ -345,10 +347,7 @@ class Held:
 
     def corners(self) -> list[Rows]:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
-        if not self.loop.wheels:
-            return [self.near.A]
-        every = ([x * self.size("h") for x in corner] for corner in AROUND)
-        return [plus(self.near.A, self.near.spun(*spinning(self.loop, at))) for at in every]
+        return around(self.loop, self.near, self.size("h")) if self.loop.wheels else [self.near.A]
 
     @property
     def away(self) -> Radii:

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import product
 from typing import NamedTuple
 
 from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
 from .numbers import Rows, beside, inverse, plus, scalar, times
 from .regions import STATE, with_momentum
+
+HALF_ROOT = Fraction(7072, 10000)
+"""At least the root of 1/2."""
+AROUND = [
+    *([c * HALF_ROOT for c in signs] for signs in product((-1, 1), repeat=3)),
+    *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
+]
+"""The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
 class Near(NamedTuple):
@@ -35,6 +44,12 @@ def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
     A = over_period([[-x for x in row] for row in rates], h)
     B, grown = ([[c * x for x in row] for c in both for row in N] for both in ((h, h * h / 4), (h * h / 2, h**3 / 12)))
     return Near(torque, rates, A, B, grown, N)
+
+
+def around(loop: AttitudeLoop, near: Near, momentum: Fraction) -> list[Rows]:
+    """Return A at corners between which it is with all momenta of wheels up to that."""
+    every = ([x * momentum for x in corner] for corner in AROUND)
+    return [plus(near.A, near.spun(*spinning(loop, at))) for at in every]
 
 
 def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:

@@ -35,7 +35,7 @@ def points(claim: Claim) -> Proof:
     changes no faster than that and told.change.per.rate times the body's rate.
     With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
     noise.attitude and noise.rate beside. The law may keep a memory that adds a torque of no more than `memory` about each
-    axis, whatever is in it."""
+    axis, whatever is in it. It may be the first move of a plan, see `plans`."""
     loop = AttitudeLoop(claim, remembers=True)
     yield from loop.sound()
     motion, numbers, samples = Held(loop), claim.numbers, 0
@@ -44,7 +44,12 @@ def points(claim: Claim) -> Proof:
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     start = yield from contents(loop, loop.lyapunov)
     region = motion.region(c)
-    limited = yield from within_limits(loop, motion.misread(region)[0] + norm([loop.added or Fraction(0)] * 3))
+    planned, asked = "", None
+    if motion.plan is not None:
+        wrong, told = motion.told(region.sizes)
+        planned, asked = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), told)
+    off = motion.misread(region)[0] + motion.planned(region.sizes)
+    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), asked)
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
@@ -118,8 +123,10 @@ def points(claim: Claim) -> Proof:
         f" {most('outside')} and {enumerated(errors)}"
     )
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
+    text += f", {planned}" * bool(planned)
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
     assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
+    assumed += ["best-plan"] * bool(planned)
     assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
