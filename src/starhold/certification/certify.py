@@ -141,7 +141,8 @@ def _remembering(subject: Subject, wanted: Wanted, unsound: str) -> tuple[list[C
         return [*claims, claim or undecided("detumbling", {}, subject, reason)], REMEMBERS
     if unsound or not (wanted.pointing or wanted.alone or wanted.disturbance > 0.0):
         memory = loop.law.remember(loop.gains, loop.known, loop.period)
-        return claims, unsound or (NOT_SOUGHT if any(labelled("memory", memory)) else REMEMBERS)
+        sought = any(labelled("memory", memory)) or loop.law.hook("plan") is not None
+        return claims, unsound or (NOT_SOUGHT if sought else REMEMBERS)
     try:
         claim, reason = pointed(subject, wanted.like, wanted.begun)
     except (UnreadableError, InputError):

@@ -237,14 +237,12 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
-    if "plan_error" in n:
-        bounds.append(
-            f"a plan that no limit shapes, whose torque is within {shown(n['plan_error'], ' N m', up=True)} of a polynomial"
-        )
+    near = shown(n.get("plan_error", 0.0), " N m", up=True)
+    bounds += [f"a plan that no limit shapes, whose torque is within {near} of a polynomial"] if "plan_error" in n else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
-    near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"
-    return f"{near}{share}, from {start}, torque held for {n['period']:.12g} s, with {listed(bounds)}{_followed(subject)}"
+    end = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"
+    return f"{end}{share}, from {start}, torque held for {n['period']:.12g} s, with {listed(bounds)}{_followed(subject)}"
 
 
 def _sampling(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
