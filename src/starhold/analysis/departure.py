@@ -232,8 +232,6 @@ def covered(
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Return whether the loop starts in the sets of the proved claims about a level of V."""
-    if loop.remembers:
-        return {}
     # The true start, not as measured.
     loop, inside = loop.without("sensor", "estimator"), dict[str, bool]()
     shown = shown_at(loop, loop.start)
