@@ -1,5 +1,6 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
-tests.certification.pointing_hunt SEED COUNT` prints what came of each; `SEED COUNT 1`: of loops with the predictive law."""
+tests.certification.pointing_hunt SEED COUNT [TOLERANCE]` prints what came of each; a TOLERANCE of "plans": of
+loops with the predictive law."""
 
 import json
 import math
@@ -153,7 +154,7 @@ class Attack(Oracle):
             return run(self.programs["law"], given)
 
         found = Fleet(
-            self.J, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
+            self.true, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
         )
         found.growing = n.get("outside.per.rate", 0.0), n.get("error.per.rate", 0.0)
         found.around = Surroundings(
@@ -264,7 +265,7 @@ class Planned(Attack):
         return found, reached
 
 
-def proved_loop(seed, folder, plans=False):
+def proved_loop(seed, folder, tolerance=None, plans=False):
     """A random loop with its text and its claim; or why there is none, in place of the claim."""
     text = random_loop(np.random.default_rng(seed), plans)
     try:
@@ -272,7 +273,7 @@ def proved_loop(seed, folder, plans=False):
         loop = build(scenario, scenario.laws[0])
     except InputError as reason:
         return None, text, f"refused: {reason}"
-    certificate = certify(loop, "hunted", replace(wanted_of(scenario, True), alone=True))
+    certificate = certify(loop, "hunted", replace(wanted_of(scenario, True), alone=True, inertia_tolerance=tolerance))
     claim = certificate.claim("pointing")
     if claim is None or claim.outcome != "proved":
         why = [o.evidence.get("reason", "") for one in certificate.claims for o in one.obligations]
@@ -280,9 +281,9 @@ def proved_loop(seed, folder, plans=False):
     return loop, text, claim
 
 
-def hunted(seed, folder, plans=False):
+def hunted(seed, folder, tolerance=None, plans=False):
     """What became of a random loop: the text, why there is no claim or "", what contradicts it or "", and shares."""
-    _, text, claim = proved_loop(seed, folder, plans)
+    _, text, claim = proved_loop(seed, folder, tolerance, plans)
     if isinstance(claim, str):
         return text, claim, "", None
     attack, lanes = (Planned, LANES // 3) if plans else (Attack, LANES)
@@ -290,20 +291,19 @@ def hunted(seed, folder, plans=False):
     return text, "", found, (claim, reached)
 
 
-def main(first, count, plans=0):
+def main(first, count, tolerance=None, plans=False):
     """Print a line for each loop, and how many of each kind there were."""
     begun, tally = time.time(), dict.fromkeys(("refused", "undecided", "proved", "broken"), 0)
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            text, why, found, more = hunted(seed, Path(folder), bool(plans))
+            text, why, found, more = hunted(seed, Path(folder), tolerance, plans)
             kind, shown = why.split(":")[0] or "proved", why
             if more:
                 claim, (V, angle, rate) = more
+                kept = f"share {claim.numbers['share']} off {claim.numbers.get('tolerance', 0.0)}"
                 n = claim.numbers
                 ends = f"{math.degrees(n['angle']):.3g} of {math.degrees(n['slew_angle']):.3g} deg"
-                shown = (
-                    f"V {V:.3f} angle {angle:.3f} rate {rate:.3f}, {ends}, share {n['share']} {found and 'BROKEN ' + found}"
-                )
+                shown = f"V {V:.3f} angle {angle:.3f} rate {rate:.3f}, {ends}, {kept} {found and 'BROKEN ' + found}"
             tally[kind] += 1
             tally["broken"] += bool(found)
             law = text.rsplit('type = "', 1)[1].split('"')[0]
@@ -312,4 +312,5 @@ def main(first, count, plans=0):
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:4]))
+    asked = sys.argv[3:4]
+    main(*map(int, sys.argv[1:3]), *([None, True] if asked == ["plans"] else map(float, asked)))

@@ -104,7 +104,7 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
         return _remembering(subject, wanted, unsound)
     unflown = unsound
     if not unflown and wanted.alone:
-        claim, reason = pointed(subject, wanted.like, wanted.begun)
+        claim, reason = pointed(subject, wanted.like, wanted.begun, wanted.inertia_tolerance)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
     elif not unflown:
         pointing = wanted.pointing or wanted.disturbance > 0.0
@@ -144,7 +144,7 @@ def _remembering(subject: Subject, wanted: Wanted, unsound: str) -> tuple[list[C
         memory = loop.law.remember(loop.gains, loop.known, loop.period)
         return claims, unsound or (NOT_SOUGHT if plans or any(labelled("memory", memory)) else REMEMBERS)
     try:
-        claim, reason = pointed(subject, wanted.like, wanted.begun)
+        claim, reason = pointed(subject, wanted.like, wanted.begun, wanted.inertia_tolerance)
     except (UnreadableError, InputError):
         claim, reason = None, ""
     if claim is not None:

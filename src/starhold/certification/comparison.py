@@ -1,6 +1,7 @@
 """Compares the programs and numbers of a proof with those of a loop that flies."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from math import inf, isfinite
 from typing import Any
@@ -17,7 +18,7 @@ from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import fraction
 from starhold.certification.subject import above, make_subject
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes, samples_of
+from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, samples_of
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
@@ -94,8 +95,9 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
     if claim["theorem"] == POINTS:
+        known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
-        pushed = pushes(loop, envelope).numbers
+        pushed = known.against(envelope).numbers
         if not numbers.keys().isdisjoint(CHANGE):
             # Without both a torque may turn over at once.
             numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers

@@ -58,12 +58,12 @@ def proved_claims(
     """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: proved ones,
     and refuted ones among the others; and why no evidence was found for other theorems. turn: the rotation that the set
     within limits must contain (rad); rate: up to which motions should converge from every attitude (rad/s, inf for any);
-    tolerance: of the inertia, by default the largest; pointing: whether to find the pointing bound of the loop as it flies,
-    of motions that begin at the rate `begun` (rad/s).
+    tolerance: of the inertia, by default the largest, in the pointing bound none; pointing: whether to find the pointing
+    bound of the loop as it flies, of motions that begin at the rate `begun` (rad/s).
     """
     loop = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
-        find_pointed(loop, begun=begun)
+        _find_pointed(loop, None, begun, tolerance)
     find_refuted(loop, turn, rate)
     claims = met(checked(loop))
     # The refuted claim is the requested one; a weaker one may be proved.
@@ -71,12 +71,28 @@ def proved_claims(
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, loop.failed
 
 
-def pointed(subject: Subject, like: Claim | None = None, begun: float | None = None) -> tuple[Claim | None, str]:
+def pointed(
+    subject: Subject, like: Claim | None = None, begun: float | None = None, tolerance: float | None = None
+) -> tuple[Claim | None, str]:
     """Return the pointing claim of a loop as it flies, or why no evidence was found. like: the claim of another loop, for
-    the same start set and limits; begun: the rate (rad/s) at which motions begin."""
+    the same start set, limits and tolerance; begun: the rate (rad/s) at which motions begin; tolerance: of the inertia."""
     loop = Loop(subject)
-    find_pointed(loop, None if like is None or like.proof is None else like.proof.claim["numbers"], begun)
+    numbers = None if like is None or like.proof is None else like.proof.claim["numbers"]
+    _find_pointed(loop, numbers, begun, tolerance)
     return next(iter(checked(loop)), None), loop.failed.get(POINTS, "no proof was found")
+
+
+def _find_pointed(loop: Loop, like: Mapping[str, Any] | None, begun: float | None, tolerance: float | None) -> None:
+    """Find the pointing bound with the tolerance of the inertia, or without if none is proved with it."""
+    if like is not None:
+        tolerance = float(Fraction(like["tolerance"])) if "tolerance" in like else None
+    loop.known = replace(loop.known, tolerance=tolerance)
+    if find_pointed(loop, like, begun) or tolerance is None or like is not None:
+        return
+    why = loop.failed.get(POINTS, "no proof was found")
+    loop.known = replace(loop.known, tolerance=None)
+    if find_pointed(loop, like, begun):
+        loop.failed[POINTS] = f"with the inertia's tolerance: {why}"
 
 
 def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tuple[dict[str, Claim], dict[str, str]] | None:
@@ -253,6 +269,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
         **errors,
         "told": "outside.0" in numbers,
+        **({"tolerance": below(numbers["tolerance"])} if "tolerance" in numbers else {}),
         "share": below(1 - numbers["share"]) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),
         **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},

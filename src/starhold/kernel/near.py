@@ -10,6 +10,9 @@ from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
 from .numbers import Rows, beside, inverse, plus, scalar, times
 from .regions import STATE, with_momentum
 
+CHANGE = "told.change", "told.change.per.rate"
+"""How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
+MOMENTA = ("h1", "h2", "h3")
 HALF_ROOT = Fraction(7072, 10000)
 """At least the root of 1/2."""
 AROUND = [
@@ -46,17 +49,16 @@ def near_target(loop: AttitudeLoop, h: Fraction) -> Near:
     return Near(torque, rates, A, B, grown, N)
 
 
-def around(loop: AttitudeLoop, near: Near, momentum: Fraction) -> list[Rows]:
-    """Return A at corners between which it is with all momenta of wheels up to that."""
-    every = ([x * momentum for x in corner] for corner in AROUND)
-    return [plus(near.A, near.spun(*spinning(loop, at))) for at in every]
-
-
 def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
     """Return what wheels' momentum makes of the rates, as matrices: in the law's torque, and in that on the body."""
     names = {f"h{k + 1}": x for k, x in enumerate(at)}
     law, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
     return law, body
+
+
+def between(near: Near, loop: AttitudeLoop, size: Fraction) -> list[Rows]:
+    """Return matrices between which A is with each momentum of wheels of up to a size."""
+    return [plus(near.A, near.spun(*spinning(loop, [x * size for x in corner]))) for corner in AROUND]
 
 
 def over_period(feedback: Rows, h: Fraction) -> Rows:

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from .loops import AXES, RATES, TURNS
-from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, up, whole
+from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, times, transpose, up, whole
 from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
-SPEED, ANGLE, PULL = "|w", "|q", "|u"
-"""Under which the sizes have those of |w| and |q|, and of the acceleration that is linear in the state where it is known."""
+SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
+"""Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
+a tube of the torque that an inertia near the given one adds."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
 """The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
@@ -102,6 +103,14 @@ def least_form(parts: Factored, region: Region) -> Rows:
     return middle
 
 
+def outweighed(Q: Rows, c: Fraction, F: Rows, M: Rows) -> Rows:
+    """Return the matrix of a form that is no more than x.Qx - c |Fx| |Mx|: 2 |Fx| |Mx| <= s |Fx|^2 + |Mx|^2 / s."""
+    if not c:
+        return Q
+    s = stretch(M) / stretch(F)
+    return plus(plus(Q, times(transpose(F), F), -c * s / 2), times(transpose(M), M), -c / (2 * s))
+
+
 def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
     """Return how much parts change at most with a vector, in norms: not at all with one that none of them has."""
     names = [name for name in sizes if name[0] == letter]
@@ -123,6 +132,11 @@ def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
             rows = [[p.only(lambda m, names=names: len(m) != 1 or m[0] not in names) for p in row] for row in rows]
             bound += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
     return bound + stretch([[most(p, sizes) for p in row] for row in rows])
+
+
+def told(true: Sizes, wrong: Sizes) -> Sizes:
+    """Return the sizes of what a law is told that is off by so much, by letters."""
+    return {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in true.items()}
 
 
 def lengths(X: Rows) -> Sizes:
@@ -159,6 +173,11 @@ def growing(parts: list[Poly]) -> list[Poly]:
 def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
     """Return values by names."""
     return dict(zip(names, values, strict=True))
+
+
+def beyond(wide: list[Fraction], sizes: Sizes) -> list[Fraction]:
+    """Return by how much bounds of the rates are more than those in a region."""
+    return [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
 
 
 def stretch(rows: Rows) -> Fraction:

@@ -26,7 +26,7 @@ from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
 from starhold.certification.matrices import floats
 from starhold.certification.subject import above
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes
+from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
@@ -232,8 +232,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
         kinds = [SHARE in like]
     for noisy in kinds:
-        bounds = pushes(loop.loop, loop.known.envelope(noisy))
-        against = bounds._replace(outside=bounds.outside + float(loop.known.disturbance))
+        against = loop.known.against(loop.known.envelope(noisy))
         try:
             if any(pushed.find_largest(*one) for pushed in ways(loop, against, noisy, tried[0]) for one in tried):
                 return True
@@ -273,6 +272,7 @@ class Pushed:
         self.plan: Plan | None = None
         self.largest, self.refused = (0.0, 0.0, ""), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
+        self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
         if loop.plan is not None:
