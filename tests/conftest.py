@@ -13,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+from starhold.kernel.numbers import Account
 from starhold.loop import kernels
 from starhold.trace import calling, machine
 from tests.proofs import share
@@ -81,6 +82,12 @@ def _proofs(tmp_path_factory):
     """Workers keep what they prove in one folder of the run, beside their own."""
     own = tmp_path_factory.getbasetemp()
     share((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "proofs")
+
+
+@pytest.fixture(autouse=True)
+def _account():
+    """Begin each test with all the work that the kernel may do, whatever a test before spent."""
+    Account.open()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -107,6 +107,7 @@ def test_compare_begins_with_the_loop_as_it_flies_once_that_is_asked_for(tmp_pat
     starhold("check", "out/certificate.json", cwd=tmp_path, code=0)
 
 
+@pytest.mark.slow
 def test_certify_says_why_a_claim_is_about_no_larger_start(tmp_path):
     done = starhold("certify", "cubesat-slew", "--law", "pd", "--why", "-o", "out", cwd=tmp_path)
     (subject,) = (one["subject"] for one in json.loads((tmp_path / "out" / "certificate.json").read_text())["certificates"])

@@ -25,7 +25,7 @@ from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.parts.targets.history import Knots
 
 GATHERED = 0.05
-"""The part of the wheels' momentum at which a mode ends that may be added before it does."""
+"""The momentum that may be added before a mode ends, as a share of the wheels' momentum at which it ends."""
 SPLINE = "rotation spline"
 """The curve that a tabulated target follows between its knots, see `parts.targets.history.Knots`."""
 

@@ -24,7 +24,7 @@ from starhold.parts.craft import Craft, tensor
 
 CARD = Card(
     title="Predictive",
-    summary="minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised anew, inside the torque limit",
+    summary="minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised at each step, within the torque limit",
     sources=("published comparison of Lyapunov, sliding-mode and predictive attitude control",),
     assumptions=(
         "rigid body",
@@ -58,7 +58,7 @@ optimum, and whether limits shaped the last plan (1) or not (0), which decides h
 
 
 class Memory(NamedTuple):
-    """The law keeps the numbers of its program between calls, changed in place and made anew for each trajectory, see
+    """The law keeps the numbers of its program between calls, changed in place and new for each trajectory, see
     `predictive.problem`."""
 
     numbers: Buffer

@@ -46,7 +46,7 @@ DEMANDED: dict[str, tuple[str, ...]] = {
     "target": ("Params", "examples", "goal"),
     "actuator": ("Params", "examples"),
 }
-"""The attributes that a part of each role must define, beside `CARD` and `ROLE`."""
+"""The attributes that a part of each role must define, besides `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
 """Equations that parts of a role have at least one of."""
 BOUNDS: dict[str, tuple[str, ...]] = {
@@ -219,7 +219,7 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
 
 
 def read_module(path: Path) -> ModuleType:
-    """A file of Python run as a module, again where its text has changed. Errors as of `from_file`."""
+    """Run a Python file as a module, again if its text has changed. Errors as of `from_file`."""
     given, path = path, _real(path)
     source = read_bytes(path)
     # The suffix as given counts too: a link that is called a table is not run.

@@ -47,7 +47,7 @@ NEAR = (7, 5, 3, 2, 1, 0.5)
 RATES = (5, 3, 2, 1, 0.5)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
 NEARLY = 10.0
-"""A chain of levels is taken that ends below so many times its `aim`, and no other one is looked for."""
+"""A chain of levels that ends below this multiple of its `aim` is taken, and no other one is looked for."""
 LEAST = 1e-6
 """The deflection (rad) of a spring as stiff as the law under the least external torque that is considered."""
 NEARER = 0.25

@@ -32,7 +32,7 @@ LARGE = 3000
 """The entries of a matrix beyond which the sparse interior point takes too long."""
 DIGITS = (12, 14, 9, 16)
 SINGULAR, SHORT = 1e-6, 8
-"""The share of the largest eigenvalue below which a matrix is taken for singular, and the denominators of what it takes to
+"""The share of the largest eigenvalue below which a matrix counts as singular, and the denominators of what it takes to
 zero."""
 DEFINITE = -1e-8
 """The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""

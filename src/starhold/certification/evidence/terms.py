@@ -19,7 +19,7 @@ from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Sum
 
 PAIRED = 10
-"""Products of two known things are tried, of so many of them at most."""
+"""The most known quantities of which products in pairs are tried."""
 
 
 def times(a: Poly, b: Poly, c: int = 1) -> Poly:
