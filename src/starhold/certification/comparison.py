@@ -147,12 +147,12 @@ def _planned(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         f"{name} is not told" for name in recorded.subject if name.startswith("plan.") and name not in claim["subject"]
     )
     try:
-        told, _ = told_of(recorded, plan)
+        numbers, _ = told_of(recorded, plan)
     except RefusedError as reason:
         yield str(reason)
         return
     for name in ("plan.gap", "plan.stiffness"):
-        if rational(claim["numbers"].get(name, "0")) < fraction(told[name]):
+        if rational(claim["numbers"].get(name, "0")) < fraction(numbers[name]):
             yield f"{name} is exceeded"
 
 

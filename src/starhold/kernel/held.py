@@ -32,6 +32,7 @@ from .regions import (
     Region,
     Sizes,
     Tube,
+    as_told,
     beyond,
     factored,
     felt,
@@ -43,7 +44,6 @@ from .regions import (
     outweighed,
     settled,
     stretch,
-    told,
     with_momentum,
 )  # fmt: skip
 
@@ -193,7 +193,7 @@ class Held(Reader):
 
     def planned(self, sizes: Sizes) -> Fraction:
         """Return how far the torque is at most from that of a plan's moves, if there is one."""
-        return self.plan.error(told(sizes, self.wrong)) if self.plan else ZERO
+        return self.plan.error(as_told(sizes, self.wrong)) if self.plan else ZERO
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""

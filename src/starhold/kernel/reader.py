@@ -1,4 +1,4 @@
-"""What errors of that which a law is told do to its torque. Docs/kernel.md, 10."""
+"""How far errors of what a law is told take its torque from the one at the true state. Docs/kernel.md, 10."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 from .loops import AttitudeLoop
 from .numbers import norm, root
 from .polynomials import Poly
-from .regions import ANGLE, Region, Sizes, felt, stretch, told
+from .regions import ANGLE, Region, Sizes, as_told, felt, stretch
 
 
 class Reader:
@@ -39,7 +39,7 @@ class Reader:
         far from there and what errors that noise drives add linearly on target."""
         if not self.turned + self.rated + self.led + self.hurried:
             return Fraction(0), Fraction(0)
-        wrong, sizes = self.wrong, told(region.sizes, self.wrong)
+        wrong, sizes = self.wrong, as_told(region.sizes, self.wrong)
         full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
         all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
         # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.

@@ -134,7 +134,7 @@ def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
     return bound + stretch([[most(p, sizes) for p in row] for row in rows])
 
 
-def told(true: Sizes, wrong: Sizes) -> Sizes:
+def as_told(true: Sizes, wrong: Sizes) -> Sizes:
     """Return the sizes of what a law is told that is off by so much, by letters."""
     return {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in true.items()}
 

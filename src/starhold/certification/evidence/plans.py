@@ -1,4 +1,4 @@
-"""What the proof of a law that plans its moves is told of the plan."""
+"""Finds the numbers and the evidence about a plan, for the proof of a law that plans its moves."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def told_of(loop: RecordedLoop, plan: Plan) -> tuple[dict[str, Any], dict[str, A
     telling = [f.part.module.Reading for f in flown.used("sensor")] + [
         f.part.module.Estimate for f in flown.used("estimator")
     ]
-    demand(not any("position" in told._fields for told in telling), "the law is told a position that may be off")
+    demand(not any("position" in reading._fields for reading in telling), "the law is told a position that may be off")
     if flown.has("two-body"):
         # Twice the torque for a turn by q, half its slope, twice: |n x J (n x e) + (n x e) x J n| <= (largest - least) |e|.
         stiffness = above(4 * gravity_gradient_bounds(flown)[1])

@@ -87,7 +87,7 @@ class Chain:
         lower = self.lower(Fraction(self.level))
         return lower is not None and lower[2] < Fraction(self.level)
 
-    def told(self) -> dict[str, Any]:
+    def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""
         off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
         return {"level": self.level} | ({"plan.error": float(off) * MORE} if self.motion.plan else {})
@@ -276,8 +276,8 @@ class Pushed:
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
         if loop.plan is not None:
-            planned, told = told_of(loop, loop.plan)
-            more, self.evidence = more | planned, self.evidence | told
+            planned, about = told_of(loop, loop.plan)
+            more, self.evidence = more | planned, self.evidence | about
         wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
         self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
         changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
@@ -366,7 +366,7 @@ class Pushed:
         if not any(chain.decreases() for chain in begun):
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return None
-        if examined and not begins(loop, self.claim(begun[0].V, numbers | begun[0].told()), self.scales):
+        if examined and not begins(loop, self.claim(begun[0].V, numbers | begun[0].of_level()), self.scales):
             return None
         return numbers, begun
 
@@ -387,7 +387,7 @@ class Pushed:
             return False
         motion, start = chain.motion, Fraction(chain.level)
         chain, (angle, fastest) = chain.nearest()
-        numbers |= chain.told()
+        numbers |= chain.of_level()
         numbers["highest"] = float(start + motion.h / 2 * motion.swing(motion.tube(motion.region(start)))) * MORE
         numbers |= {"end.angle": angle, "end.rate": fastest, "settling": float(motion.h * chain.samples) * MORE}
         if not isfinite(angle) or angle > NEARER * numbers.get("angle", numbers.get("start.angle", 0.0)):

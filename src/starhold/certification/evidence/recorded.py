@@ -72,7 +72,7 @@ class RecordedLoop:
 
     @cached_property
     def plan(self) -> Plan | None:
-        """What the law plans, if it does."""
+        """Return what the law plans, or None."""
         tell: Any = self.loop.law.hook("plan")
         return None if tell is None else tell(self.loop.gains, self.loop.known, self.loop.period)
 

@@ -18,10 +18,10 @@ Most: TypeAlias = list[Fraction | None]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
-def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), asked: Sequence[Fraction] | None = None) -> Proof:
+def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), largest: Sequence[Fraction] | None = None) -> Proof:
     """On {V <= level}, or everywhere, with everything from outside at most as told: each component of the torque is at most
     `limit` in size (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k, of
-    those that are told. less: how far the torque is at most from that of the true state, by what is told wrongly. asked:
+    those that are told. less: how far the torque is at most from that of the true state, by what is told wrongly. largest:
     how large it is at most about each axis, errors included, where that is known."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, longest = numbers.get("limit"), numbers.get("limit.norm")
@@ -54,10 +54,10 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), asked: Seque
     known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
     said, none = list[str](), poly(0)
     reduced = [None if x is None else x - less for x in (limit, longest)]
-    limited = [(*load, none) for load in loads("torque", *reduced)] if asked is None else []
+    limited = [(*load, none) for load in loads("torque", *reduced)] if largest is None else []
     for name, bound in (("torque", limit), ("norm of the torque", longest)):
-        if bound is not None and asked is not None:
-            yield name, Exceeds(bound, max(asked) if bound is limit else norm(asked))
+        if bound is not None and largest is not None:
+            yield name, Exceeds(bound, max(largest) if bound is limit else norm(largest))
     if limit is not None:
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if longest is not None:

@@ -10,7 +10,7 @@ from ..held import Held
 from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
-from ..regions import ANGLE, AT_REST, RATE, TURN, balls, told, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, as_told, balls, widened
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
@@ -45,12 +45,12 @@ def points(claim: Claim) -> Proof:
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     start = yield from contents(loop, loop.lyapunov)
     region = motion.region(c)
-    planned, asked = "", None
+    planned, torques = "", None
     if motion.plan is not None:
         wrong = motion.wrong
-        planned, asked = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), told(region.sizes, wrong))
+        planned, torques = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), as_told(region.sizes, wrong))
     off = motion.misread(region)[0] + motion.planned(region.sizes)
-    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), asked)
+    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques)
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
