@@ -276,6 +276,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         "share": below(1 - numbers["share"]) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),
         **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
+        **({"plan_error": above(numbers["plan.error"])} if "plan.error" in numbers else {}),
         **{name: above(numbers[key]) for name, key in ends.items()},
     }
 

@@ -221,9 +221,8 @@ def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "angle" not in n:
         return f"a torque from outside of up to {shown(n['torque'], ' N m')} leaves the body near the target"
-    start = f"rest at up to {angle(n['slew_angle'])}"
-    if n["rate_start"]:
-        start = f"up to {angle(n['slew_angle'])} at up to {speed(n['rate_start'])}"
+    turned = angle(n["slew_angle"])
+    start = f"up to {turned} at up to {speed(n['rate_start'])}" if n["rate_start"] else f"rest at up to {turned}"
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
     beside = " beside those that the law is told" if n["told"] else ""
 
@@ -238,6 +237,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []
     bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
+    bounds += [f"a plan within {shown(n['plan_error'], ' N m', up=True)} of a polynomial"] if "plan_error" in n else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
     near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"

@@ -142,6 +142,11 @@ def taken_apart(rows: tuple[tuple[Poly, ...], ...]) -> tuple[tuple[tuple[Poly, .
     return rows, turned
 
 
+def as_told(true: Sizes, wrong: Sizes) -> Sizes:
+    """Return the sizes of what a law is told that is off by so much, by letters."""
+    return {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in true.items()}
+
+
 def lengths(X: Rows) -> Sizes:
     """Return bounds of |w| and |q| where x.X^-1 x <= 1: no eigenvalue exceeds the largest sum of a row."""
     parts = (([row[part] for row in X[part]], name) for part, name in ((RATE, SPEED), (TURN, ANGLE)))
