@@ -138,7 +138,7 @@ def offer(monkeypatch):
         monkeypatch.syspath_prepend(str(folder))
         for name in names:
             monkeypatch.delitem(sys.modules, name, raising=False)
-        monkeypatch.setattr(parts, "entry_points", lambda group: points if group == "starhold.parts" else [])
+        monkeypatch.setattr(parts, "entries", lambda group: points if group == "starhold.parts" else [])
         forget()
 
     yield give

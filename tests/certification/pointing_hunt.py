@@ -1,6 +1,6 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
-tests.certification.pointing_hunt SEED COUNT [KIND [TOLERANCE]]` prints what came of each; KIND: "targets" for ones that
-move, "shaken" for random torques, "" for neither."""
+tests.certification.pointing_hunt SEED COUNT [TOLERANCE | KIND]` prints what came of each; KIND: "plans" for loops with
+the predictive law, "targets" for ones that move, "shaken" for random torques."""
 
 import json
 import math
@@ -21,8 +21,9 @@ from starhold.scenario.reading import parse
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.bodies.rigid_body import wanted_of
 from tests.certification.hunt import EARTH, random_inertia, unit
-from tests.kernel.flights import Fleet, Surroundings, along, times, turn
+from tests.kernel.flights import Fleet, Surroundings, along, cross, times, turn
 from tests.kernel.oracle import Oracle
+from tests.kernel.planned import Planned as Plans
 from tests.kernel.programs import run
 
 LANES, PERIODS, SETTLED = 96, 2000, 40.0
@@ -32,7 +33,7 @@ how flights on target begin."""
 
 def random_loop(random, kind=""):
     """The text of a scenario of which a pointing bound may be proved: inertia, orbit, target, wheels, law, gains, period,
-    start, and the parts that disturb, measure and estimate, all at random; of a kind those that it has for certain."""
+    start, and the parts that disturb, measure and estimate, all at random; of a kind what it has for certain."""
 
     def some(*choices):
         return choices[int(random.integers(len(choices)))]
@@ -74,12 +75,19 @@ def random_loop(random, kind=""):
         lines += [f'momentum_limit = "{size(0.5, 10.0) * w * scale:.6g} N m s"']
         lines += [f"viscous = {size(1e-6, 1e-3) * w * rotor:.6g}", f"coulomb = {size(1e-6, 1e-3) * k:.6g}"] * some(0, 1)
     law = some("lyapunov", "wheel", "wheel") if wheels else some("lyapunov", "lyapunov", "pd", "matrix-pd", "lqr", "wheel")
+    law = "mpc" if kind == "plans" else law
     lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
     if kind == "shaken":
         lines += ["[[part]]", 'type = "random-torque"', f"deviation = {size(1e-5, 1e-3) * k:.6g}"]
     lines += ["[simulation]", f"duration = {100.0 * period!r}", f"control_period = {period!r}"]
     lines += ["[certify]", f"disturbance = {size(1e-6, 3e-2) * k:.6g}", "[[law]]", f'type = "{law}"']
     lines += [f'quaternion_sign = "{some("as_published", "shortest", "hysteresis")}"']
+    if kind == "plans":
+        # Gains of about this stiffness and damping.
+        weights = [f"q_rate = {(d / k * random.uniform(0.2, 1.2)) ** 2:.6g}", f"r = {1.0 / k**2:.6g}", "q_attitude = 1.0"]
+        horizon, terminal = int(random.integers(1, 13)), some("riccati", "riccati", "riccati", "stage")
+        weights += [f"horizon = {horizon}", f'terminal = "{terminal}"', f'limit = "{some("axis", "norm")}"']
+        return "\n".join([*lines, *weights]) + "\n"
     if law in ("lyapunov", "pd"):
         return "\n".join([*lines, f"k_rate = {d:.6g}", f"k_attitude = {k:.6g}"]) + "\n"
     spread = random.uniform(0.7, 1.4, size=3) if some(0, 1) else np.ones(3)
@@ -160,6 +168,8 @@ def parts_of(random, some, size, numbers, orbit, wheels, k, w, period):
 class Attack(Oracle):
     """Flights against a pointing claim: one half begins on the border of its set, one half on target."""
 
+    longest = PERIODS
+
     def __init__(self, content, claim, seed, lanes=LANES):
         super().__init__(content, claim, seed)
         self.lanes = lanes
@@ -216,7 +226,7 @@ class Attack(Oracle):
         begin = (np.concatenate([np.array(part).T, np.tile(rest[:, None], half)], axis=1) for part, rest in zip(
             zip(*states, strict=True), (np.eye(4)[0], np.zeros(3)), strict=True))  # fmt: skip
         near = np.arange(self.lanes) >= half
-        periods = int(min(n["settling"] / h + 300, PERIODS))
+        periods = int(min(n["settling"] / h + 300, self.longest))
         extremal, usual = self.extremal(periods), fleet.push
 
         def push(k, q, w):
@@ -258,6 +268,34 @@ def flown(loop, claim, random, lanes=128):
     return worst
 
 
+class Planned(Attack):
+    """Flights of a law that plans, whose torque is that of the best plan, and how far this is from the program as a share of
+    what is claimed, and from its limits. They are short, because the motion is sampled anew for each lane and period."""
+
+    longest = 300
+
+    def fleet(self):
+        fleet, plan, self.shares = super().fleet(), Plans(self.subject, self.numbers, self.J), [0.0, 0.0]
+        program, n = fleet.law, along(self.rng.normal(size=(3, self.lanes)))
+
+        def law(q, w, *around):
+            _, r, a, _ = around or [np.zeros(w.shape)] * 4
+            ahead = cross(w + r, self.J @ (w + r)) - cross(w, self.J @ w) + self.J @ (a - cross(w, r))
+            torques = plan.torques(q, w, n, ahead)
+            off = np.linalg.norm(torques[0] - program(q, w, *around), axis=0).max() / self.numbers["plan.error"]
+            self.shares = [max(pair) for pair in zip(self.shares, (off, plan.exceeded(torques)), strict=True)]
+            return torques[0]
+
+        fleet.law = law
+        return fleet
+
+    def worst(self):
+        found, reached = super().worst()
+        if max(self.shares) > 1.0 and not found:
+            found = f"the plan is {self.shares} of its bounds"
+        return found, reached
+
+
 def proved_loop(seed, folder, tolerance=None, kind=""):
     """A random loop with its text and its claim; or why there is none, in place of the claim."""
     text = random_loop(np.random.default_rng(seed), kind)
@@ -270,7 +308,7 @@ def proved_loop(seed, folder, tolerance=None, kind=""):
     claim = certificate.claim("pointing")
     if claim is None or claim.outcome != "proved":
         why = [o.evidence.get("reason", "") for one in certificate.claims for o in one.obligations]
-        return loop, text, "undecided: " + "; ".join(why)
+        return loop, text, "undecided: " + "; ".join(why or [certificate.unflown])
     return loop, text, claim
 
 
@@ -279,11 +317,12 @@ def hunted(seed, folder, tolerance=None, kind=""):
     _, text, claim = proved_loop(seed, folder, tolerance, kind)
     if isinstance(claim, str):
         return text, claim, "", None
-    found, reached = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, seed).worst()
+    attack, lanes = (Planned, LANES // 3) if kind == "plans" else (Attack, LANES)
+    found, reached = attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, seed, lanes).worst()
     return text, "", found, (claim, reached)
 
 
-def main(first, count, of="", tolerance=None):
+def main(first, count, tolerance=None, of=""):
     """Print a line for each loop, and how many of each kind there were."""
     begun, tally = time.time(), dict.fromkeys(("refused", "undecided", "proved", "broken"), 0)
     with tempfile.TemporaryDirectory() as folder:
@@ -304,4 +343,5 @@ def main(first, count, of="", tolerance=None):
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:3]), *sys.argv[3:4], *map(float, sys.argv[4:5]))
+    asked = sys.argv[3:4]
+    main(*map(int, sys.argv[1:3]), *([None, *asked] if asked[:1] and asked[0].isalpha() else map(float, asked)))

@@ -173,6 +173,7 @@ ASSUMPTIONS = {
     FRICTIONLESS: Assumption("wheels without friction", _friction),
     "bounded-momentum": Assumption("total momentum at most as told"),
     "spare-momentum": Assumption("no wheel filled by momentum that friction moves between wheels", _filled),
+    "best-plan": Assumption("torque of a plan as told, of nearly the least cost", _limited),
     "no-wheels": Assumption("no stored momentum"),
     "no-outside-torque": Assumption("no torque from outside", _pulled),
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),

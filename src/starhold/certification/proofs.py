@@ -13,7 +13,6 @@ from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.detumbling import DETUMBLES, find_detumbling
 from starhold.certification.evidence.finding import certificate, obligations
-from starhold.certification.evidence.pointing import POINTS, find_pointed
 from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.refuted import (
     AWAY,
@@ -25,6 +24,7 @@ from starhold.certification.evidence.refuted import (
     UNSETTLED,
     find_refuted,
 )
+from starhold.certification.evidence.starts import POINTS
 from starhold.certification.matrices import above, below
 from starhold.certification.subject import Subject
 from starhold.kernel.check import Proved, check
@@ -85,6 +85,9 @@ def pointed(
 
 def _find_pointed(loop: Loop, like: Mapping[str, Any] | None, begun: float | None, tolerance: float | None) -> None:
     """Find the pointing bound with the tolerance of the inertia, or without if none is proved with it."""
+    # Loaded here, because its matrices need a large library.
+    from starhold.certification.evidence.pointing import find_pointed
+
     if like is not None:
         tolerance = float(Fraction(like["tolerance"])) if "tolerance" in like else None
     loop.known = replace(loop.known, tolerance=tolerance)
@@ -275,6 +278,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         "share": below(1 - numbers["share"]) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),
         **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
+        **({"plan_error": above(numbers["plan.error"])} if "plan.error" in numbers else {}),
         **{name: above(numbers[key]) for name, key in ends.items()},
     }
 

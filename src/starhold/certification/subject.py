@@ -92,7 +92,7 @@ def make_subject(
     rate, acceleration = _target_bounds(loop)
     axes, norm, pull = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0), fmpq(0)
     if loop.has("gravity-gradient"):
-        axes, norm, pull = _gravity_gradient_bounds(loop)
+        axes, norm, pull = gravity_gradient_bounds(loop)
     # The subject is what its file says.
     axes, (norm, pull, rate, acceleration) = (
         tuple(exact(above(x)) for x in bounds) for bounds in (axes, (norm, pull, rate, acceleration))
@@ -211,7 +211,7 @@ def _momentum(loop: ClosedLoop, target_rate: Any, stored: float) -> float:
 # --- bounds on the outside --------------------------------------------------------------------------------------------
 
 
-def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any, Any]:
+def gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any, Any]:
     """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m), and on the norm for an
     inertia of one (1/s2)."""
     nearest, _, _, gravity = perigee(loop)

@@ -222,22 +222,22 @@ def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "angle" not in n:
         return f"a torque from outside of up to {shown(n['torque'], ' N m')} leaves the body near the target"
-    begun = f"up to {angle(n['slew_angle'])}"
-    start = f"{begun} at up to {speed(n['rate_start'])}" if n["rate_start"] else f"rest at {begun}"
+    turned = angle(n["slew_angle"])
+    start = f"up to {turned} at up to {speed(n['rate_start'])}" if n["rate_start"] else f"rest at up to {turned}"
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
-    beside = " beside those that the law is told" if n["told"] else ""
 
     def pushed(name: str) -> str:
         more = f" and {shown(growing, ' N m s')} times the body's rate" if (growing := n[f"{name}_per_rate"]) else ""
         return f"of up to {shown(n[name], ' N m')}{more}"
 
     random = f", random ones of up to {shown(n['random_torque'], ' N m')}" if "random_torque" in n else ""
-    bounds = [f"torques from outside {pushed('torque')}{beside}{random}"]
+    bounds = [f"torques from outside {pushed('torque')}{' beside those that the law is told' * bool(n['told'])}{random}"]
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []
     bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
+    bounds += [f"a plan within {shown(n['plan_error'], ' N m', up=True)} of a polynomial"] if "plan_error" in n else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
     near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"

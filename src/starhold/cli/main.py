@@ -54,6 +54,8 @@ def main() -> None:
     if unsaid is not None and not isinstance(unsaid, BrokenPipeError):
         print(f"starhold: standard output cannot be written: {unsaid.strerror}", file=sys.stderr)
         code = code or USER_ERROR
+    # At the end the interpreter would look several times through all that was loaded for what is no longer in use.
+    gc.freeze()
     sys.exit(code)
 
 
@@ -61,6 +63,8 @@ def run_command() -> int:
     """Run the command in `sys.argv`, and return its exit code."""
     # Set before NumPy loads: on matrices as small as a law's, the threads of its library only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Nor are plugins of the library that reads tables sought in all installed packages.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
     warnings.formatwarning = _as_line

@@ -15,7 +15,9 @@ from functools import cached_property
 from .loops import AXES, NONE, AttitudeLoop
 from .near import CHANGE, MOMENTA, between, near_target
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
+from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
+from .reader import Reader
 from .regions import (
     ANGLE,
     AT_REST,
@@ -30,6 +32,7 @@ from .regions import (
     Region,
     Sizes,
     Tube,
+    as_told,
     beyond,
     factored,
     felt,
@@ -47,12 +50,13 @@ from .regions import (
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
 
 
-class Held:
+class Held(Reader):
     """A loop with its torque held for a period, and V = s (1 - q0) + x.Gx."""
 
-    def __init__(self, loop: AttitudeLoop) -> None:
+    def __init__(self, loop: AttitudeLoop, plan: Plan | None = None) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
+        self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
         # What noise adds near the target, and what momentum makes of that.
         self.swayed = self.apart = AT_REST
         self.random = numbers.get("noise.torque") or ZERO
@@ -188,37 +192,14 @@ class Held:
         sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)}
         return Region(X, sizes | self.others, least)
 
-    def misread(self, region: Region) -> tuple[Fraction, Fraction]:
-        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
-        far from there and what errors that noise drives add linearly on target."""
-        if not self.turned + self.rated + self.led + self.hurried:
-            return Fraction(0), Fraction(0)
-        r, a = self.size("r"), self.size("a")
-        turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
-        wrong = {"q": self.turned / 2, "w": self.rated + turn["r"]} | turn
-        wrong["h"] = stretch(self.loop.given) * self.rated
-        # A torque that turns over at once is what the law is told.
-        wrong["e"] = self.change[1] * self.turned if self.change else Fraction(0)
-        sizes = {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in region.sizes.items()}
-        full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
-        all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
-        # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
-        away, (turned, rated) = sizes[ANGLE], self.noise
-        near = sizes | {"v": away * away}
-        linear = {"q": turned / 2, "w": rated}
-        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
-        less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
-        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
-
-    def size(self, letter: str) -> Fraction:
-        """Return a bound of the norm of a vector from outside."""
-        sizes = [x for name, x in self.others.items() if name[0] == letter]
-        return norm(sizes) if letter == "e" else max(sizes, default=Fraction(0))
+    def planned(self, sizes: Sizes) -> Fraction:
+        """Return how far the torque is at most from that of a plan's moves, if there is one."""
+        return self.plan.error(as_told(sizes, self.wrong)) if self.plan else ZERO
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
         """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
-        return {"outside": outside + sizes[LOAD], "both": outside + error + sizes[LOAD]}
+        return {"outside": outside + sizes[LOAD], "both": outside + error + sizes[LOAD] + self.planned(sizes)}
 
     def load(self, sizes: Sizes, acceleration: Fraction) -> Fraction:
         """Return how far the torque that the body takes is from that of the given inertia."""

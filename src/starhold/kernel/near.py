@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import reduce
 from itertools import product
 from typing import NamedTuple
 
@@ -58,7 +59,8 @@ def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
 
 def between(near: Near, loop: AttitudeLoop, size: Fraction) -> list[Rows]:
     """Return matrices between which A is with each momentum of wheels of up to a size."""
-    return [plus(near.A, near.spun(*spinning(loop, [x * size for x in corner]))) for corner in AROUND]
+    ways = [near.spun(*spinning(loop, way)) for way in scalar(size)]
+    return [reduce(lambda A, one: plus(A, *one), zip(ways, corner, strict=True), near.A) for corner in AROUND]
 
 
 def over_period(feedback: Rows, h: Fraction) -> Rows:

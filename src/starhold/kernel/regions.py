@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from .loops import AXES, RATES, TURNS
 from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, times, transpose, up, whole
@@ -115,13 +116,20 @@ def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
     """Return how much parts change at most with a vector, in norms: not at all with one that none of them has."""
     names = [name for name in sizes if name[0] == letter]
     demand(all(name in names for p in parts for name in p.names if name[0] == letter), "how large a vector is is not told")
-    return stretched([[p.slope(name) for name in names] for p in parts], sizes) if names else Fraction(0)
+    if not names:
+        return Fraction(0)
+    rows, turned = taken_apart(tuple(tuple(p.slope(name) for name in names) for p in parts))
+    bound = stretch([[most(p, sizes) for p in row] for row in rows])
+    for letter, c in turned:
+        bound += c * (sizes[SPEED] if letter == "w" else max(sizes[f"{letter}{k + 1}"] for k in AXES))
+    return bound
 
 
-def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
-    """Return a bound of how much longer a matrix of polynomials makes a vector: |y x z| <= |y| |z|, and what is left by its
-    entries. Vectors from outside are no longer than each of their components may be."""
-    bound = Fraction(0)
+@lru_cache(256)
+def taken_apart(rows: tuple[tuple[Poly, ...], ...]) -> tuple[tuple[tuple[Poly, ...], ...], list[tuple[str, Fraction]]]:
+    """Return what is left of a matrix of polynomials without those of y x z, and how often each y is in it: |y x z| <= |y|
+    |z|, and the rest is bounded by its entries. Vectors from outside are no longer than each of their components may be."""
+    turned = list[tuple[str, Fraction]]()
     for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
         names = [f"{letter}{k + 1}" for k in AXES]
         c = rows[1][0].terms.get((names[2],))
@@ -129,9 +137,14 @@ def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
             continue
         slopes = [[[p.terms.get((name,), 0) for name in names] for p in row] for row in rows]
         if slopes == [[[(0, c, -c)[x] for x in axis] for axis in row] for row in TURNED]:
-            rows = [[p.only(lambda m, names=names: len(m) != 1 or m[0] not in names) for p in row] for row in rows]
-            bound += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
-    return bound + stretch([[most(p, sizes) for p in row] for row in rows])
+            rows = tuple(tuple(p.only(lambda m, names=names: len(m) != 1 or m[0] not in names) for p in row) for row in rows)
+            turned.append((letter, abs(c)))
+    return rows, turned
+
+
+def as_told(true: Sizes, wrong: Sizes) -> Sizes:
+    """Return the sizes of what a law is told that is off by so much, by letters."""
+    return {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in true.items()}
 
 
 def lengths(X: Rows) -> Sizes:

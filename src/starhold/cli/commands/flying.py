@@ -88,20 +88,21 @@ def _fly(
     process gives the commands, nothing is proved or timed."""
     if proof and not certify:
         raise InputError("compare" if nested else "run", "--proof", "--no-certify too", "one of the two")
-    from starhold.scenario.reading import load
-
-    # Read before the modules that fly and print are loaded, so that its errors are reported at once.
-    scenario = load(file, allow_unstable)
-    from starhold.cli.console import console
-    from starhold.cli.show import flying, print_outcome, print_results
     from starhold.report.painter import Painter
-    from starhold.report.results import open_folder, write_results, write_run
-    from starhold.studies import compare as studies
-    from starhold.studies.timing import Stopwatch
 
-    entries = list(scenario.laws) if nested else [scenario.pick(law)]
-    # Its library loads while laws fly.
+    # Its library loads while the scenario is read and laws fly.
     with Painter(pictures is Drawn.ALL) as painter:
+        from starhold.scenario.reading import load
+
+        # Read before the modules that fly and print are loaded, so that its errors are reported at once.
+        scenario = load(file, allow_unstable)
+        from starhold.cli.console import console
+        from starhold.cli.show import flying, print_outcome, print_results
+        from starhold.report.results import open_folder, write_results, write_run
+        from starhold.studies import compare as studies
+        from starhold.studies.timing import Stopwatch
+
+        entries = list(scenario.laws) if nested else [scenario.pick(law)]
         # All are built before the first flight, so that an error in the last is reported at once.
         loops = [studies.build(scenario, entry) for entry in entries]
         name = scenario.name if nested else f"{scenario.name}-{entries[0].name}"
