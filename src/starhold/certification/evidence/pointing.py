@@ -88,8 +88,10 @@ class Chain:
 
     def of_level(self) -> dict[str, Any]:
         """Return the claim's numbers that follow from its level."""
+        if self.motion.plan is None:
+            return {"level": self.level}
         off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
-        return {"level": self.level} | ({"plan.error": float(off) * MORE} if self.motion.plan else {})
+        return {"level": self.level, "plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
@@ -305,8 +307,7 @@ class Pushed:
         return self.loop.claim(POINTS, self.words, V, **numbers) | {"evidence": self.evidence | evidence}
 
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
-        """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
-        a start that moves; both are in decreasing order."""
+        """Find the claim from the largest possible angle, there at the largest possible rate; both are in decreasing order."""
         for angle, rates in self.starts(angles, rate, limits, beyond):
             for one in rates:
                 if self.kept(self.find, angle, one, limits):
