@@ -307,7 +307,7 @@ class Pushed:
         return self.loop.claim(POINTS, self.words, V, **numbers) | {"evidence": self.evidence | evidence}
 
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
-        """Find the claim from the largest possible angle, there at the largest possible rate; both are in decreasing order."""
+        """Find the claim from the largest possible angle, at the largest possible rate there; both decrease."""
         for angle, rates in self.starts(angles, rate, limits, beyond):
             for one in rates:
                 if self.kept(self.find, angle, one, limits):
