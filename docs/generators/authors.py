@@ -141,10 +141,14 @@ def claims_table() -> str:
         found: dict[str, list[str]] = {"every claim": [], "pointing": [], "none": []}
         for name, part in parts(role).items():
             tells = any(part.hook(hook) is not None for hook in ("bound", "error", "noise", "perturbation", "recursion"))
-            by = "every claim" if name in READ.get(role, ()) else "pointing" if tells else "none"
+            moves = role == "target" and part.hook("motion") is not None
+            by = "every claim" if moves or name in READ.get(role, ()) else "pointing" if tells else "none"
             found[by].append(f"`{name}`")
         rows.append([role, *(", ".join(names) for names in found.values())])
-    return table(["role", "taken in by its equations", 'by its bounds, of "pointing as it flies" alone', "left out"], rows)
+    return table(
+        ["role", "taken in by its equations or its motion", 'by its bounds, of "pointing as it flies" alone', "left out"],
+        rows,
+    )
 
 
 def required_table() -> str:

@@ -15,6 +15,7 @@ from starhold.campaign import proved
 from starhold.campaign.campaign import with_campaign
 from starhold.campaign.job import Job, Source, scenario_of
 from starhold.campaign.results import ByClaim, Within
+from starhold.certification.certificate import STEADY, UNTIL, Claim
 from starhold.cli.arguments import INTERNAL_ERROR
 from starhold.parts.craft import tensor
 from starhold.scenario.building import build
@@ -199,6 +200,15 @@ def test_the_notes_on_premises_are_what_recordings_show():
                     value = window.value(windows[number, row, run])
                     assert value == pytest.approx(expected[name][begin:end].max(), rel=1e-9, abs=1e-14), name
             begin = end
+
+
+def test_a_claim_about_motions_between_jumps_bounds_no_flight(monkeypatch):
+    """Nor one about less time than a flight lasts."""
+    begun = Claim.limited_to
+    monkeypatch.setattr(Claim, "limited_to", lambda claim, until: begun(replace(claim, assumptions=(STEADY,)), until))
+    assert flown(runs=2).laws[0].claim.text == "the claim holds only if the target does not jump"
+    monkeypatch.setattr(Claim, "limited_to", lambda claim, until: begun(replace(claim, assumptions=(f"{UNTIL}79",)), until))
+    assert flown(runs=2).laws[0].claim.text == "the claim holds only if the flight lasts 79 s at most"
 
 
 WIDE = {

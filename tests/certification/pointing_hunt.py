@@ -1,6 +1,6 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
-tests.certification.pointing_hunt SEED COUNT [TOLERANCE]` prints what came of each; a TOLERANCE of "plans": of
-loops with the predictive law."""
+tests.certification.pointing_hunt SEED COUNT [TOLERANCE | KIND]` prints what came of each; KIND: "plans" for loops with
+the predictive law, "targets" for ones that move, "shaken" for random torques."""
 
 import json
 import math
@@ -31,9 +31,9 @@ LANES, PERIODS, SETTLED = 96, 2000, 40.0
 how flights on target begin."""
 
 
-def random_loop(random, plans=False):
+def random_loop(random, kind=""):
     """The text of a scenario of which a pointing bound may be proved: inertia, orbit, target, wheels, law, gains, period,
-    start, and the parts that disturb, measure and estimate, all at random. plans: its law is the predictive one."""
+    start, and the parts that disturb, measure and estimate, all at random; of a kind what it has for certain."""
 
     def some(*choices):
         return choices[int(random.integers(len(choices)))]
@@ -61,7 +61,10 @@ def random_loop(random, plans=False):
         lines += ['epoch = "2027-03-20T12:00:00Z"', "[environment]", f"gravity_gradient = {some('true', 'false')}"]
     attitude, rate = unit(random), some(0.0, 0.1 * w) * random.normal(size=3)
     lines += ["[initial]", f"attitude = {numbers(attitude)}", f"rate = {numbers(rate)}"]
-    lines += ["[target]", f'mode = "{some("inertial", "orbital") if orbit else "inertial"}"']
+    if kind == "targets":
+        lines += target_of(random, some, size, numbers, orbit, w)
+    else:
+        lines += ["[target]", f'mode = "{some("inertial", "orbital") if orbit else "inertial"}"']
     if wheels:
         rotor = 10.0 ** random.uniform(-4, -2) * float(np.linalg.eigvalsh(J)[0])
         lines += ["[wheels]", f'layout = "{some("orthogonal", "pyramid")}"', f'inertia = "{rotor:.6g} kg m^2"']
@@ -72,12 +75,14 @@ def random_loop(random, plans=False):
         lines += [f'momentum_limit = "{size(0.5, 10.0) * w * scale:.6g} N m s"']
         lines += [f"viscous = {size(1e-6, 1e-3) * w * rotor:.6g}", f"coulomb = {size(1e-6, 1e-3) * k:.6g}"] * some(0, 1)
     law = some("lyapunov", "wheel", "wheel") if wheels else some("lyapunov", "lyapunov", "pd", "matrix-pd", "lqr", "wheel")
-    law = "mpc" if plans else law
+    law = "mpc" if kind == "plans" else law
     lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
+    if kind == "shaken":
+        lines += ["[[part]]", 'type = "random-torque"', f"deviation = {size(1e-5, 1e-3) * k:.6g}"]
     lines += ["[simulation]", f"duration = {100.0 * period!r}", f"control_period = {period!r}"]
     lines += ["[certify]", f"disturbance = {size(1e-6, 3e-2) * k:.6g}", "[[law]]", f'type = "{law}"']
     lines += [f'quaternion_sign = "{some("as_published", "shortest", "hysteresis")}"']
-    if plans:
+    if kind == "plans":
         # Gains of about this stiffness and damping.
         weights = [f"q_rate = {(d / k * random.uniform(0.2, 1.2)) ** 2:.6g}", f"r = {1.0 / k**2:.6g}", "q_attitude = 1.0"]
         horizon, terminal = int(random.integers(1, 13)), some("riccati", "riccati", "riccati", "stage")
@@ -94,6 +99,31 @@ def random_loop(random, plans=False):
     shape = shape * spread if np.allclose(shape, np.diag(np.diag(shape))) else shape
     gains = [f"k_rate = {json.dumps((d * shape).tolist())}", f"k_attitude = {json.dumps((k * shape).tolist())}"]
     return "\n".join([*lines, *gains, *([f"gyroscopic = {some(0.0, 1.0)}"] if law == "lqr" else [])]) + "\n"
+
+
+def target_of(random, some, size, numbers, orbit, w):
+    """Lines of a target that moves, by no more than the loop can follow."""
+    kind = some("scan", "yaw-steering", "ground-station", "ground-strip", "slew") if orbit else "slew"
+    given = ["[[part]]", f'type = "{kind}"']
+    if kind == "scan":
+        swing = size(0.02, 1.0) * w
+        given += [
+            f"amplitude = {size(0.05, 1.0):.6g}",
+            f"swing = {2 * math.pi / swing:.6g}",
+            f'shape = "{some("sinusoidal", "raster")}"',
+        ]
+    elif kind == "ground-station":
+        given += [f"latitude = {random.uniform(-1.5, 1.5):.6g}", f"longitude = {random.uniform(-3.0, 3.0):.6g}"]
+        given += [f"elevation = {random.uniform(0.1, 1.3):.6g}"]
+    elif kind == "ground-strip":
+        ends = random.uniform(-1.4, 1.4), random.uniform(-3.0, 3.0)
+        given += [f"{key} = {x:.6g}" for key, x in zip(("latitude", "longitude"), ends, strict=True)]
+        given += [f"to_{key} = {x + size(1e-3, 0.1):.6g}" for key, x in zip(("latitude", "longitude"), ends, strict=True)]
+        given += ["begin = 0", f"duration = {size(10.0, 300.0):.6g}"]
+    elif kind == "slew":
+        given += [f"attitude = {numbers(unit(random))}", f"rate = {size(1e-3, 0.2) * w:.6g}"]
+        given += [f"acceleration = {size(1e-4, 0.03) * w * w:.6g}"]
+    return given
 
 
 def parts_of(random, some, size, numbers, orbit, wheels, k, w, period):
@@ -163,6 +193,7 @@ class Attack(Oracle):
             *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
             self.noise(self.lanes, self.rng) if "share" in n else None,
             (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
+            (n.get("noise.torque.deviation", 0.0), n.get("noise.torque", 0.0)),
         )  # fmt: skip
         return found
 
@@ -265,9 +296,9 @@ class Planned(Attack):
         return found, reached
 
 
-def proved_loop(seed, folder, tolerance=None, plans=False):
+def proved_loop(seed, folder, tolerance=None, kind=""):
     """A random loop with its text and its claim; or why there is none, in place of the claim."""
-    text = random_loop(np.random.default_rng(seed), plans)
+    text = random_loop(np.random.default_rng(seed), kind)
     try:
         scenario = parse(text, "hunted.toml", folder)
         loop = build(scenario, scenario.laws[0])
@@ -281,22 +312,22 @@ def proved_loop(seed, folder, tolerance=None, plans=False):
     return loop, text, claim
 
 
-def hunted(seed, folder, tolerance=None, plans=False):
+def hunted(seed, folder, tolerance=None, kind=""):
     """What became of a random loop: the text, why there is no claim or "", what contradicts it or "", and shares."""
-    _, text, claim = proved_loop(seed, folder, tolerance, plans)
+    _, text, claim = proved_loop(seed, folder, tolerance, kind)
     if isinstance(claim, str):
         return text, claim, "", None
-    attack, lanes = (Planned, LANES // 3) if plans else (Attack, LANES)
+    attack, lanes = (Planned, LANES // 3) if kind == "plans" else (Attack, LANES)
     found, reached = attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, seed, lanes).worst()
     return text, "", found, (claim, reached)
 
 
-def main(first, count, tolerance=None, plans=False):
+def main(first, count, tolerance=None, of=""):
     """Print a line for each loop, and how many of each kind there were."""
     begun, tally = time.time(), dict.fromkeys(("refused", "undecided", "proved", "broken"), 0)
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            text, why, found, more = hunted(seed, Path(folder), tolerance, plans)
+            text, why, found, more = hunted(seed, Path(folder), tolerance, of)
             kind, shown = why.split(":")[0] or "proved", why
             if more:
                 claim, (V, angle, rate) = more
@@ -313,4 +344,4 @@ def main(first, count, tolerance=None, plans=False):
 
 if __name__ == "__main__":
     asked = sys.argv[3:4]
-    main(*map(int, sys.argv[1:3]), *([None, True] if asked == ["plans"] else map(float, asked)))
+    main(*map(int, sys.argv[1:3]), *([None, *asked] if asked[:1] and asked[0].isalpha() else map(float, asked)))

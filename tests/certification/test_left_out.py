@@ -32,18 +32,16 @@ TAKEN = {
     "linear-gravity",
     "three-body-gravity",
     "wheels",
-    "inertial",
-    "orbital",
     "history",
-    "sun",
 }
-"""The parts that the theorems in docs/certificates.md take in."""
+"""The parts that the theorems in docs/certificates.md take in, beside targets that say their motion."""
 
 
 def others(body):
     """Every installed part for a body that no theorem takes in, with its first example."""
     found = [part for role in set(PACKAGES) - {"body"} for part in parts(role).values() if part.body in ("", body)]
-    return [Fitted(part, part.examples()[0]) for part in found if part.name not in TAKEN]
+    said = [part for part in found if part.name not in TAKEN and (part.role, bool(part.hook("motion"))) != ("target", True)]
+    return [Fitted(part, part.examples()[0]) for part in said]
 
 
 @cache

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from starhold.certification.subject import perigee
+from starhold.certification.target_motion import perigee
 from starhold.scenario.reading import load
 from starhold.simulation.lane import fly
 from tests.making import built

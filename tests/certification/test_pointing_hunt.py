@@ -58,7 +58,7 @@ def test_extremal_flights_of_the_cubesat_end_near_its_bound(law, least, tmp_path
 @pytest.mark.parametrize("seed", [91004, 91012, 92006, 92008])
 def test_no_flight_breaks_the_claim_of_a_random_loop_that_plans(seed, tmp_path):
     """The torque is that of the best plan, which keeps within its limits and near the program."""
-    _, why, found, more = hunted(seed, tmp_path, plans=True)
+    _, why, found, more = hunted(seed, tmp_path, kind="plans")
     assert (why, found) == ("", "")
     _, shares = more
     assert max(shares) > 0.1

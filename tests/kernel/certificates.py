@@ -53,6 +53,7 @@ POINTING = {
     "calm": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(3))),
     "skew": ((SKEW, K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(10))),
     "noisy": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, 0.0, math.radians(10))),
+    "shaken": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, 0.0, math.radians(10))),
     "half turn": (([2.0, 3.0, 4.0], 0.09, 0.009, 0.5), (1e-8, 0.0, math.radians(178))),
     "overdamped": (([1.0, 1.0, 1.0], 1.95, 0.75, 1.0), (1e-6, 0.0, math.radians(0.5))),
 }
@@ -65,7 +66,8 @@ NOISY = {
         {"type": "gyro", "noise": 2e-5, "bias_walk": 1e-5},
         {"type": "star-tracker", "cross": "10 arcsec", "roll": "60 arcsec", "boresight": [0, -1, 0], "interval": 1.0},
         {"type": "mekf", "bias": 1e-3, **KALMAN},
-    ]
+    ],
+    "shaken": [{"type": "random-torque", "deviation": "2 uN m"}],
 }
 """The parts that noise comes with."""
 

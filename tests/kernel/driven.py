@@ -37,15 +37,22 @@ class Driven:
         Phi = expm(drift * self.numbers["period"])[:6]
         return Phi[:, :6] - Phi[:, 6:] @ np.hstack([C, K]), -Phi[:, 6:] @ np.hstack([K / 2, C])
 
+    def shaken(self):
+        """What a torque that is held makes of the motion of (w, q) near rest, in deviations of the random torque."""
+        N, zero = np.linalg.inv(self.J), np.zeros((3, 3))
+        drift = np.block([[zero, zero, N], [np.eye(3) / 2, zero, zero], [np.zeros((3, 9))]])
+        return self.numbers.get("noise.torque.deviation", 0.0) * expm(drift * self.numbers["period"])[:6, 6:]
+
     def largest_errors(self, samples, maps, begun=2500):
         """The largest errors of attitude and rate in spans of so many samples, once they have settled, and the largest rates
         and turns that they cause in the linear motion, in lanes with maps of their own of (w, q) and of these errors."""
         lanes, (A, B) = len(maps), map(np.array, zip(*maps, strict=True))
-        noise = self.noise(lanes, np.random.default_rng(2))
+        noise, random, shaken = self.noise(lanes, np.random.default_rng(2)), np.random.default_rng(3), self.shaken()
         x, most = np.zeros((6, lanes)), np.zeros((4, lanes))
         for k in range(-begun, samples):
             told, rate = noise.told()
             sizes = [np.linalg.norm(part, axis=0) for part in (told, rate, x[:3], x[3:])]
             x = np.einsum("nij,jn->in", A, x) + np.einsum("nij,jn->in", B, np.concatenate([told, rate]))
+            x = x + shaken @ random.normal(size=(3, lanes)) if shaken.any() else x
             most = np.maximum(most, sizes) if k >= 0 else most
         return most

@@ -50,7 +50,8 @@ def moved(J, inverse, q, w, torque, h):
 class Surroundings(NamedTuple):
     """Bounds of a torque that the law is told (about each axis), of a target's rate and acceleration, of the momentum with
     wheels (None: there are none), of errors of the attitude and the rate that it is told, and of how fast the torque changes
-    that it is told, with what is more for each rad that the body turns."""
+    that it is told, with what is more for each rad that the body turns; and the deviation of a random torque and the most
+    that it is."""
 
     told: list
     rate: float
@@ -60,6 +61,7 @@ class Surroundings(NamedTuple):
     rated: float
     noise: "Noise | None" = None
     change: tuple = (np.inf, 0.0)
+    shaken: tuple = (0.0, 0.0)
 
 
 class Noise:
@@ -196,8 +198,11 @@ class Fleet:
                 fast = np.linalg.norm(w + around.target(q, t)[0], axis=0)
                 pushed, error = (x + c * fast for x, c in zip((self.outside, self.error), self.growing, strict=True))
                 command = around.command(self.law, q, w, t, unit) + error * unit
+                # Nothing is drawn where there is none, so that other flights stay as they are.
+                random = self.rng.normal(scale=self.around.shaken[0], size=w.shape) if self.around.shaken[0] else 0.0 * w
+                random = random * np.minimum(1.0, self.around.shaken[1] / np.maximum(np.linalg.norm(random, axis=0), 1e-300))
                 for k in range(parts):
-                    outside = pushed * unit + around.loaded(unit, fast, part)
+                    outside = pushed * unit + around.loaded(unit, fast, part) + random
                     q, w = around.after(q, w, t + (k + 0.5) * part, command, outside, part)
                     # What would exceed the momentum is taken out as it comes in.
                     stored = np.maximum(np.linalg.norm(around.kept, axis=0), 1e-300)

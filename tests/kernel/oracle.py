@@ -302,6 +302,7 @@ class Oracle(Driven):
             *(n.get(f"error.{told}", 0.0) for told in ("attitude", "rate")),
             self.noise(2 * tries, self.rng) if "share" in n else None,
             (n.get("told.change", np.inf), n.get("told.change.per.rate", 0.0)),
+            (n.get("noise.torque.deviation", 0.0), n.get("noise.torque", 0.0)),
         )  # fmt: skip
         states = [self.border(V0, level * self.rng.uniform()) for _ in range(tries)]
         states += [(self.shrunk(turned(self.rng), V0, level * 10.0 ** self.rng.uniform(-6, 0)), zero) for _ in range(tries)]

@@ -15,7 +15,7 @@ from starhold.parts.catalogue import PACKAGES, parts
 from starhold.parts.contract import Envelope, Errors
 from starhold.parts.effectors import magnetic_unloading, wheels
 from starhold.parts.effectors.layouts import pyramid, three_orthogonal
-from starhold.parts.environments import constant_torque, drag, residual_dipole, solar_pressure, torque_table
+from starhold.parts.environments import constant_torque, drag, random_torque, residual_dipole, solar_pressure, torque_table
 from starhold.parts.epoch import SIDEREAL
 from starhold.parts.orbit import BODIES
 from starhold.parts.random import Dice
@@ -396,4 +396,13 @@ def test_noise_is_as_large_as_a_part_says(name):
 
 def test_every_part_that_says_its_noise_is_measured():
     found = [part for role in set(PACKAGES) - {"body"} for part in parts(role).values()]
-    assert {part.name for part in found if part.hook("noise")} == {*NOISY}
+    assert {part.name for part in found if part.hook("noise")} == {*NOISY, "random-torque"}
+
+
+def test_a_random_torque_is_as_large_as_it_says():
+    given = random_torque.Params(3e-4)
+    torques = np.array([random_torque.update(ZERO, None, given, Dice((5, 6), step, 0), step) for step in range(3000)])
+    units = torques / random_torque.noise(given, 0.1).torque
+    assert np.allclose(np.cov(units.T), np.eye(3), atol=0.15)
+    # Neither with the one before.
+    assert np.abs(units[1:].T @ units[:-1] / len(units)).max() < 0.1

@@ -117,7 +117,8 @@ BROKEN = {
         "target",
         {
             "Goal(params.attitude, ZERO, ZERO)": "Goal(params.attitude, (1e-3, 0.0, 0.0), ZERO)",
-            "def examples": "def motion(params):\n    return 1e-4, 0.0\n\n\ndef examples",
+            "def examples": "def motion(params, orbit):\n    return Motion(1e-4, 0.0)\n\n\ndef examples",
+            "import Card": "import Motion, Card",
         },
         {"keeps_what_it_says"},
     ),

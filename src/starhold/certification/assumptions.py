@@ -8,13 +8,15 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from starhold.algebra.quaternion import conjugate, multiply, to_reference
 from starhold.algebra.vector import ZERO
-from starhold.certification.certificate import ORBIT, WITHOUT, Claim
+from starhold.certification.certificate import ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.orbit_band import strays
+from starhold.certification.target_motion import motion_of
 from starhold.kernel.sentences import ASSUMPTIONS as SENTENCES
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.loop.kernels import make_step
-from starhold.parts.contract import IS_VALID
+from starhold.parts.contract import AT_REST, IS_VALID
 from starhold.parts.effectors.wheel_motion import has_friction
 from starhold.parts.effectors.wheels import BAND
 
@@ -43,6 +45,13 @@ def assumption(identifier: str) -> Assumption:
     if identifier.startswith(ORBIT):
         share = 100.0 * float(identifier.removeprefix(ORBIT))
         return Assumption(f"distance, speed and momentum of the orbit within {share:.3g} % of two-body motion", _strayed)
+    if identifier.startswith(UNTIL):
+        until = float(identifier.removeprefix(UNTIL))
+
+        def late(span: Any) -> Unmet:
+            return [(span["time"] * span.unit > until, "its target's motion has no bounds any more")]
+
+        return Assumption(f"the flight's first {until:.6g} s", late)
     return ASSUMPTIONS[identifier]
 
 
@@ -126,10 +135,24 @@ def _unsure(span: Any) -> Unmet:
     return [(span[name] < 0.5, "the estimate is not valid") for name in names]
 
 
+def _jumped(span: Any) -> Unmet:
+    motion, time = motion_of(span.loop) or AT_REST, span["time"] * span.unit
+    body, error = span["attitude"].T, span["attitude_error"].T
+    target: Any = multiply(body, conjugate(error))
+    steps = np.abs(np.einsum("ik,ik->k", np.array(target)[:, 1:], np.array(target)[:, :-1]))
+    rates = np.array(to_reference(body, (span["rate"] - span["rate_error"]).T))
+    most = np.diff(time) * MORE
+    jumps = 2.0 * np.arccos(np.minimum(steps, 1.0)) > motion.rate * most + NEAR
+    jumps |= np.linalg.norm(np.diff(rates), axis=0) > motion.acceleration * most + NEAR * motion.rate
+    return [(np.append(False, jumps), "the target jumps")]
+
+
 def _turning(span: Any) -> Unmet:
     return [(span.loop.target.part.name != "inertial", "the target turns")]
 
 
+MORE, NEAR = 1.0 + 1e-6, 1e-6
+"""The margins by which a target that jumps is told from one that moves."""
 UNLIMITED, WHEELS, FRICTIONLESS = "unlimited-torque", "unlimited-wheels", "frictionless-wheels"
 UNLIMITED_CONTROL, IN_THE_PLANE, LINEAR = "unlimited-control", "in-the-plane", "linear-motion"
 VALID_ESTIMATE = "valid-estimate"
@@ -159,6 +182,7 @@ ASSUMPTIONS = {
     "unknown-outside-torque": Assumption("torque from outside bounded in norm"),
     "bounded-target": Assumption("target's motion at most as told"),
     VALID_ESTIMATE: Assumption("estimate valid throughout", _unsure),
+    STEADY: Assumption("target between its jumps", _jumped),
     "target-at-rest": Assumption("target at rest", _turning),
     LINEAR: Assumption("linear motion near rest on a target at rest"),
     "equations-as-given": Assumption("the equations exactly as given"),

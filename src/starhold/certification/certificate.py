@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib import metadata
 from itertools import count
+from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -89,6 +90,16 @@ class Claim:
         """The parts of the loop that it leaves out, each as role and name."""
         return [name.removeprefix(WITHOUT) for name in self.assumptions if name.startswith(WITHOUT)]
 
+    def numbers_of(self, prefix: str) -> list[float]:
+        """The numbers of the assumptions whose identifiers begin so."""
+        return [float(name.removeprefix(prefix)) for name in self.assumptions if name.startswith(prefix)]
+
+    def limited_to(self, until: float) -> str:
+        """What must be so for it to be about all of a flight that lasts so long (s); empty where nothing must."""
+        end = min(self.numbers_of(UNTIL), default=inf)
+        about = [f"the flight lasts {end:.6g} s at most"] * (end < until)
+        return " and ".join(["the target does not jump"] * (STEADY in self.assumptions) + about)
+
     def angle_from(self, time: float) -> float:
         """Return the angle (rad) that a claim about the loop as it flies bounds from this time (s) on."""
         return min(most for begin, most in self.numbers["funnel"] if begin <= time)
@@ -98,9 +109,11 @@ class Claim:
         return next((o for o in self.obligations if o.outcome == "refuted"), None)
 
 
-WITHOUT, ORBIT = "without:", "orbit-within:"
-"""Begin the identifiers of the assumptions that a part is not there, role and name, and that forces move the orbit by no
-more than a share."""
+WITHOUT, ORBIT, UNTIL = "without:", "orbit-within:", "until:"
+"""Begin the identifiers of the assumptions that a part is not there, role and name, that forces move the orbit by no more
+than a share, and that a flight has not lasted longer (s)."""
+STEADY = "steady-target"
+"""The assumption that the target does not jump."""
 BESIDE = ("sampling", "control-limit", "saturated-axis", "detumbling")
 """Kinds of claims about a control loop that state no ultimate bound, and accompany one that does."""
 NOT_SOUGHT = "not sought"

@@ -15,8 +15,9 @@ from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED,
 from starhold.certification.evidence.detumbling import is_about
 from starhold.certification.evidence.isotropic import ISOTROPIC
 from starhold.certification.evidence.starts import POINTS
+from starhold.certification.matrices import above
 from starhold.certification.proofs import HELD_AND_PUSHED, detumbled, pointed, proved_claims
-from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
+from starhold.certification.subject import Subject, described, direction, exact_craft, make_subject
 from starhold.certification.unmodelled import named
 from starhold.errors import InputError
 from starhold.laws.interface import Measurement

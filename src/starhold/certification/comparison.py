@@ -16,14 +16,14 @@ from starhold.certification.evidence.refuted import REFUTING
 from starhold.certification.evidence.starts import POINTS
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
-from starhold.certification.matrices import fraction
-from starhold.certification.subject import above, make_subject
+from starhold.certification.matrices import above, fraction
+from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, samples_of
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
 from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.plans import PLANNED
-from starhold.kernel.theorems.noise import BESIDE
+from starhold.kernel.theorems.noise import BESIDE, DEVIATION
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS
 from starhold.parts.effectors.wheel_motion import at_top_speed
@@ -98,6 +98,8 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
         pushed = known.against(envelope).numbers
+        if "share" in numbers and (driven := driven_errors(loop)) is not None:
+            pushed[DEVIATION] = driven.torque
         if not numbers.keys().isdisjoint(CHANGE):
             # Without both a torque may turn over at once.
             numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers
@@ -107,7 +109,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
         if "outside" in least and OUTSIDE not in claim["taken"]:
             least["outside"] += known.modelled_norm
         # What is not stated is zero.
-        numbers = dict.fromkeys(Pushes(0.0).numbers, Fraction(0)) | numbers
+        numbers = dict.fromkeys((*Pushes(0.0).numbers, DEVIATION), Fraction(0)) | numbers
     wheeled = any(name.startswith(("motors", "stored")) for name in numbers)
     limit = float(loop.saturation_limit() if wheeled else loop.craft.torque_limit)
     most = {"limit": limit, "limit.norm": limit}

@@ -7,8 +7,9 @@ from typing import TypeAlias
 
 from starhold.certification.certificate import Certificate, Claim
 from starhold.certification.certify import between_samples, undecided
+from starhold.certification.matrices import above
 from starhold.certification.proofs import taken_over
-from starhold.certification.subject import above, described, make_subject
+from starhold.certification.subject import described, make_subject
 from starhold.certification.unmodelled import is_read, named
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.effectors.wheels import gives_allocated_torque
@@ -58,8 +59,8 @@ def ends(levels: Mapping[str, float], before: ClosedLoop, after: ClosedLoop) -> 
     """Return the rate and angle, relative to the target of the next mode, up to which the tests of a switch hold, allowing
     for rounding; None for no bound."""
     one, other = before.target, after.target
-    same = is_read(one) and one.part == other.part and same_numbers(one.params, other.params)
-    turns = [above(make_subject(loop).target_rate) if is_read(loop.target) else inf for loop in (before, after)]
+    same = is_read(before, one) and one.part == other.part and same_numbers(one.params, other.params)
+    turns = [above(make_subject(loop).target_rate) if is_read(loop, loop.target) else inf for loop in (before, after)]
     tests = {"rate_below": 0.0 if same else sum(turns), "body_rate_below": turns[1]}
     rate = min((levels[name] + turn for name, turn in tests.items() if name in levels and turn < inf), default=None)
     angle = levels.get("angle_below") if same else None

@@ -35,6 +35,23 @@ def number(x: Any) -> float:
     return float(x.mid()) if isinstance(x, arb) else float(x)
 
 
+def above(x: Any) -> float:
+    """A float not below a rational."""
+    exactly = fraction(x)
+    value = float(exactly)
+    return value if value >= exactly else float(np.nextafter(value, np.inf))
+
+
+def below(x: Any) -> float:
+    """A float not above a rational."""
+    return -above(-x)
+
+
+def upper(ball: arb) -> Any:
+    """A rational not below a ball."""
+    return exact(above(exact(float(ball.abs_upper().mid())))) * exact(1.0 + 1e-15)
+
+
 def inverted(a: Rows) -> Rows:
     """Return the inverse of a definite matrix."""
     Account.open()

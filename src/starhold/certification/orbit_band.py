@@ -24,12 +24,13 @@ MORE = 1.0 + 1e-9
 class Band(NamedTuple):
     """An orbit stays within `share` of the distances, speeds and angular momentum of two-body motion: `change` is the most
     that the speed away from the centre differs (m/s). `rate` (rad/s) and `acceleration` (rad/s2): how far the orbital
-    frame's motion is from that of two-body motion."""
+    frame's motion is from that of two-body motion. `force`: the largest that moves it, per mass (m/s2)."""
 
     share: float = 0.0
     change: float = 0.0
     rate: float = 0.0
     acceleration: float = 0.0
+    force: float = 0.0
 
 
 def movers(loop: ClosedLoop) -> list[Fitted]:
@@ -51,7 +52,7 @@ def band_of(loop: ClosedLoop) -> Band:
     rate = high * force / momentum
     # f_n changes as the craft moves and the normal turns; r and h change too.
     turned = (gradient * fast + force * rate) * high / momentum + force * fast / momentum + rate**2
-    return Band(share, share * fast, rate * MORE, hypot(force / low, turned) * MORE)
+    return Band(share, share * fast, rate * MORE, hypot(force / low, turned) * MORE, force * MORE)
 
 
 def extremes(loop: ClosedLoop) -> tuple[float, float, float]:

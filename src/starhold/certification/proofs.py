@@ -25,7 +25,8 @@ from starhold.certification.evidence.refuted import (
     find_refuted,
 )
 from starhold.certification.evidence.starts import POINTS
-from starhold.certification.subject import Subject, above, below
+from starhold.certification.matrices import above, below
+from starhold.certification.subject import Subject
 from starhold.kernel.check import Proved, check
 from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.rules import Exceeds
@@ -271,6 +272,7 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         "rate_start": rate,
         **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
         **errors,
+        **({"random_torque": float(numbers["noise.torque"])} if "noise.torque" in numbers else {}),
         "told": "outside.0" in numbers,
         **({"tolerance": below(numbers["tolerance"])} if "tolerance" in numbers else {}),
         "share": below(1 - numbers["share"]) if "share" in numbers else None,

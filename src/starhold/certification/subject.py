@@ -6,19 +6,31 @@ from fractions import Fraction
 from typing import Any, cast
 
 import numpy as np
-from flint import arb, fmpq
+from flint import fmpq
 
 from starhold.algebra.polynomial import Polynomial, constants, exact
 from starhold.algebra.vector import Matrix, Vector
-from starhold.certification.matrices import fraction, greatest, inverted, least, matrix_of, negative, number, rows
+from starhold.certification.matrices import (
+    above,
+    fraction,
+    greatest,
+    inverted,
+    least,
+    matrix_of,
+    negative,
+    number,
+    rows,
+    upper,
+)
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
+from starhold.certification.target_motion import motion_of, perigee
 from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, pushes
 from starhold.errors import InputError
 from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import Envelope
+from starhold.parts.contract import AT_REST, Envelope
 from starhold.parts.craft import Craft, tensor
 from starhold.parts.effectors.wheels import ALLOCATIONS, Wheels
 from starhold.parts.environments.gravity_gradient import gravity_gradient
@@ -103,7 +115,7 @@ def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
     }
     target = described_target(loop)
     # Claims leave other targets out by name, and are about one at rest.
-    name = target["target"] if is_read(loop.target) else "inertial"
+    name = target["target"] if is_read(loop, loop.target) else "inertial"
     return {
         "law": loop.law.name,
         "gains": described_gains(loop.law, loop.gains),
@@ -132,7 +144,7 @@ def described_target(loop: ClosedLoop) -> dict[str, Any]:
     """The target by its name, with its attitude if it rests and the knots that it follows if it has any; one that claims
     leave out as they name it."""
     part, knots = loop.target.part, followed(loop)
-    name = part.name if is_read(loop.target) else f"{part.role} {loop.target.called}"
+    name = part.name if is_read(loop, loop.target) else f"{part.role} {loop.target.called}"
     history = None if knots is None else {"interpolant": SPLINE} | {n: x.tolist() for n, x in knots._asdict().items()}
     attitude = list(loop.target.params.attitude) if name == "inertial" else None
     return {"target": name, "attitude": attitude, "history": history}
@@ -171,18 +183,6 @@ def _finite(x: float) -> float | None:
     return x if np.isfinite(x) else None
 
 
-def above(x: Any) -> float:
-    """A float not below a rational."""
-    exactly = fraction(x)
-    value = float(exactly)
-    return value if value >= exactly else float(np.nextafter(value, np.inf))
-
-
-def below(x: Any) -> float:
-    """A float not above a rational."""
-    return -above(-x)
-
-
 def exact_craft(inertia: Any, torque_limit: Any, gravity: Any) -> Craft:
     """A craft of constant polynomials with the exact inverse of its inertia; a limit that is infinite stays a variable."""
     full = rows(tensor(inertia))
@@ -209,24 +209,6 @@ def _momentum(loop: ClosedLoop, target_rate: Any, stored: float) -> float:
 
 
 # --- bounds on the outside --------------------------------------------------------------------------------------------
-
-
-def perigee(loop: ClosedLoop) -> tuple[arb, arb, arb, arb]:
-    """Least distance (m), angular momentum (m2/s), eccentricity and gravitational parameter of two-body motion, as balls."""
-    r = [arb(x) for x in loop.start.position]
-    v = [arb(x) for x in loop.start.velocity]
-    gravity = arb(loop.craft.gravity)
-    across = [r[i] * v[j] - r[j] * v[i] for i, j in ((0, 1), (1, 2), (2, 0))]
-    # Not ** 2, which has no value for a ball around zero.
-    h2 = sum((part * part for part in across), arb(0))
-    distance = sum((x * x for x in r), arb(0)).sqrt()
-    energy = sum((x * x for x in v), arb(0)) / 2 - gravity / distance
-    if not h2 > 0:
-        raise InputError("orbit", "", "a path through the centre of attraction", "an orbit that passes beside it")
-    squared = 1 + 2 * energy * h2 / gravity**2
-    # Of a circle the ball of e2 may reach below zero, which e2 itself does not.
-    eccentricity = squared.nonnegative_part().sqrt()
-    return h2 / gravity / (1 + eccentricity), h2.sqrt(), eccentricity, gravity
 
 
 def gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any, Any]:
@@ -264,11 +246,6 @@ def direction(name: str, first: int = 1, count: int = 3) -> Any:
     return tuple(Polynomial.variable(f"{name}{i}") for i in range(first, first + count))
 
 
-def upper(ball: arb) -> Any:
-    """A rational not below a ball."""
-    return exact(above(exact(float(ball.abs_upper().mid())))) * exact(1.0 + 1e-15)
-
-
 def _target_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
     knots = followed(loop)
     if knots is not None:
@@ -276,12 +253,5 @@ def _target_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
             return spline_bounds(knots)
         except ArithmeticError as reason:
             raise InputError("target", "history", str(reason), "attitudes closer together") from None
-    if loop.target.part.name != "orbital":
-        tell = loop.target.part.hook("motion") if is_read(loop.target) else None
-        return (fmpq(0), fmpq(0)) if tell is None else tuple(map(exact, tell(loop.target.params)))  # pyright: ignore
-    nearest, momentum, eccentricity, gravity = perigee(loop)
-    # The orbital frame turns by h/r2, and this changes by -2 h r'/r3 with |r'| at most mu e/h.
-    share, change, rate, acceleration = map(exact, band_of(loop))
-    nearest, more = nearest * (1 - share), 1 + share
-    turn = upper(momentum * more / nearest**2) + rate
-    return turn, upper(2 * (gravity * eccentricity + momentum * change) * more / nearest**3) + acceleration
+    motion = motion_of(loop) or AT_REST
+    return exact(motion.rate), exact(motion.acceleration)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from math import ceil, inf, isfinite
+from math import ceil, hypot, inf, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,21 +12,23 @@ import numpy as np
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import Vector, apply, norm, scale
-from starhold.certification.certificate import ORBIT, WITHOUT, Claim
+from starhold.certification.certificate import ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.orbit_band import band_of, extremes, movers
+from starhold.certification.target_motion import motion_of
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.contract import DEVIATIONS, NO_ERRORS, Envelope, Errors, Noise, Push, Recursion
+from starhold.parts.contract import AT_REST, DEVIATIONS, NO_ERRORS, Envelope, Errors, Noise, Push, Recursion
 from starhold.parts.craft import tensor
 from starhold.parts.orbit import period_of
-from starhold.parts.part import Fitted
+from starhold.parts.part import Fitted, Part
 from starhold.parts.pushes import moves
 
 READ = {
     "environment": ("two-body", "gravity-gradient", "linear-gravity", "three-body-gravity"),
     "effector": ("wheels",),
-    "target": ("inertial", "orbital", "history"),
+    "target": ("history",),
 }
-"""The parts that theorems model, by role; a claim's other assumptions describe their torques and motions."""
+"""The parts that theorems model, by role, beside targets that bound their motion; a claim's other assumptions describe their
+torques and motions."""
 BOUNDED = ("pointing",)
 """Kinds of claims that include external torques and errors by their bounds."""
 DETUMBLING = "detumbling"
@@ -61,10 +63,12 @@ class Pushes(NamedTuple):
 
 
 class Driven(NamedTuple):
-    """Noise-driven errors, the parts with the noise, and the parts with the errors."""
+    """Noise-driven errors, the parts with the noise, and the parts with the errors; the deviation of a random torque about
+    each axis (N m)."""
 
     recursion: Recursion
     parts: tuple[Fitted, ...]
+    torque: float = 0.0
 
 
 def envelope_of(loop: ClosedLoop, momentum: float, noisy: bool) -> Envelope:
@@ -98,8 +102,9 @@ def pushes(loop: ClosedLoop, envelope: Envelope) -> Pushes:
     (torque, per_rate), (command, command_per_rate) = (
         [sum(x) for x in zip(*pushed, strict=True)] for pushed in (torques, errors)
     )
-    turn = band_of(loop)[2:] if loop.target.part.name == "orbital" else (0.0, 0.0)
-    return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *turn)))
+    motion = motion_of(loop) or AT_REST
+    off = motion.off_rate, motion.off_acceleration
+    return Pushes(*(x * MORE for x in (torque, per_rate, attitude, rate, command, command_per_rate, *off)))
 
 
 def environment_torques(loop: ClosedLoop, envelope: Envelope) -> tuple[Push, float]:
@@ -124,15 +129,31 @@ def change_of_modelled(loop: ClosedLoop, envelope: Envelope) -> Push:
 
 
 def driven_errors(loop: ClosedLoop) -> Driven | None:
+    """Return what noise drives in a loop: errors of what its law is told, which are none where its parts do not say them,
+    and random torques from outside. None without either, and where the target depends on the law's mode."""
+    if loop.target.part.flag("BY_MODE"):
+        return None
+    told = _told_errors(loop)
+    torques = [fitted for fitted in loop.used("environment") if _noise(fitted, loop.period).torque]
+    if told is None and torques:
+        told = Driven(_as_read(Noise()), ())
+    if told is None:
+        return None
+    return told._replace(
+        parts=(*told.parts, *torques), torque=hypot(*(_noise(fitted, loop.period).torque for fitted in torques))
+    )
+
+
+def _told_errors(loop: ClosedLoop) -> Driven | None:
     """Return the noise-driven errors of an estimate, or of readings that the law uses directly; None without noise, where
-    parts do not fully declare it, where an estimator leaves other errors in, where sensors of one quantity are not read
-    together, and where the target depends on the law's mode.
+    parts do not fully declare it, where an estimator leaves other errors in, and where sensors of one quantity are not read
+    together.
     """
     estimators = loop.used("estimator")
     wanted = {name for f in estimators for name in f.needs} or {"attitude", "rate"}
     sensors = tuple(f for f in loop.used("sensor") if wanted & _shown(f))
     declared = all(f.part.hook("noise") is not None and _is_removed(_bounded(f), bool(estimators)) for f in sensors)
-    if not sensors or not declared or loop.target.part.flag("BY_MODE"):
+    if not sensors or not declared:
         return None
     noise = Noise()
     several = getattr(estimators[0].part.module, "SEVERAL", ()) if estimators else ()
@@ -151,7 +172,8 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
         tell: Any = estimators[0].part.hook("recursion")
         recursion = None if tell is None else tell(estimators[0].params, noise, loop.period, _rate(loop))
     else:
-        recursion = _as_read(noise) if _is_random(noise) else None
+        as_it_is = noise.walk or noise.every > 1 or not _is_random(noise)
+        recursion = None if as_it_is else _as_read(noise)
     return None if recursion is None else Driven(recursion, (*sensors, *estimators))
 
 
@@ -165,7 +187,7 @@ def samples_of(loop: ClosedLoop) -> int:
 
 def assumed_away(loop: ClosedLoop) -> list[str]:
     """Return the parts of a loop that only claims of the kinds `BOUNDED` include, as role and name."""
-    return [_called(f) for f in _acting(loop) if not is_read(f)]
+    return [_called(f) for f in _acting(loop) if not is_read(loop, f)]
 
 
 def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple[Claim, ...]:
@@ -181,11 +203,19 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
             return tuple(f"{WITHOUT}{name}" for name in away)
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
-        absent = [f for f in _acting(loop) if not (is_read(f) or f in noisy or _says(loop, f, envelope, f in estimated))]
+        absent = [
+            f for f in _acting(loop) if not (is_read(loop, f) or f in noisy or _says(loop, f, envelope, f in estimated))
+        ]
         share = band_of(loop).share
         return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []))
 
-    return tuple(replace(claim, assumptions=(*claim.assumptions, *more(claim))) for claim in claims)
+    target = motion_of(loop) or AT_REST
+    moved = [STEADY] * target.jumps + [f"{UNTIL}{target.until:.6g}"] * isfinite(target.until)
+
+    def all_of(claim: Claim) -> tuple[str, ...]:
+        return (*claim.assumptions, *more(claim), *(moved if claim.kind != DETUMBLING else ()))
+
+    return tuple(replace(claim, assumptions=all_of(claim)) for claim in claims)
 
 
 def _acting(loop: ClosedLoop) -> tuple[Fitted, ...]:
@@ -202,11 +232,15 @@ def _called(fitted: Fitted) -> str:
     return f"{fitted.part.role} {fitted.called}"
 
 
-def is_read(fitted: Fitted) -> bool:
-    """Whether theorems model a part: by its name, or a target by bounds of its motion."""
+def is_read(loop: ClosedLoop, fitted: Fitted) -> bool:
+    """Whether theorems model a part of a loop: by its name, or its target by bounds of its motion."""
     part = fitted.part
-    if part.role == "target" and (tell := part.hook("motion")) is not None:
-        return all(map(isfinite, tell(fitted.params)))
+    if part.role == "target" and part.hook("motion") is not None:
+        return motion_of(loop) is not None
+    return _is_modelled(part)
+
+
+def _is_modelled(part: Part) -> bool:
     return part.name in READ.get(part.role, ()) and part.file is None
 
 
@@ -235,7 +269,7 @@ def _is_in_detumbling(fitted: Fitted, envelope: Envelope, period: float) -> bool
     if part.role == "sensor" and "magnetic_field" in _shown(fitted):
         return _bounded(fitted) == NO_ERRORS and not _is_random(_noise(fitted, period))
     if part.role == "environment":
-        return is_read(fitted) or (_pushes(fitted, envelope)[0] is not None and not moves(fitted.params))
+        return _is_modelled(part) or (_pushes(fitted, envelope)[0] is not None and not moves(fitted.params))
     return part.role in ("sensor", "estimator", "target") or part.name in ("magnetorquers", "inactive-wheels")
 
 
@@ -246,10 +280,10 @@ def _pushes(fitted: Fitted, envelope: Envelope) -> tuple[Push | None, Push | Non
     part = fitted.part
     acts = part.hook("torque" if part.role == "environment" else "reaction") is not None
     # A torque that laws are told is bounded by the claim's numbers, which are about the gravity gradient alone.
-    acts = acts and (is_read(fitted) or not part.flag("MODELLED"))
+    acts = acts and (_is_modelled(part) or not part.flag("MODELLED"))
     tells: list[Any] = [part.hook("bound") if acts else None, part.hook("error") if part.role in COMMANDED else None]
     declared = [None if tell is None else tell(fitted.params, envelope) for tell in tells]
-    torque, error = (push if push is None or is_read(fitted) or all(map(isfinite, push)) else None for push in declared)
+    torque, error = (push if push is None or _is_modelled(part) or all(map(isfinite, push)) else None for push in declared)
     return torque, error
 
 
@@ -295,12 +329,9 @@ def _is_random(noise: Noise) -> bool:
     return any(leaves(noise._replace(every=noise.every - 1)))
 
 
-def _as_read(noise: Noise) -> Recursion | None:
-    """Return the errors of readings that the law uses directly; a random-walk bias, and an attitude that is held, are
-    unbounded.
-    """
-    if noise.walk or noise.every > 1:
-        return None
+def _as_read(noise: Noise) -> Recursion:
+    """Return the errors of readings that the law uses directly, without a random-walk bias and held attitudes, which are
+    unbounded."""
 
     def read(errors: tuple[Vector, ...], random: tuple[Vector, ...]) -> tuple[tuple[Vector, ...], Vector, Vector]:
         misread = apply(noise.attitude, random[2]), scale(noise.rate, random[0])

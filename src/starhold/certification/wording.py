@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from starhold.certification.assumptions import LINEAR, UNLIMITED, UNLIMITED_CONTROL, WHEELS
-from starhold.certification.certificate import FILE, ORBIT, Certificate, Claim, Obligation
+from starhold.certification.certificate import FILE, ORBIT, STEADY, UNTIL, Certificate, Claim, Obligation
 from starhold.certification.obligations import OBLIGATIONS
 from starhold.certification.rounding import angle, shown, speed
 from starhold.laws.catalogue import file_of, known_law
@@ -89,8 +89,9 @@ def listed(words: Sequence[str]) -> str:
 
 
 def _unbounded(claim: Claim, subject: Mapping[str, Any]) -> str:
-    shares = [float(name.removeprefix(ORBIT)) for name in claim.assumptions if name.startswith(ORBIT)]
-    kept = "".join(f"on an orbit within {100.0 * share:.3g} % of a two-body one, " for share in shares)
+    kept = "".join(f"on an orbit within {100.0 * share:.3g} % of a two-body one, " for share in claim.numbers_of(ORBIT))
+    kept += "between jumps of its target, " * (STEADY in claim.assumptions)
+    kept += "".join(f"for the flight's first {end:.6g} s, " for end in claim.numbers_of(UNTIL))
     return kept + _ideal(claim, subject)
 
 
@@ -224,15 +225,14 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     turned = angle(n["slew_angle"])
     start = f"up to {turned} at up to {speed(n['rate_start'])}" if n["rate_start"] else f"rest at up to {turned}"
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
-    beside = " beside those that the law is told" if n["told"] else ""
 
     def pushed(name: str) -> str:
-        growing = n[f"{name}_per_rate"]
-        more = f" and {shown(growing, ' N m s')} times the body's rate" if growing else ""
+        more = f" and {shown(growing, ' N m s')} times the body's rate" if (growing := n[f"{name}_per_rate"]) else ""
         return f"of up to {shown(n[name], ' N m')}{more}"
 
-    bounds = [f"torques from outside {pushed('torque')}{beside}"]
-    bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
+    random = f", random ones of up to {shown(n['random_torque'], ' N m')}" if "random_torque" in n else ""
+    bounds = [f"torques from outside {pushed('torque')}{' beside those that the law is told' * bool(n['told'])}{random}"]
+    bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name] > 1e-12]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
     bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []

@@ -59,8 +59,9 @@ class Held(Reader):
         self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
         # What noise adds near the target, and what momentum makes of that.
         self.swayed = self.apart = AT_REST
-        self.constant = {name: numbers[name] for name in ("outside", "error")}
-        self.constant["error"] += norm([loop.added or ZERO] * 3)
+        self.random = numbers.get("noise.torque") or ZERO
+        more = {"outside": self.random, "error": norm([loop.added or ZERO] * 3)}
+        self.constant = {name: numbers[name] + x for name, x in more.items()}
         self.per_rate = {name: numbers.get(f"{name}.per.rate") or Fraction(0) for name in ("outside", "error")}
         self.noise, errors = (
             [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")
@@ -345,10 +346,9 @@ class Held(Reader):
         self, tube: Tube, fast: Fraction = Fraction(0), pulled: Fraction = Fraction(0)
     ) -> list[tuple[Rows, Fraction]]:
         """Return pairs B, b such that samples in the tube's region are followed by x+ = Ax + the sum of B v, |v| <= b, with
-        A between those of `corners`: less what noise adds, and less where the slow torque alone would hold the body. fast,
-        pulled: |w|, and what `pulled` returns, of motions to which momentum is to add nothing in A."""
-        h, region = self.h, tube.region
-        wide, turn = tube.sizes[SPEED], tube.sizes[ANGLE]
+        A between those of `corners`: less what noise and a random torque add, and where the slow torque alone would hold the
+        body. fast, pulled: |w|, and what `pulled` returns, of motions to which momentum is to add nothing in A."""
+        h, region, wide, turn = self.h, tube.region, tube.sizes[SPEED], tube.sizes[ANGLE]
         demand(region.least > 0 and turn < 1, "a region is not near the target")
         # As q0 > 0 at all times, 1 - q0 <= |q|^2.
         near = region.sizes | {"v": turn * turn}
@@ -359,7 +359,7 @@ class Held(Reader):
         drift += h * (pulled + self.pulled(self.apart) + noisy)
         growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))
         late = self.stale(tube.sizes, self.beside, letters=growing)
-        steady = tube.uneven - self.lasting + tube.pushed + odd + tube.stale - late
+        steady = tube.uneven - self.lasting + tube.pushed - self.random + odd + tube.stale - late
         # Of what momentum makes of the rates A has the rest of the drift.
         grown = (
             felt(self.spun, "w", tube.sizes) * drift + felt(self.tumbled, "w", tube.sizes) * norm(tube.drift)

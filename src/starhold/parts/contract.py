@@ -63,7 +63,8 @@ class Noise(NamedTuple):
     """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), which
     is new after each `every` control periods, and at each control step of the rate (rad/s) and of the change of a gyro's
     bias until the next (rad/s); the deviation about each axis of that of the magnetic field (T); of the attitudes of further
-    sensors (3, 3; rad), new at the same steps."""
+    sensors (3, 3; rad), new at the same steps. Of an environment the deviation about each axis of a torque (N m) that is new
+    at each control step and held until the next."""
 
     attitude: Matrix = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     every: int = 1
@@ -71,6 +72,7 @@ class Noise(NamedTuple):
     walk: float = 0.0
     field: float = 0.0
     more: tuple[Matrix, ...] = ()
+    torque: float = 0.0
 
 
 class Recursion(NamedTuple):
@@ -98,6 +100,41 @@ class Envelope(NamedTuple):
     momentum: float
     moment: float
     field_error: float = 0.0
+
+
+class Orbit(NamedTuple):
+    """Bounds of an orbit, for targets that bound by it how they move: the least distance from the centre of attraction (m),
+    the largest speed (m/s), the rate (rad/s) and the acceleration (rad/s2) of the orbital frame, the gravitational parameter
+    (m3/s2), and the direction of the angular momentum at the start. Forces beside that of a point mass move the craft by no
+    more than `force` (m/s2), and the frame otherwise than in two-body motion by no more than `off_rate` (rad/s) and
+    `off_acceleration` (rad/s2)."""
+
+    nearest: float
+    speed: float
+    rate: float
+    acceleration: float
+    gravity: float
+    normal: Vector
+    force: float = 0.0
+    off_rate: float = 0.0
+    off_acceleration: float = 0.0
+
+
+class Motion(NamedTuple):
+    """Bounds of how a target moves: its rate (rad/s) and acceleration (rad/s2), `inf` for one without; how far those that it
+    gives may be off (rad/s, rad/s2); until when, since the start of the flight, all this holds (s); and whether its attitude
+    or its rate jumps at some instants, between which it holds."""
+
+    rate: float
+    acceleration: float
+    off_rate: float = 0.0
+    off_acceleration: float = 0.0
+    until: float = math.inf
+    jumps: bool = False
+
+
+AT_REST, UNLIMITED = Motion(0.0, 0.0), Motion(math.inf, math.inf)
+"""The motion of a target that rests, and of one without bounds."""
 
 
 class Push(NamedTuple):

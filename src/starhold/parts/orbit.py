@@ -135,6 +135,23 @@ def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) 
     return ((eccentricity * math.sinh(end) - end) - (sine - begun)) / rate
 
 
+def at_anomaly(position: Vector, velocity: Vector, gravity: float, anomaly: float) -> tuple[Vector, Vector]:
+    """Position (m) and velocity (m/s) where the orbit is by so much (rad) of true anomaly ahead of a position."""
+    distance, _, radial, h2 = _invariants(position, velocity, gravity)
+    c, s, parameter, h = math.cos(anomaly), math.sin(anomaly), h2 / gravity, math.sqrt(h2)
+    e_c, e_s = parameter / distance - 1.0, h * radial / (gravity * distance)
+    r = parameter / (1.0 + e_c * c - e_s * s)
+    # Lagrange's coefficients (Battin).
+    f, g = 1.0 - r / parameter * (1.0 - c), r * distance * s / h
+    f1, g1 = gravity / (h * distance) * (radial / h * (1.0 - c) - s), 1.0 - distance / parameter * (1.0 - c)
+
+    def summed(a: float, b: float) -> Vector:
+        x, y, z = (a * p + b * v for p, v in zip(position, velocity, strict=True))
+        return (x, y, z)
+
+    return summed(f, g), summed(f1, g1)
+
+
 def _conic(position: Vector, velocity: Vector, gravity: float) -> tuple[float, float, float]:
     """Distance (m), parameter (m) and eccentricity."""
     distance, _, radial, h2 = _invariants(position, velocity, gravity)

@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import Scalar, Truth
 from starhold.algebra.vector import Matrix, Vector
+from starhold.parts.contract import Motion, Orbit
 from starhold.parts.random import Dice
 
 State: TypeAlias = Any
@@ -238,8 +239,8 @@ class Target(Protocol):
         """The goal at a control step; before: its attitude at the step before where it follows that, else nothing."""
         ...
 
-    def motion(self, params: Any, /) -> tuple[float, float]:
-        """The largest rate (rad/s) and acceleration (rad/s2) of its attitude over the whole flight."""
+    def motion(self, params: Any, orbit: Orbit, /) -> Motion:
+        """The largest rate (rad/s) and acceleration (rad/s2) of its attitude, on an orbit within these bounds."""
         ...
 
 

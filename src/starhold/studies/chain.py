@@ -12,7 +12,8 @@ import numpy as np
 
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.hand_over import flown_ends
-from starhold.certification.subject import above, make_subject
+from starhold.certification.matrices import above
+from starhold.certification.subject import make_subject
 from starhold.certification.wording import listed
 from starhold.studies.body import Issued
 from starhold.studies.modes import RELEASED, STORED, HandOver, fresh_momentum, hand_overs, left_momentum
@@ -173,6 +174,7 @@ def _link(one: HandOver, before: str, after: str, last: Claim | None, claim: Cla
     if claim is not None and (angle == inf or early):
         fast = f" at up to {np.degrees(claim.numbers['rate_start']):.3g}°/s" if early else ""
         assumed.append(f"{after} begins within {np.degrees(claim.numbers['slew_angle']):.3g}° of its target{fast}")
+    assumed += [limited] if claim is not None and (limited := claim.limited_to(inf)) else []
     lacks = _lacking(before, after, claim, 0.0 if early else rate, angle)
     heavy = [] if claim is None else _heavy(after, claim, momentum)
     alone = bool(heavy) and not lacks

@@ -133,7 +133,8 @@ def _proved(
         until = times.end if math.isfinite(times.end) else max(scenario.table.simulation.duration, times.begin)
         grown = _grown(one, claim, until)
         unloaded = bool(grown) and any(_unloads(fitted.part) for fitted in one.loop.used("effector"))
-        why = why or ("" if unloaded else grown)
+        limited = claim.limited_to(until)
+        why = why or ("" if unloaded else grown) or (f"the claim holds only if {limited}" if limited else "")
         if why:
             continue
         absent = [*([enumerated(claim.left_out)] if claim.left_out else []), *changes]

@@ -15,7 +15,8 @@ from starhold.certification.evidence.finding import NotFoundError, complete, rea
 from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.field import field_along
-from starhold.certification.subject import Subject, above
+from starhold.certification.matrices import above
+from starhold.certification.subject import Subject
 from starhold.certification.unmodelled import environment_torques
 from starhold.errors import InputError
 from starhold.kernel.loops import WHEELS, AttitudeLoop

@@ -15,7 +15,17 @@ from starhold.certification.matrices import floats
 from starhold.certification.unmodelled import driven_errors, measures_noisy_field, samples_of
 from starhold.kernel.loops import AttitudeLoop
 from starhold.kernel.near import near_target
-from starhold.kernel.theorems.noise import BESIDE, CARRIED, CORRECTED, SHARE, driven, linear, parts_of, spins_of
+from starhold.kernel.theorems.noise import (
+    BESIDE,
+    CARRIED,
+    CORRECTED,
+    DEVIATION,
+    SHARE,
+    driven,
+    linear,
+    parts_of,
+    spins_of,
+)
 from starhold.parts.contract import DEVIATIONS
 
 linalg: Any = import_module("scipy.linalg")
@@ -44,7 +54,8 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
     parts, shapes = parts_of(len(errors[0][0][0]), spins), list[Array]()
     widths = dict.fromkeys(parts, 0.0)
     for spin in spins:
-        carried, corrected = (tuple(map(floats, driven(near, *pair, spin))) for pair in errors)
+        every_step = (driven(near, *pair, spin, Fraction(noise.torque)) for pair in errors)
+        carried, corrected = (tuple(map(floats, step)) for step in every_step)
         steps = [carried] * (every - 1) + [corrected]
         size = len(carried[0][0])
         whole, spread = period(steps, size, 0.0 * np.eye(size))
@@ -73,9 +84,13 @@ def find_radii(loop: Loop, wired: AttitudeLoop) -> tuple[dict[str, Any], dict[st
         return width * float(optimize.brentq(missed, 1.0, 12.0)) * MORE
 
     shares = SHARES if len(parts) == len(SHARES) else (*(0.9 * x for x in SHARES), *(0.1 * SHARES[0],) * 2)
+    # A random torque takes as much as an error.
+    shares = [x * (1.0 - SHARES[0] * bool(noise.torque)) for x in shares]
     often = [len(spins) * len(pair) if k > 1 else 1 for k, pair in enumerate(parts.values())]
     radii = [radius(width, share / n) for width, share, n in zip(deviations, shares, often, strict=True)]
     numbers = {SHARE: RARELY, "samples": samples, "every": every, "noise.attitude": radii[0], "noise.rate": radii[1]}
+    if noise.torque:
+        numbers |= {DEVIATION: noise.torque, "noise.torque": radius(noise.torque, SHARES[0])}
     numbers |= {BESIDE: DEVIATIONS} if measures_noisy_field(loop.loop) else {}
     evidence = {
         "covariances": [[[float.hex(x) for x in row] for row in pair.tolist()] for pair in shapes],

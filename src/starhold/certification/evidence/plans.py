@@ -8,7 +8,8 @@ import numpy as np
 
 from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.squares import rounded
-from starhold.certification.subject import above, gravity_gradient_bounds
+from starhold.certification.matrices import above
+from starhold.certification.subject import gravity_gradient_bounds
 from starhold.kernel.numbers import demand
 from starhold.laws.predictive.free import Plan
 

@@ -24,8 +24,7 @@ from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
 from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
-from starhold.certification.matrices import floats
-from starhold.certification.subject import above
+from starhold.certification.matrices import above, floats
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
@@ -308,7 +307,7 @@ class Pushed:
         return self.loop.claim(POINTS, self.words, V, **numbers) | {"evidence": self.evidence | evidence}
 
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
-        """Find the claim from the largest possible angle, there at the largest possible rate; both are in decreasing order."""
+        """Find the claim from the largest possible angle, at the largest possible rate there; both decrease."""
         for angle, rates in self.starts(angles, rate, limits, beyond):
             for one in rates:
                 if self.kept(self.find, angle, one, limits):

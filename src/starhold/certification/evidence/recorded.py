@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
 from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
-from starhold.certification.subject import Subject, above
+from starhold.certification.matrices import above
+from starhold.certification.subject import Subject
 from starhold.certification.unmodelled import driven_errors
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, REMEMBERS, SHORTEST, WHEELS, AttitudeLoop
 from starhold.kernel.plans import PLANNED

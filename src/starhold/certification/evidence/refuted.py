@@ -13,7 +13,7 @@ from starhold.certification.evidence.finding import read
 from starhold.certification.evidence.recorded import ASKED
 from starhold.certification.evidence.terms import valued
 from starhold.certification.matrices import number
-from starhold.certification.subject import perigee
+from starhold.certification.target_motion import perigee
 from starhold.kernel.loops import AttitudeLoop, around
 from starhold.kernel.numbers import RefusedError
 from starhold.kernel.polynomials import Poly

@@ -32,6 +32,8 @@ from ..rules import Definite, Exceeds, Part
 from ..sentences import Statement, below
 
 SHARE, BESIDE = "share", "noise.beside"
+DEVIATION = "noise.torque.deviation"
+"""That of a random torque about each axis (N m), new at each sample and held until the next."""
 CARRIED, CORRECTED = "errors carried", "errors corrected"
 """The programs of a sample without a new measurement, and with one: from `errors` and standard normal `noise` to the errors
 at the next, and to those of the attitude and the rate that the law is told."""
@@ -47,9 +49,9 @@ PLACES, FINE, SLIGHT = 100, 160, 40
 
 def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radii, Radii]]]:
     """At all of `samples` samples on end, every `every`-th with a new measurement, errors of attitude and rate are no larger
-    than noise.attitude and noise.rate, other standard normal vectors no longer than noise.beside, and the rate and the turn
-    that the errors cause near the target no larger than those returned, nor what momentum makes of these, but with a
-    probability of `share` at most."""
+    than noise.attitude and noise.rate, the random torque than noise.torque, other standard normal vectors no longer than
+    noise.beside, and the rate and the turn that the errors and this torque cause near the target no larger than those
+    returned, nor what momentum makes of these, but with a probability of `share` at most."""
     numbers = claim.numbers
     share, samples, every = (numbers[name] for name in (SHARE, "samples", "every"))
     demand(1 <= every <= MOST and every.denominator == samples.denominator == 1, "samples are not counted")
@@ -61,7 +63,7 @@ def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radi
     widths = [rational(x) for x in read_list(claim.evidence["deviations"], len(parts))]
     swayed = [rational(x) for x in read_list(claim.evidence["swayed"], len(parts) - 2)]
     for place, spin in enumerate(spins):
-        driven_by = [driven(motion.near, *pair, spin) for pair in errors]
+        driven_by = [driven(motion.near, *pair, spin, numbers.get(DEVIATION)) for pair in errors]
         first, last = driven_by[0], driven_by[-1]
         size = len(last[0][0])
         demand(size == len(first[0][0]) and len(last[0]) == len(first[0]), "the errors are not those of one estimate")
@@ -81,9 +83,12 @@ def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radi
     radii = [numbers["noise.attitude"], numbers["noise.rate"], *swayed]
     often = [1, 1, *(len(spins) * len(blocks) for blocks in [*parts.values()][2:])]
     beside, missed = "", sum(n * samples * tail(*pair) for n, *pair in zip(often, radii, widths, strict=True))
+    if DEVIATION in numbers:
+        missed += samples * tail(motion.random, numbers[DEVIATION])
+        beside = f", a random torque from outside up to {below(motion.random)} N m"
     if BESIDE in numbers:
         missed += samples * tail(numbers[BESIDE], Fraction(1))
-        beside = f", other noise up to {below(numbers[BESIDE])} deviations"
+        beside += f", other noise up to {below(numbers[BESIDE])} deviations"
     yield "share", Exceeds(share, missed)
     text = (
         f", of these errors up to {below(numbers['noise.attitude'])} rad and {below(numbers['noise.rate'])} rad/s driven by"
@@ -114,20 +119,28 @@ def parts_of(size: int, spins: Sequence[Spin | None]) -> dict[str, list[slice]]:
     return where | {name: [slice(first, first + 3)] for name, first in apart.items()}
 
 
-def driven(near: Near, errors: Rows, noise: Rows, spin: Spin | None = None) -> tuple[Rows, Rows]:
+def driven(
+    near: Near, errors: Rows, noise: Rows, spin: Spin | None = None, random: Fraction | None = None
+) -> tuple[Rows, Rows]:
     """Return A and B of the rates and the turn that errors cause near the target, the errors themselves and those told: from
     Ax + Bn for these alone. The law is told q + e/2 and w + s. spin: with a momentum and with the opposite one, to the first
-    order, and half of what differs at the end."""
+    order, and half of what differs at the end. random: the deviation of a torque on the body; of what momentum makes of that
+    none of its own period."""
     size = len(errors) - 6
     turned, rated = ([row[part] for row in near.torque] for part in (TURN, RATE))
 
     def torque(rows: Rows) -> Rows:
         return plus(times(rated, rows[size + 3 :]), times(turned, rows[size : size + 3]), Fraction(1, 2))
 
+    pushed: Rows = [[random * x for x in row] if random else [] for row in near.B]
     plain = [times(near.B, torque(rows)) for rows in (errors, noise)]
     still = [[Fraction(0)] * len(STATE) for _ in errors]
+
+    def unpushed(rows: Rows) -> Rows:
+        return [row + [Fraction(0)] * len(pushed[0]) for row in rows]
+
     if spin is None:
-        return beside(near.A, plain[0]) + beside(still, errors), plain[1] + noise
+        return beside(near.A, plain[0]) + beside(still, errors), beside(plain[1], pushed) + unpushed(noise)
     law, body = spin
 
     def more(rows: Rows) -> Rows:
@@ -142,9 +155,9 @@ def driven(near: Near, errors: Rows, noise: Rows, spin: Spin | None = None) -> t
         beside(beside([[-x for x in row] for row in half], plus(near.A, half, -1)), plus(e, spun, -1)),
     ]
     apart = [[(x - y) / 2 for x, y in zip(s, t, strict=True)] for s, t in zip(*both, strict=True)]
-    return both[0] + both[1] + beside(beside(still, still), errors) + apart, plus(n, shaken) + plus(
-        n, shaken, -1
-    ) + noise + shaken
+    signs = [beside(plus(n, shaken, sign), pushed) for sign in (1, -1)]
+    told = beside(beside(still, still), errors)
+    return both[0] + both[1] + told + apart, signs[0] + signs[1] + unpushed(noise) + unpushed(shaken)
 
 
 def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:

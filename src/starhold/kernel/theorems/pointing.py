@@ -15,7 +15,7 @@ from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
 from .limits import within_limits
-from .noise import SHARE, within_radii
+from .noise import DEVIATION, SHARE, within_radii
 from .response import first_of, responds
 
 ROUNDS = 64
@@ -56,6 +56,7 @@ def points(claim: Claim) -> Proof:
     tube = motion.tube(region)
     yield "V between samples", Exceeds(numbers["highest"], c + h / 2 * motion.swing(tube))
     noise = Statement("", ())
+    demand(motion.random == 0 or (SHARE in numbers and DEVIATION in numbers), "a random torque has no share")
     if SHARE in numbers:
         noise, (motion.swayed, motion.apart) = yield from within_radii(claim, motion)
     levels, ellipsoids = (read_list(claim.evidence[name]) for name in ("levels", "ellipsoids"))

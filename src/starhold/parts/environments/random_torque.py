@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.vector import ZERO, Vector
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Noise, Parameter
 from starhold.parts.random import Dice
 
 CARD = Card(
@@ -39,6 +39,11 @@ def update(memory: Vector, state: Any, params: Params, dice: Dice, step: int) ->
 def torque(state: Any, params: Params, craft: Any, memory: Vector) -> Vector:
     """Torque on the body (N m, body axes)."""
     return memory
+
+
+def noise(params: Params, period: float) -> Noise:
+    """That of the torque."""
+    return Noise(torque=params.deviation)
 
 
 def examples() -> list[Params]:

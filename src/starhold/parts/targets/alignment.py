@@ -13,7 +13,7 @@ from starhold.algebra.quaternion import Quaternion, nearer
 from starhold.algebra.scalar import Scalar, sqrt
 from starhold.algebra.vector import Matrix, Vector, add, apply, cross, dot, multiply, norm, scale, subtract, transpose
 from starhold.parts import sun
-from starhold.parts.contract import Parameter
+from starhold.parts.contract import UNLIMITED, Motion, Orbit, Parameter
 from starhold.parts.epoch import DAY, SIDEREAL
 from starhold.parts.roles import Goal
 
@@ -56,6 +56,53 @@ def aligned(first: Moving, second: Moving, axes: Matrix, before: Quaternion) -> 
     rate = (dot(y.first, z.value), dot(z.first, x.value), dot(x.first, y.value))
     acceleration = (_slope(y, z), _slope(z, x), _slope(x, y))
     return Goal(attitude, apply(axes, rate), apply(axes, acceleration))
+
+
+class Turning(NamedTuple):
+    """The largest rate (rad/s) and acceleration across it (rad/s2) of a direction, and how much of the rate and of the
+    acceleration is not known."""
+
+    rate: float
+    acceleration: float
+    off_rate: float = 0.0
+    off_acceleration: float = 0.0
+
+
+ROOM = 1.0 + 1e-7
+"""The margin for floats of bounds."""
+
+
+def bounded(first: Turning, second: Turning, sine: float) -> Motion:
+    """Bounds of the motion of `aligned`, with directions whose angle x has at least this sine.
+
+    With z' and s' of no more than n and S, and y = z x s over the sine d, the vector (w_z d, d') is no longer than n |cos x|
+    + S, and z.(z x s)' is w_x d. So w_z is no more than W = (n |cos x| + S)/d, and with the accelerations m and Q w_z' is no
+    more than W^2 + n^2/2 + (m |cos x| + Q + 2nS)/d, the rest no more than m + nW. What is not known is in these terms."""
+    if not sine > 0.0:
+        return UNLIMITED
+    sine /= ROOM
+    cosine, (n, m, _, lost), (s, q, off, unknown) = math.sqrt(1.0 - sine * sine), first, second
+    about = (n * cosine + s) / sine
+    gained = about**2 + 0.5 * n**2 + (m * cosine + q + 2.0 * n * s) / sine
+    more = 2.0 * (lost + unknown) / sine + 3.0 * off * (2.0 * (n + s) - off) / sine**2
+    return Motion(math.hypot(n, about), math.hypot(m + n * about, gained), off / sine, more)
+
+
+def nadir(orbit: Orbit) -> Turning:
+    """How the direction to the centre of attraction moves: the velocity is known, and the acceleration towards it."""
+    return Turning(orbit.rate, orbit.acceleration, 0.0, orbit.force / orbit.nearest)
+
+
+def line_of_sight(orbit: Orbit, gravity: float, distance: float, radius: float, turn: float) -> Turning:
+    """How the direction moves to a place that is at least so far from the craft (m), at most so far from the centre (m), and
+    moves as if about that (rad/s); gravity: the gravitational parameter that the target knows."""
+    if not distance > 0.0:
+        return Turning(math.inf, math.inf)
+    speed = orbit.speed + turn * radius
+    off = orbit.force + abs(gravity - orbit.gravity) / orbit.nearest**2
+    pull = orbit.gravity / orbit.nearest**2 + orbit.force + turn**2 * radius
+    # Of a speed v the part along the line and that across it have a product of v^2/2 at most.
+    return Turning(speed / distance, (pull + speed**2 / distance) / distance, 0.0, off / distance)
 
 
 def _slope(a: Moving, b: Moving) -> Scalar:

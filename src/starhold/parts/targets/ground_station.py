@@ -10,7 +10,7 @@ from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import Scalar, less, where
 from starhold.algebra.vector import ZERO, Matrix, Vector, cross, dot, norm, scale, subtract
 from starhold.algebra.words import number_of
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import UNLIMITED, Card, Motion, Orbit, Parameter
 from starhold.parts.craft import EARTH
 from starhold.parts.epoch import EPOCH, START, Date, days_of, sidereal, spun, turned
 from starhold.parts.roles import Goal
@@ -20,9 +20,12 @@ from starhold.parts.targets.alignment import (
     OTHER,
     SPIN,
     Moving,
+    Turning,
     aligned,
     body_axes,
+    bounded,
     geodetic,
+    line_of_sight,
     opposite_of,
     orbiting,
 )
@@ -38,6 +41,9 @@ CARD = Card(
     ),
 )
 ROLE = "target"
+LEANING, BANDS = 0.0034, 64
+"""The largest angle (rad) of the vertical to the direction from the Earth's centre; bands of the sky for which its motion is
+bounded."""
 NEEDS = ("two-body",)
 ABOUT = "Earth"
 FOLLOWS = True
@@ -92,6 +98,24 @@ def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
     ahead: Any = [tuple(where(in_view, x, y) for x, y in zip(*pair, strict=True)) for pair in pairs]
     against = scale(-1.0, cross(state.position, state.velocity))
     return aligned(Moving(*ahead), Moving(against, ZERO, ZERO), params.axes, before)
+
+
+def motion(params: Params, orbit: Orbit) -> Motion:
+    """Bounds between its jumps: those of the orbital frame, and of the line to the station, of which the lowest craft are
+    nearest. It is no farther from the orbit's plane than the angle at the craft between station and centre."""
+    place, _ = geodetic(params.latitude, params.longitude, params.height)
+    radius, low = norm(place), min(0.5 * math.pi - params.elevation + LEANING, 0.5 * math.pi)
+    normal = Turning(orbit.off_rate, orbit.off_acceleration, orbit.off_rate, orbit.off_acceleration)
+    most: tuple[float, ...] = orbit.rate, orbit.acceleration, orbit.off_rate, orbit.off_acceleration
+    for k in range(BANDS):
+        # From so far from the zenith at least, and at most: the craft is farther and the angle larger where it is lower.
+        far, wide = (radius * math.sin(low * j / BANDS) / orbit.nearest for j in (k, k + 1))
+        if not wide < 1.0:
+            return UNLIMITED
+        distance = orbit.nearest * math.sqrt(1.0 - far * far) - radius * math.cos(low * k / BANDS)
+        seen = line_of_sight(orbit, params.gravity, distance, radius, SPIN)
+        most = tuple(map(max, most, bounded(seen, normal, math.sqrt(1.0 - wide * wide))))
+    return Motion(*most[:4], jumps=True)
 
 
 def examples() -> list[Params]:

@@ -10,7 +10,7 @@ from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import Scalar, both, less, less_equal, maximum, minimum, sqrt, where
 from starhold.algebra.vector import ZERO, Matrix, Vector, add, cross, dot, norm, scale, subtract, unit
 from starhold.algebra.words import number_of
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import UNLIMITED, Card, Motion, Orbit, Parameter
 from starhold.parts.craft import EARTH
 from starhold.parts.epoch import EPOCH, START, Date, days_of, sidereal, spun, turned
 from starhold.parts.roles import Goal
@@ -21,9 +21,12 @@ from starhold.parts.targets.alignment import (
     RADIUS,
     SPIN,
     Moving,
+    Turning,
     aligned,
     body_axes,
+    bounded,
     geodetic,
+    line_of_sight,
     orbiting,
 )
 
@@ -138,6 +141,23 @@ def _carried(fixed: Moving, cosine: Scalar, sine: Scalar) -> Moving:
     carried = add(first, (-SPIN * value[1], SPIN * value[0], 0.0))
     turning = (-SPIN * twice[1] - SPIN**2 * value[0], SPIN * twice[0] - SPIN**2 * value[1], 0.0)
     return Moving(value, carried, add(second, turning))
+
+
+def motion(params: Params, orbit: Orbit) -> Motion:
+    """Bounds until the strip's end, with a jump as the place begins to move; infinite where the line to it may come along
+    the strip's normal. With an angle x between the planes of strip and orbit a craft at r is at most r sin x from that of
+    the strip, in which it is at least r cos x from the centre, and the place no more than the Earth's radius."""
+    strip = prepare(params, 1.0)
+    until = params.begin + params.duration
+    normal = spun(strip.normal, *cosine_sine(strip.turn))
+    apart = math.acos(min(1.0, abs(dot(normal, orbit.normal)))) + (SPIN + orbit.off_rate) * until
+    if not apart < 0.5 * math.pi:
+        return UNLIMITED
+    off, across = orbit.nearest * math.sin(apart), orbit.nearest * math.cos(apart) - RADIUS
+    # The ellipsoid's radius changes by its flattening at most as the direction turns.
+    seen = line_of_sight(orbit, params.gravity, orbit.nearest - RADIUS, RADIUS, 1.01 * strip.rate + SPIN)
+    moved = bounded(seen, Turning(SPIN, SPIN**2), max(across, 0.0) / math.hypot(across, off))
+    return moved._replace(until=until, jumps=params.begin > 0.0)
 
 
 def examples() -> list[Params]:

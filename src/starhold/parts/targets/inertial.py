@@ -6,7 +6,7 @@ from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import NO_TURN, Quaternion
 from starhold.algebra.vector import ZERO
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import AT_REST, Card, Motion, Orbit, Parameter
 from starhold.parts.roles import Goal
 
 CARD = Card(title="Inertial attitude", summary="q_RN = constant", sources=("definition",), assumptions=())
@@ -24,6 +24,11 @@ class Params(NamedTuple):
 def goal(params: Params, state: Any, step: int, before: Any) -> Goal:
     """The attitude, at rest."""
     return Goal(params.attitude, ZERO, ZERO)
+
+
+def motion(params: Params, orbit: Orbit) -> Motion:
+    """None."""
+    return AT_REST
 
 
 def examples() -> list[Params]:

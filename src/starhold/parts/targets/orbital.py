@@ -8,7 +8,7 @@ from starhold.algebra.cosines import to_quaternion
 from starhold.algebra.quaternion import Quaternion, nearer
 from starhold.algebra.scalar import sqrt
 from starhold.algebra.vector import cross, dot, scale
-from starhold.parts.contract import Card, NoParams
+from starhold.parts.contract import Card, Motion, NoParams, Orbit
 from starhold.parts.roles import Goal
 
 CARD = Card(
@@ -37,6 +37,11 @@ def goal(params: NoParams, state: Any, step: int, before: Quaternion) -> Goal:
     attitude = nearer(to_quaternion((cross(against, down), against, down)), before)
     rate = size / r2
     return Goal(attitude, (0.0, -rate, 0.0), (0.0, 2.0 * rate * dot(position, velocity) / r2, 0.0))
+
+
+def motion(params: NoParams, orbit: Orbit) -> Motion:
+    """That of the frame."""
+    return Motion(orbit.rate, orbit.acceleration, orbit.off_rate, orbit.off_acceleration)
 
 
 def examples() -> list[NoParams]:

@@ -10,10 +10,10 @@ from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import Scalar, absolute, less, side, where
 from starhold.algebra.vector import ZERO, Matrix, Vector, cross, norm, scale
 from starhold.algebra.words import number_of
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Motion, Orbit, Parameter
 from starhold.parts.craft import EARTH
 from starhold.parts.roles import Goal
-from starhold.parts.targets.alignment import AXIS, GRAVITY, OTHER, Moving, aligned, body_axes, opposite_of, orbiting
+from starhold.parts.targets.alignment import AXIS, GRAVITY, OTHER, ROOM, Moving, aligned, body_axes, opposite_of, orbiting
 from starhold.parts.targets.eigenaxis import onto
 
 CARD = Card(
@@ -93,15 +93,32 @@ def _raster(params: Numbers, swings: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     phase = swings - nearest(swings)
     quarter = 0.25 - absolute(0.25 - absolute(phase))
     sense, towards = side(phase), side(0.25 - absolute(phase))
-    # In swings: the time for which it turns round on one side of an end, and the rate between.
-    round_ = 0.25 * params.turning
-    rate = params.amplitude / (0.25 - 0.5 * round_)
+    round_, rate, bend = _lines(params.amplitude, params.turning)
     left = 0.25 - quarter
-    turns, bend = less(left, round_), rate / round_
+    turns = less(left, round_)
     angle = where(turns, params.amplitude - 0.5 * bend * left * left, rate * quarter)
     speed, slope = where(turns, bend * left, rate), where(turns, -bend, 0.0)
     often = params.often
     return sense * angle, often * towards * speed, often * often * sense * slope
+
+
+def _lines(amplitude: Scalar, turning: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """In swings: the time for which it turns round on one side of an end, the rate between, and the acceleration."""
+    round_ = 0.25 * turning
+    rate = amplitude / (0.25 - 0.5 * round_)
+    return round_, rate, rate / round_
+
+
+def motion(params: Params, orbit: Orbit) -> Motion:
+    """That of the orbital frame, and of the swings in it."""
+    often = ROOM / params.swing
+    if params.shape:
+        _, rate, slope = _lines(params.amplitude, params.turning)
+    else:
+        rate, slope = math.tau * params.amplitude, math.tau**2 * params.amplitude
+    rate, slope = often * rate, often**2 * slope
+    off = orbit.off_acceleration + orbit.off_rate * rate
+    return Motion(orbit.rate + rate, orbit.acceleration + slope + orbit.rate * rate, orbit.off_rate, off)
 
 
 def examples() -> list[Params]:

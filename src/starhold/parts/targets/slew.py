@@ -11,12 +11,13 @@ from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import Vector, dot
 from starhold.algebra.words import number_of
 from starhold.parts import sun
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import Card, Motion, Orbit, Parameter
 from starhold.parts.craft import Craft
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.roles import Goal
 from starhold.parts.stated_attitude import unit_quaternion
+from starhold.parts.targets.alignment import ROOM
 from starhold.parts.targets.eigenaxis import (
     ACCELERATION,
     AXIS,
@@ -110,6 +111,12 @@ def check(params: Numbers, craft: Craft) -> None:
 def goal(params: Numbers, state: Any, step: int, before: Any) -> Goal:
     """The attitude at this control step, with its rate and acceleration."""
     return turned(params.start, params.legs, number_of(step) * params.period - params.begin)
+
+
+def motion(params: Params, orbit: Orbit) -> Motion:
+    """The largest rate and acceleration of its turns: the rate is steady as it begins and ends, the acceleration is not."""
+    legs = prepare(params, 1.0).legs
+    return Motion(max(leg.acceleration * leg.speeding for leg in legs) * ROOM, max(leg.acceleration for leg in legs))
 
 
 def examples() -> list[Params]:

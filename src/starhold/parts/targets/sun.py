@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, inf, sin
+from math import atan2, sin
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion
@@ -10,7 +10,7 @@ from starhold.algebra.scalar import Scalar
 from starhold.algebra.vector import ZERO, Matrix, Vector, norm
 from starhold.algebra.words import number_of
 from starhold.parts import sun
-from starhold.parts.contract import Card, Parameter
+from starhold.parts.contract import UNLIMITED, Card, Motion, Orbit, Parameter
 from starhold.parts.ephemeris import EPHEMERIS
 from starhold.parts.epoch import EPOCH, START, Date
 from starhold.parts.roles import Goal
@@ -63,16 +63,16 @@ def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
     return aligned(seen, Moving(params.reference, ZERO, ZERO), params.axes, before)
 
 
-def motion(params: Params) -> tuple[float, float]:
+def motion(params: Params, orbit: Orbit) -> Motion:
     """Bounds of the rate (rad/s) and the acceleration (rad/s2) of the attitude; infinite for a reference that the Sun may
     come to. At an angle x between them, a motion of the Sun by its rate turns the attitude by no more than it over sin x."""
     across, up = norm((params.reference[0], params.reference[1], 0.0)), params.reference[2]
     # The Sun is nowhere farther from the equator than the ecliptic.
     off = atan2(abs(up), across) - sun.STEEPEST
     if off <= 0.0:
-        return inf, inf
+        return UNLIMITED
     sine = sin(off)
-    return sun.FASTEST / sine, 2.0 * sun.QUICKENING / sine + 3.0 * (sun.FASTEST / sine) ** 2
+    return Motion(sun.FASTEST / sine, 2.0 * sun.QUICKENING / sine + 3.0 * (sun.FASTEST / sine) ** 2)
 
 
 def examples() -> list[Params]:

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
+from math import asin, sin
 from typing import Annotated, Any, NamedTuple
 
 from starhold.algebra.quaternion import Quaternion
 from starhold.algebra.scalar import Scalar
-from starhold.algebra.vector import Matrix, Vector
+from starhold.algebra.vector import Matrix, Vector, dot
 from starhold.algebra.words import number_of
 from starhold.parts import sun
-from starhold.parts.contract import Card
+from starhold.parts.contract import Card, Motion, Orbit
 from starhold.parts.craft import EARTH
 from starhold.parts.ephemeris import EPHEMERIS
-from starhold.parts.epoch import EPOCH, START, Date
+from starhold.parts.epoch import DAY, EPOCH, START, Date
 from starhold.parts.roles import Goal
-from starhold.parts.targets.alignment import AXIS, GRAVITY, OTHER, aligned, body_axes, opposite_of, orbiting, towards_sun
+from starhold.parts.targets.alignment import (
+    AXIS,
+    GRAVITY,
+    OTHER,
+    Turning,
+    aligned,
+    body_axes,
+    bounded,
+    nadir,
+    opposite_of,
+    orbiting,
+    towards_sun,
+)
 
 CARD = Card(
     title="Yaw steering",
@@ -61,6 +74,15 @@ def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
     """The attitude at this control step."""
     down = opposite_of(orbiting(state.position, state.velocity, params.gravity))
     return aligned(down, towards_sun(number_of(step) * params.period, params.sun), params.axes, before)
+
+
+def motion(params: Params, orbit: Orbit) -> Motion:
+    """Bounds for the first day, by the angle of the Sun to the plane of the orbit; infinite where the Sun may come into it,
+    as it does in every year."""
+    high = asin(min(1.0, abs(dot(orbit.normal, sun.sun(0.0, sun.prepared(params.epoch, params.ephemeris)).direction))))
+    least = high - (sun.FASTEST + orbit.off_rate) * DAY
+    moved = bounded(nadir(orbit), Turning(sun.FASTEST, sun.QUICKENING), sin(max(least, 0.0)))
+    return moved._replace(until=DAY)
 
 
 def examples() -> list[Params]:
