@@ -15,7 +15,7 @@
 
    Program of the law: sha256 99130acbe6b13c7bcd3c5cbc219c37d087ae6db2517dfd9e6fe729d84998d648
 
-   Certificate: certificate.json, sha256 e249fc424fe02a6b3c864b50ffa62a750a9537a6a88fe40a77fd7204efc7c6f4:
+   Certificate: certificate.json, sha256 000a841c3ab114d6915216ccfb54b82df66bbedf70b212b2b6c3aeaad91042e7:
    proved
    Claims:
      proved: region of attraction: from the level set of V that holds rest at every attitude by the shorter

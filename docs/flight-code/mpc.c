@@ -62,7 +62,7 @@ typedef struct {
     quaternion_t attitude;
 } goal_t;
 
-/* All that a measurement is made of beside the state: the goal (None where the loop has no target),
+/* All that a measurement is made of besides the state: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
    body), the control period, the limit of the command, and all readings of the sensors, an attribute for
    each. */
@@ -171,8 +171,8 @@ typedef struct {
     double scalar1;
 } sweep_result_t;
 
-/* A trial plan has a flag, whether a limit cut a move, and the change of half the cost towards it, slope +
-   curvature / 2, which is free of the cancellation that a difference of two costs suffers. */
+/* A trial plan, with a flag for whether a limit cut a move, and the change of half the cost towards it,
+   slope + curvature / 2, which is free of the cancellation that a difference of two costs suffers. */
 typedef struct {
     bool cut;
     double change;
@@ -1953,7 +1953,7 @@ static void unroll(double *numbers)
 
 /* -------------------------------- laws.predictive.solver -------------------------------- */
 
-/* Search along the projection arc of the step (Armijo), halved so many times at most, until the cost
+/* Search along the projection arc of the step (Armijo), halved `halvings` times at most, until the cost
    decreases enough. */
 static double shorten(double *numbers, double halvings)
 {

@@ -20,7 +20,7 @@
    0.1 s.
    ****************************************************************************************************
 
-   Certificate: certificate.json, sha256 5f4e5ffa9c2d401f70f80cd5b7d4b864417c34a83be9e3764f08649fd1363b6f:
+   Certificate: certificate.json, sha256 c5201cb99a17d5abaee79376438c83ae314e426f7d4d9dd03ea1ff68632cd09c:
    undecided
    Claims:
      proved: reaches its surface: with unlimited torque, from every attitude and rate the motion reaches

@@ -87,7 +87,7 @@ typedef struct {
     double inverse_square;
 } attraction_result_t;
 
-/* All that a measurement is made of beside the state: the goal (None where the loop has no target),
+/* All that a measurement is made of besides the state: the goal (None where the loop has no target),
    whether it never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s,
    body), the control period, the limit of the command, and all readings of the sensors, an attribute for
    each. */
@@ -306,9 +306,16 @@ static vector_t gravity_gradient_torque(const state_t *state, const craft_t *cra
 /* Return the sum of weights[i] * vectors[i], from the first to the last; there is at least one. */
 static vector_t weighted(doubles4_t weights, vectors4_t vectors)
 {
-    const vector_t total = add(add(add(scale(weights.e[0], vectors.e[0]), scale(weights.e[1], vectors.e[1])),
-        scale(weights.e[2], vectors.e[2])), scale(weights.e[3], vectors.e[3]));
-    return total;
+    const double t11 = weights.e[0] * vectors.e[0].x + weights.e[1] * vectors.e[1].x + weights.e[2] *
+        vectors.e[2].x;
+    const double t13 = weights.e[0] * vectors.e[0].y + weights.e[1] * vectors.e[1].y + weights.e[2] *
+        vectors.e[2].y;
+    const double t15 = weights.e[0] * vectors.e[0].z + weights.e[1] * vectors.e[1].z + weights.e[2] *
+        vectors.e[2].z;
+    const double x = t11 + weights.e[3] * vectors.e[3].x;
+    const double y = t13 + weights.e[3] * vectors.e[3].y;
+    const double z = t15 + weights.e[3] * vectors.e[3].z;
+    return (vector_t){x, y, z};
 }
 
 /* -------------------------------- parts.effectors.wheels -------------------------------- */

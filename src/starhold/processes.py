@@ -1,4 +1,4 @@
-"""What this process may do to work on several processors."""
+"""Whether this process can be copied to work on several processors."""
 
 import sys
 from threading import active_count

@@ -15,24 +15,15 @@ from starhold.certification.subject import make_subject
 from starhold.certification.unmodelled import named, pushes
 from starhold.parts.catalogue import fit
 from starhold.parts.environments import oblateness
-from starhold.parts.orbit import BODIES, Elements, from_elements, highest, lowest
+from starhold.parts.orbit import highest, lowest
 from starhold.parts.targets import orbital
+from tests.certification.flattened import FLATTENED, MU, flattened, pull
 from tests.making import ORBIT as GRAVITY
-from tests.making import ORBITAL, flown, hub
+from tests.making import flown
 from tests.tiers import leading
 
-MU = BODIES["Earth"].gravity
-FLATTENED = fit("environment", "oblateness")
 STARTS = [*product((0.0, 0.02, 0.2), (0.0, 1.1, 1.57, 2.3), (0.0, 1.0, 4.0))]
 """Eccentricities, inclinations (rad), and arguments of perigee (rad)."""
-
-
-def flattened(eccentricity, inclination, perigee, *parts, period=10.0):
-    """A body on an orbit around the flattened Earth."""
-    size = 6.878e6 / (1.0 - eccentricity)
-    position, velocity = from_elements(Elements(size, eccentricity, inclination, 0.3, perigee, 0.7), MU)
-    loop = hub(*GRAVITY, FLATTENED, ORBITAL, *parts, rate=(0.0, 0.0, 0.0), period=period, command_limit=0.0)
-    return replace(loop, start=loop.start._replace(position=position, velocity=velocity))
 
 
 @pytest.mark.parametrize("start", leading([(start,) for start in STARTS], 6))
@@ -68,13 +59,6 @@ def test_an_orbit_stays_in_its_band_and_the_frame_near_that_of_two_body_motion(s
     assert off < band.rate + 1e-10
     assert late < band.acceleration
     assert start[1] in (0.0, 1.57) or off > 0.1 * band.rate
-
-
-def pull(loop, place):
-    """The acceleration (m/s2) at a place."""
-    state = SimpleNamespace(position=tuple(place))
-    near = np.array(place) * -MU / np.linalg.norm(place) ** 3
-    return near + oblateness.acceleration(state, FLATTENED.params, loop.craft, ())
 
 
 def test_no_place_has_more_acceleration_or_gradient_than_is_told():

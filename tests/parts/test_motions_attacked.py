@@ -15,9 +15,9 @@ from starhold.parts.catalogue import PACKAGES, fit, parts
 from starhold.parts.epoch import days_of, sidereal
 from starhold.parts.targets import ground_station, ground_strip, scan, slew, yaw_steering
 from starhold.parts.targets.alignment import RADIUS, SPIN, geodetic
-from tests.certification.test_orbit_band import MU, flattened, pull
+from tests.certification.flattened import MU, flattened, pull
 from tests.making import ORBIT, hub
-from tests.parts.test_bounds_attacked import along, climbed, epoch, orbit, size, turned, vector
+from tests.parts.attacks import along, climbed, epoch, orbit, size, turned, vector
 from tests.tiers import fewer, leading
 
 STATES, PARAMS, WORST = fewer(1_000_000, 100), fewer(200, 20), 10

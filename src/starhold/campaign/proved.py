@@ -128,8 +128,8 @@ def _subject(job: Job, law: str) -> Subject | str:
             why = one.certificate.unflown or why
         elif claim.left_out:
             why = f"the claim leaves out {enumerated(claim.left_out)}"
-        elif told := claim.limited_to(steps * loop.period):
-            why = f"the claim holds only if {told}"
+        elif condition := claim.limited_to(steps * loop.period):
+            why = f"the claim holds only if {condition}"
         elif (change := study.ends(one, loop, steps * loop.period)) is not None:
             why = f"the claim ends with what changes at {change * loop.period:g} s"
         else:

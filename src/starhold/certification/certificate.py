@@ -95,7 +95,7 @@ class Claim:
         return [float(name.removeprefix(prefix)) for name in self.assumptions if name.startswith(prefix)]
 
     def limited_to(self, until: float) -> str:
-        """What must be so for it to be about all of a flight that lasts so long (s); empty where nothing must."""
+        """Return the conditions under which it is about a flight up to a time (s); empty where there are none."""
         end = min(self.numbers_of(UNTIL), default=inf)
         about = [f"the flight lasts {end:.6g} s at most"] * (end < until)
         return " and ".join(["the target does not jump"] * (STEADY in self.assumptions) + about)

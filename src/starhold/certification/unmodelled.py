@@ -133,14 +133,14 @@ def driven_errors(loop: ClosedLoop) -> Driven | None:
     and random torques from outside. None without either, and where the target depends on the law's mode."""
     if loop.target.part.flag("BY_MODE"):
         return None
-    told = _told_errors(loop)
+    driven = _told_errors(loop)
     torques = [fitted for fitted in loop.used("environment") if _noise(fitted, loop.period).torque]
-    if told is None and torques:
-        told = Driven(_as_read(Noise()), ())
-    if told is None:
+    if driven is None and torques:
+        driven = Driven(_as_read(Noise()), ())
+    if driven is None:
         return None
-    return told._replace(
-        parts=(*told.parts, *torques), torque=hypot(*(_noise(fitted, loop.period).torque for fitted in torques))
+    return driven._replace(
+        parts=(*driven.parts, *torques), torque=hypot(*(_noise(fitted, loop.period).torque for fitted in torques))
     )
 
 

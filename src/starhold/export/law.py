@@ -14,6 +14,7 @@ from starhold.loop.closed_loop import Carry, ClosedLoop, Composition, Memories, 
 from starhold.loop.step import make_equations
 from starhold.parts.contract import CLOCK, NoMemory
 from starhold.parts.part import Part
+from starhold.parts.random import Silent
 from starhold.parts.roles import Goal
 from starhold.trace.recording import Recorder
 
@@ -120,7 +121,7 @@ def flight_law(loop: ClosedLoop) -> FlightLaw:
         firsts, again, readings, shown = {}, [], {}, {}
         for sensor, memory, params in zip(loop.used("sensor"), carry.memories.sensors, setup.sensors, strict=True):
             part = sensor.part
-            first = part.module.measure(loop.start, memory, params, _Still(), 0)[0]._asdict()
+            first = part.module.measure(loop.start, memory, params, Silent(), 0)[0]._asdict()
             # Without an estimator attitude and rate are inputs.
             taken = [name for name in first if parts.estimator is not None or name in parts.law.reads]
             repeated = not firsts.keys().isdisjoint(taken)
@@ -187,16 +188,6 @@ def _seen(parts: Composition, copies: Copies) -> Composition:
         return replace(value, module=copies.seen(value.module)) if isinstance(value, Part) else value
 
     return Composition(*(seen(value) for value in parts))
-
-
-class _Still:
-    """Random numbers that are always zero."""
-
-    def vector(self, place: int, deviation: Any) -> Any:
-        return ZERO
-
-    def normals(self, place: int, count: int) -> Any:
-        return (0.0,) * count
 
 
 class _Reading(SimpleNamespace):

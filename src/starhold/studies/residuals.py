@@ -12,7 +12,7 @@ from starhold.algebra.dual import Dual, variables
 from starhold.algebra.quaternion import conjugate, multiply
 from starhold.algebra.structure import flatten
 from starhold.loop.closed_loop import ClosedLoop
-from starhold.parts.random import RANGE, Silent
+from starhold.parts.random import RANGE, Dice
 from starhold.studies.fitting import Array, Prediction, Reading
 
 SINGULAR = 1e-9
@@ -98,12 +98,11 @@ def conjugates(quaternions: Array) -> Array:
     return np.array([[multiply(conjugate(tuple(q)), unit) for unit in units] for q in quaternions]).swapaxes(1, 2)
 
 
-class _Varied(Silent):
+class _Varied(Dice):
     """Random numbers that are 0 and vary, to see how noise enters a reading."""
 
-    def vector(self, place: int, deviation: Any) -> Any:
-        x, y, z = self.normals(place, 3)
-        return (deviation * x, deviation * y, deviation * z)
+    def __init__(self) -> None:
+        super().__init__((0, 0), 0, 0)
 
     def normals(self, place: int, count: int) -> tuple[Any, ...]:
         return tuple(variables([0.0] * count, place, RANGE))

@@ -156,8 +156,8 @@ def driven(
     ]
     apart = [[(x - y) / 2 for x, y in zip(s, t, strict=True)] for s, t in zip(*both, strict=True)]
     signs = [beside(plus(n, shaken, sign), pushed) for sign in (1, -1)]
-    told = beside(beside(still, still), errors)
-    return both[0] + both[1] + told + apart, signs[0] + signs[1] + unpushed(noise) + unpushed(shaken)
+    misread = beside(beside(still, still), errors)
+    return both[0] + both[1] + misread + apart, signs[0] + signs[1] + unpushed(noise) + unpushed(shaken)
 
 
 def linear(claim: Claim, role: str) -> tuple[Rows, Rows]:
