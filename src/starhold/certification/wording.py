@@ -20,6 +20,7 @@ HEADINGS = {
     "inertia": "uncertain inertia",
     "wheels": "within the wheels' limits",
     "pointing": "pointing as it flies",
+    "appendages": "pointing with appendages",
     "sampling": "torque held between samples",
     "sliding": "reaches its surface",
     "detumbling": "loses energy",
@@ -185,9 +186,8 @@ def _hand_over(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    where = place(n, subject) or "from a level set of V"
     either = ", from either quaternion of an attitude" if subject["quaternion_sign"] == "hysteresis" else ""
-    return f"{where} the body comes to rest on target without leaving the set{either}"
+    return f"{place(n, subject) or 'from a level set of V'} the body comes to rest on target without leaving the set{either}"
 
 
 def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -224,6 +224,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     start = f"rest at up to {angle(n['slew_angle'])}"
     if n["rate_start"]:
         start = f"up to {angle(n['slew_angle'])} at up to {speed(n['rate_start'])}"
+    start += f" with states of the appendages of up to {', '.join(map(shown, n['begun']))}" if "begun" in n else ""
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
     beside = " beside those that the law is told" if n["told"] else ""
 
@@ -327,7 +328,7 @@ _SENTENCES = {
     "torque-limit": _torque_limit,
     "wheels": _wheels,
     "inertia": _inertia,
-    "pointing": _pointing,
+    **dict.fromkeys(("pointing", "appendages"), _pointing),
     "sampling": _sampling,
     "sliding": _sliding,
     "detumbling": _detumbling,
