@@ -36,7 +36,7 @@ class Timed(NamedTuple):
 
 COMPLETION = {"_STARHOLD_COMPLETE": "complete_bash", "COMP_WORDS": "starhold comp", "COMP_CWORD": "1"}
 COMMANDS = {
-    "run three-laws": Timed(("run", "three-laws"), 1.0, writes=True),
+    "run three-laws": Timed(("run", "three-laws"), rest=1.0, writes=True),
     "compare three-laws": Timed(("compare", "three-laws"), rest=3.0, writes=True),
     "run cubesat-mission": Timed(("run", "cubesat-mission"), 1.5, 6.0, writes=True),
     "run of no file": Timed(("run", "no-such-file.toml"), rest=0.4, code=2),

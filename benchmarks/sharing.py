@@ -1,4 +1,4 @@
-"""What it is worth that kernels compute once what all lanes share: the same flights with sharing, and without it.
+"""What sharing is worth: the same flights, with what all lanes share computed once, and computed in every lane.
 
 Starts differ in attitude and rate; orbit, epoch and craft are those of the file. Both must end with the same bits.
 

@@ -13,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+from starhold.kernel.numbers import Account
 from starhold.loop import kernels
 from starhold.trace import calling, machine
 from tests.proofs import share
@@ -83,6 +84,12 @@ def _proofs(tmp_path_factory):
     share((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "proofs")
 
 
+@pytest.fixture(autouse=True)
+def _account():
+    """Begin each test with all the work that the kernel may do, whatever a test before spent."""
+    Account.open()
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _plain_code():
     """Compile kernels without optimisation: the same bits in a tenth of the time. `make test-all` has what users have."""
@@ -131,7 +138,7 @@ def offer(monkeypatch):
         monkeypatch.syspath_prepend(str(folder))
         for name in names:
             monkeypatch.delitem(sys.modules, name, raising=False)
-        monkeypatch.setattr(parts, "entry_points", lambda group: points if group == "starhold.parts" else [])
+        monkeypatch.setattr(parts, "entries", lambda group: points if group == "starhold.parts" else [])
         forget()
 
     yield give

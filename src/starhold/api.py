@@ -67,8 +67,8 @@ def simulate(
 
 @shortly
 def stepper(scenario: reading.Scenario | str | Path, law: str | None = None, *, record: bool = True) -> Stepper:
-    """A flight that goes on by one control period at a call of `step(command)`. Without a command the law decides, the first
-    if `law` is None, and the bits are those of `simulate`. record: whether samples are kept for `dataset()`."""
+    """A flight that advances by one control period at each call of `step(command)`. Without a command the law decides, the
+    first if `law` is None, and the bits are those of `simulate`. record: whether samples are kept for `dataset()`."""
     return steppers(scenario, None, law, record=record)
 
 
@@ -91,8 +91,9 @@ def environment(
     lanes: int | None = None,
     reward: Reward | None = None,
 ) -> Environment | Environments:
-    """A scenario as an environment of Gymnasium (extra `gym`), or of so many lanes. Flight software's readings are observed,
-    actions are commands. reward: by the readings after a period and the command; None: minus the angle to the target."""
+    """A scenario as an environment of Gymnasium (extra `gym`), or as one of `lanes` flights. Flight software's readings are
+    observed, actions are commands. reward: by the readings after a period and the command; None: minus the angle to the
+    target."""
     optional("gymnasium", "environments", "gym")
     from starhold.studies.environment import Environment, Environments
 
@@ -104,7 +105,7 @@ def environment(
 def metrics(run: xr.Dataset | Flight) -> Metrics:
     """The numbers that say how well a run went, a dictionary whose `units` has the unit (SI) of each; None where there is
     none: of what `simulate` returns or `run.nc` holds, by the tolerances of its scenario; of a Flight those that it has.
-    Neither flown nor timed again, so that only a Flight tells what the law's calls cost. ValueError for a Dataset that is no
+    Neither flown nor timed again, so that only a Flight has what the law's calls cost. ValueError for a Dataset that is no
     run."""
     if not hasattr(run, "data_vars"):
         expect(getattr(run, "metric_set", run), MetricSet, "metrics", "a run of sh.simulate, or a flight of sh.compare")
@@ -183,8 +184,8 @@ def design(scenario: reading.Scenario | str | Path, law: str | None = None) -> l
 
 @shortly
 def certify(scenario: reading.Scenario | str | Path, law: str | None = None) -> list[Certificate]:
-    """Prove what can be of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate has an
-    `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tried by ten thousand flights."""
+    """Prove what can be proved of every law of a scenario, or of the one of this name, on its spacecraft. Each certificate
+    has an `outcome` and `claims` (numbers in SI, of station keeping scaled), and has been tested by ten thousand flights."""
     from starhold.studies.certificates import certify_scenario
 
     return [tried.certificate for tried in certify_scenario(reading.open_scenario(scenario), law)]
@@ -259,8 +260,8 @@ def export_requirements(
 
 @shortly
 def failures(scenario: reading.Scenario | str | Path, law: str | None = None, proof: bool = False) -> list[Failure]:
-    """Return what is left after the loss of any one or two wheels, under a law, or the first; proof: how near its target the
-    loop is proved to stay after each, too, which takes seconds each."""
+    """Return the control left after the loss of any one or two wheels, under a law, or the first; proof: how near its target
+    the loop is proved to stay after each, too, which takes seconds each."""
     return studied("failures", scenario, law, proof=proof)
 
 

@@ -18,7 +18,7 @@ from starhold.analysis.rigid_body import EXTRAS, Cone
 from starhold.parts.bodies.libration_point import Units
 from starhold.scenario.building import build
 from starhold.scenario.reading import load
-from starhold.simulation.batched import begin_metered
+from starhold.simulation.batched import Flights, begin_metered
 from starhold.simulation.lane import fly
 from starhold.simulation.lanes import ThreadPool, carry_columns
 from starhold.studies.body import study_of
@@ -93,7 +93,7 @@ def compare_metrics(scenario, law):
     phases, observers = loop.phases(steps), meter.observers(loop.composition())
     with ThreadPool(2) as pool:
         noted = meter.begun(20), meter.cuts(), meter.marks[-1], rows
-        flown = begin_metered(pool, loop, carries, phases, 5, observers, *noted)()
+        flown = begin_metered(pool, Flights(loop, carries, phases, 5, observers, *noted))()
     assert (flown.ends[-1] < 0.0).all()
     found = meter.metrics(flown.notes, flown.windows, flown.ends[-1])
     assert set(found) == {*meter.units, "diverged_at"}

@@ -129,7 +129,7 @@ def test_the_scale_of_an_inertia_needs_a_torque_that_is_known():
     fit = told_of(scenario(GYRO, FIELD), INERTIA, commands="none")
     (sentence,) = fit.posterior.sentences
     assert "the scale of spacecraft.inertia" in sentence
-    assert not fit.posterior.is_told.any()
+    assert not fit.posterior.is_determined.any()
     assert fit.values / fit.values[0] == pytest.approx(np.array([1.0, 1.3, 0.5]), rel=2e-3)
     # What is not told stays where the file has it, and is not flown as if it were.
     assert fit.values == pytest.approx([0.05, 0.065, 0.025], rel=2e-3)
@@ -138,7 +138,7 @@ def test_the_scale_of_an_inertia_needs_a_torque_that_is_known():
     fit = told_of(scenario(GYRO, FIELD, DIPOLE), INERTIA, "part.residual-dipole.dipole", BIAS, commands="none")
     (sentence,) = fit.posterior.sentences
     assert "the common scale of spacecraft.inertia, part.residual-dipole.dipole" in sentence
-    assert fit.posterior.is_told.tolist() == [False] * 6 + [True] * 3
+    assert fit.posterior.is_determined.tolist() == [False] * 6 + [True] * 3
     assert list(fit.learnt().table.campaign.over) == [", ".join(f"{BIAS}[{k}]" for k in (1, 2, 3))]
 
 

@@ -16,6 +16,7 @@ import starhold as sh
 from starhold.scenario.reading import builtin_names, builtin_text
 from starhold.scenario.writing import toml_text
 from tests.refusals import refused
+from tests.tiers import leading
 
 BODY = {
     "name": "made",
@@ -168,7 +169,9 @@ def test_what_notebooks_show_is_short():
     assert repr(sh.design(made)[0]).startswith("<Design form 2.1: lqr II; k_rate")
 
 
-@pytest.mark.parametrize("before", ["", "import starhold.scenario.reading", "import starhold as sh; sh.load('three-laws')"])
+@pytest.mark.parametrize(
+    "before", leading(["import starhold.scenario.reading", "", "import starhold as sh; sh.load('three-laws')"])
+)
 def test_the_package_of_scenarios_is_called_whatever_is_imported_first(before):
     code = f"{before}\nimport starhold as sh\nfrom starhold.scenario.reading import parse\nprint(sh.scenario({BODY!r}).name)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

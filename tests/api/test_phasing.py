@@ -15,7 +15,7 @@ from tests.running import starhold
 from tests.tiers import leading
 
 LOOPS = ("cubesat-nadir", "three-laws", "cubesat-detumble")
-EASY, PLANTED = 16, 200
+EASY, PLANTED = 8, 200
 
 
 @cache

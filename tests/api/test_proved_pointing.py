@@ -61,6 +61,7 @@ def proved_of(scenario):
     return prove_pointing(scenario, loop_of(scenario))
 
 
+@pytest.mark.slow
 def test_flights_from_the_set_of_an_even_v_begin_on_the_side_of_the_target():
     """On the other side the same V may increase: there motions turn the long way round a half turn."""
     (tried,) = certify_scenario(load("wheels-orbital"), "uncompensated")

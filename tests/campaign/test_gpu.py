@@ -13,6 +13,7 @@ from starhold.simulation.lanes import ThreadPool
 from starhold.trace.device import Device
 from tests.campaign.flown import SMALL, normal, short, uniform
 from tests.refusals import refused
+from tests.tiers import leading
 from tests.trace.machines import need_target
 from tests.trace.ptx_machine import Driver
 
@@ -91,7 +92,7 @@ def campaign(**more):
     return sh.campaign(few(), runs=4, over={"initial.rate": normal(0.01)}, law="lyapunov", search=False, gpu=True, **more)
 
 
-@pytest.mark.parametrize("run", [0, 3])
+@pytest.mark.parametrize("run", leading([3, 0]))
 def test_other_bits_are_refused(run, driver, monkeypatch):
     plainly = driver.cuMemcpyDtoH
 

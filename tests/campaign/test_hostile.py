@@ -12,6 +12,7 @@ from starhold.report.campaign_page import write_campaign
 from tests.campaign.flown import SMALL, fly, normal, short, small, uniform
 from tests.parts.files import ENVIRONMENT
 from tests.refusals import refused
+from tests.tiers import leading
 
 NORMAL = normal(0.01)
 
@@ -59,7 +60,7 @@ def test_a_metric_that_no_run_has_is_searched_without_a_warning(tmp_path, brief)
     assert math.isnan(found.laws[0].brackets[0].flown)
 
 
-@pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube", "morris", "saltelli"])
+@pytest.mark.parametrize("sampling", leading(["sobol", "morris", "saltelli", "latin-hypercube"], 2))
 def test_designs_are_flown_to_their_indices(tmp_path, sampling):
     over = {"spacecraft.inertia[3]": uniform(3.9, 4.1), "law.pd.k_rate": uniform(1.0, 3.0)}
     asked = [{"metric": "final_rate_error", "at_most": 1, "share": 0.5}]

@@ -1,5 +1,6 @@
 """Random loops of which a pointing bound is proved, and flights that are steered against it: `python -m
-tests.certification.pointing_hunt SEED COUNT` prints what came of each."""
+tests.certification.pointing_hunt SEED COUNT [TOLERANCE]` prints what came of each; a TOLERANCE of "plans": of
+loops with the predictive law."""
 
 import json
 import math
@@ -20,8 +21,9 @@ from starhold.scenario.reading import parse
 from starhold.simulation.lanes import simulate_many
 from starhold.studies.bodies.rigid_body import wanted_of
 from tests.certification.hunt import EARTH, random_inertia, unit
-from tests.kernel.flights import Fleet, Surroundings, along, times, turn
+from tests.kernel.flights import Fleet, Surroundings, along, cross, times, turn
 from tests.kernel.oracle import Oracle
+from tests.kernel.planned import Planned as Plans
 from tests.kernel.programs import run
 
 LANES, PERIODS, SETTLED = 96, 2000, 40.0
@@ -29,9 +31,9 @@ LANES, PERIODS, SETTLED = 96, 2000, 40.0
 how flights on target begin."""
 
 
-def random_loop(random):
+def random_loop(random, plans=False):
     """The text of a scenario of which a pointing bound may be proved: inertia, orbit, target, wheels, law, gains, period,
-    start, and the parts that disturb, measure and estimate, all at random."""
+    start, and the parts that disturb, measure and estimate, all at random. plans: its law is the predictive one."""
 
     def some(*choices):
         return choices[int(random.integers(len(choices)))]
@@ -70,10 +72,17 @@ def random_loop(random):
         lines += [f'momentum_limit = "{size(0.5, 10.0) * w * scale:.6g} N m s"']
         lines += [f"viscous = {size(1e-6, 1e-3) * w * rotor:.6g}", f"coulomb = {size(1e-6, 1e-3) * k:.6g}"] * some(0, 1)
     law = some("lyapunov", "wheel", "wheel") if wheels else some("lyapunov", "lyapunov", "pd", "matrix-pd", "lqr", "wheel")
+    law = "mpc" if plans else law
     lines += [*parts_of(random, some, size, numbers, orbit, wheels, k, w, period)]
     lines += ["[simulation]", f"duration = {100.0 * period!r}", f"control_period = {period!r}"]
     lines += ["[certify]", f"disturbance = {size(1e-6, 3e-2) * k:.6g}", "[[law]]", f'type = "{law}"']
     lines += [f'quaternion_sign = "{some("as_published", "shortest", "hysteresis")}"']
+    if plans:
+        # Gains of about this stiffness and damping.
+        weights = [f"q_rate = {(d / k * random.uniform(0.2, 1.2)) ** 2:.6g}", f"r = {1.0 / k**2:.6g}", "q_attitude = 1.0"]
+        horizon, terminal = int(random.integers(1, 13)), some("riccati", "riccati", "riccati", "stage")
+        weights += [f"horizon = {horizon}", f'terminal = "{terminal}"', f'limit = "{some("axis", "norm")}"']
+        return "\n".join([*lines, *weights]) + "\n"
     if law in ("lyapunov", "pd"):
         return "\n".join([*lines, f"k_rate = {d:.6g}", f"k_attitude = {k:.6g}"]) + "\n"
     spread = random.uniform(0.7, 1.4, size=3) if some(0, 1) else np.ones(3)
@@ -129,6 +138,8 @@ def parts_of(random, some, size, numbers, orbit, wheels, k, w, period):
 class Attack(Oracle):
     """Flights against a pointing claim: one half begins on the border of its set, one half on target."""
 
+    longest = PERIODS
+
     def __init__(self, content, claim, seed, lanes=LANES):
         super().__init__(content, claim, seed)
         self.lanes = lanes
@@ -143,7 +154,7 @@ class Attack(Oracle):
             return run(self.programs["law"], given)
 
         found = Fleet(
-            self.J, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
+            self.true, law, n["period"], n["outside"], n["error"], self.slow, int(self.rng.integers(10**6)), self.lanes
         )
         found.growing = n.get("outside.per.rate", 0.0), n.get("error.per.rate", 0.0)
         found.around = Surroundings(
@@ -184,7 +195,7 @@ class Attack(Oracle):
         begin = (np.concatenate([np.array(part).T, np.tile(rest[:, None], half)], axis=1) for part, rest in zip(
             zip(*states, strict=True), (np.eye(4)[0], np.zeros(3)), strict=True))  # fmt: skip
         near = np.arange(self.lanes) >= half
-        periods = int(min(n["settling"] / h + 300, PERIODS))
+        periods = int(min(n["settling"] / h + 300, self.longest))
         extremal, usual = self.extremal(periods), fleet.push
 
         def push(k, q, w):
@@ -226,45 +237,73 @@ def flown(loop, claim, random, lanes=128):
     return worst
 
 
-def proved_loop(seed, folder):
+class Planned(Attack):
+    """Flights of a law that plans, whose torque is that of the best plan, and how far this is from the program as a share of
+    what is claimed, and from its limits. They are short, because the motion is sampled anew for each lane and period."""
+
+    longest = 300
+
+    def fleet(self):
+        fleet, plan, self.shares = super().fleet(), Plans(self.subject, self.numbers, self.J), [0.0, 0.0]
+        program, n = fleet.law, along(self.rng.normal(size=(3, self.lanes)))
+
+        def law(q, w, *around):
+            _, r, a, _ = around or [np.zeros(w.shape)] * 4
+            ahead = cross(w + r, self.J @ (w + r)) - cross(w, self.J @ w) + self.J @ (a - cross(w, r))
+            torques = plan.torques(q, w, n, ahead)
+            off = np.linalg.norm(torques[0] - program(q, w, *around), axis=0).max() / self.numbers["plan.error"]
+            self.shares = [max(pair) for pair in zip(self.shares, (off, plan.exceeded(torques)), strict=True)]
+            return torques[0]
+
+        fleet.law = law
+        return fleet
+
+    def worst(self):
+        found, reached = super().worst()
+        if max(self.shares) > 1.0 and not found:
+            found = f"the plan is {self.shares} of its bounds"
+        return found, reached
+
+
+def proved_loop(seed, folder, tolerance=None, plans=False):
     """A random loop with its text and its claim; or why there is none, in place of the claim."""
-    text = random_loop(np.random.default_rng(seed))
+    text = random_loop(np.random.default_rng(seed), plans)
     try:
         scenario = parse(text, "hunted.toml", folder)
         loop = build(scenario, scenario.laws[0])
     except InputError as reason:
         return None, text, f"refused: {reason}"
-    certificate = certify(loop, "hunted", replace(wanted_of(scenario, True), alone=True))
+    certificate = certify(loop, "hunted", replace(wanted_of(scenario, True), alone=True, inertia_tolerance=tolerance))
     claim = certificate.claim("pointing")
     if claim is None or claim.outcome != "proved":
         why = [o.evidence.get("reason", "") for one in certificate.claims for o in one.obligations]
-        return loop, text, "undecided: " + "; ".join(why)
+        return loop, text, "undecided: " + "; ".join(why or [certificate.unflown])
     return loop, text, claim
 
 
-def hunted(seed, folder):
+def hunted(seed, folder, tolerance=None, plans=False):
     """What became of a random loop: the text, why there is no claim or "", what contradicts it or "", and shares."""
-    _, text, claim = proved_loop(seed, folder)
+    _, text, claim = proved_loop(seed, folder, tolerance, plans)
     if isinstance(claim, str):
         return text, claim, "", None
-    found, reached = Attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, seed).worst()
+    attack, lanes = (Planned, LANES // 3) if plans else (Attack, LANES)
+    found, reached = attack({"programs": dict(claim.proof.programs)}, claim.proof.claim, seed, lanes).worst()
     return text, "", found, (claim, reached)
 
 
-def main(first, count):
+def main(first, count, tolerance=None, plans=False):
     """Print a line for each loop, and how many of each kind there were."""
     begun, tally = time.time(), dict.fromkeys(("refused", "undecided", "proved", "broken"), 0)
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(first, first + count):
-            text, why, found, more = hunted(seed, Path(folder))
+            text, why, found, more = hunted(seed, Path(folder), tolerance, plans)
             kind, shown = why.split(":")[0] or "proved", why
             if more:
                 claim, (V, angle, rate) = more
+                kept = f"share {claim.numbers['share']} off {claim.numbers.get('tolerance', 0.0)}"
                 n = claim.numbers
                 ends = f"{math.degrees(n['angle']):.3g} of {math.degrees(n['slew_angle']):.3g} deg"
-                shown = (
-                    f"V {V:.3f} angle {angle:.3f} rate {rate:.3f}, {ends}, share {n['share']} {found and 'BROKEN ' + found}"
-                )
+                shown = f"V {V:.3f} angle {angle:.3f} rate {rate:.3f}, {ends}, {kept} {found and 'BROKEN ' + found}"
             tally[kind] += 1
             tally["broken"] += bool(found)
             law = text.rsplit('type = "', 1)[1].split('"')[0]
@@ -273,4 +312,5 @@ def main(first, count):
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:3]))
+    asked = sys.argv[3:4]
+    main(*map(int, sys.argv[1:3]), *([None, True] if asked == ["plans"] else map(float, asked)))

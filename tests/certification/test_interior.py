@@ -5,9 +5,11 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from starhold.certification.evidence import squares
 from starhold.certification.evidence.interior import most_definite
+from starhold.certification.evidence.sparse import Entries, entries_of
 from starhold.certification.evidence.sums import Guess
 from starhold.kernel.polynomials import Poly, var
 from starhold.kernel.rules import Sum
@@ -40,7 +42,7 @@ def test_the_margin_is_that_of_clarabel(seed):
     by_clarabel, here = squares.optimum(A, b, signed, blocks, twice), most_definite(A, b, signed, blocks)
     margin = here[-1]
     assert 0.75 * by_clarabel[-1] < margin < by_clarabel[-1] * (1.0 + 1e-6)
-    assert np.abs(A @ here - b).max() < 0.01 * margin
+    assert np.abs(A.dense() @ here - b).max() < 0.01 * margin
     assert here[0] > 0.99 * margin
     first = A.shape[1] - 1 - sum(map(len, blocks))
     for pairs in blocks:
@@ -49,6 +51,19 @@ def test_the_margin_is_that_of_clarabel(seed):
             gram[i, k] = gram[k, i] = v
         assert np.linalg.eigvalsh(gram)[0] > 0.99 * margin
         first += len(pairs)
+
+
+def test_matrices_are_in_memory_as_those_of_scipy():
+    A = programs(np.random.default_rng(2), True)[0]
+    below = Entries([2, 0], [1, 3], [-5.0, 7.0], (3, A.shape[1]))
+    for ours in (A, below, A.above(below), entries_of(A.dense())):
+        theirs = sparse.csc_matrix(ours.dense())
+        made = ours.compressed()
+        assert (made.data.tobytes(), made.shape) == (theirs.data.tobytes(), theirs.shape)
+        assert [*made.indices] == [*theirs.indices]
+        assert [*made.indptr] == [*theirs.indptr]
+        assert (ours.scipy() != theirs).nnz == 0
+    assert (A.above(below).dense() == np.vstack([A.dense(), below.dense()])).all()
 
 
 def test_what_is_no_sum_has_no_margin():

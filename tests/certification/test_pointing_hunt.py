@@ -52,3 +52,13 @@ def test_extremal_flights_of_the_cubesat_end_near_its_bound(law, least, tmp_path
     content = json.loads(write_proofs([certificate], "nadir", tmp_path).read_text(encoding="utf-8"))
     assert (tmp_path / FILE).exists()
     assert least < reached(content, content["claims"][0], 5000, 128) <= 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [91004, 91012, 92006, 92008])
+def test_no_flight_breaks_the_claim_of_a_random_loop_that_plans(seed, tmp_path):
+    """The torque is that of the best plan, which keeps within its limits and near the program."""
+    _, why, found, more = hunted(seed, tmp_path, plans=True)
+    assert (why, found) == ("", "")
+    _, shares = more
+    assert max(shares) > 0.1

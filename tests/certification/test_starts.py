@@ -3,6 +3,8 @@
 import random
 from fractions import Fraction
 
+import pytest
+
 from starhold.certification.certify import certify
 from starhold.certification.evidence import squares, starts
 from starhold.certification.evidence.starts import likely
@@ -42,6 +44,7 @@ def test_floats_tell_nothing_where_entries_of_the_matrix_share_a_monomial():
     assert likely(Squares(poly(1) - dot(Q[1:], Q[1:]), z, 0, [], [dot(Q, Q) - 1]), {}) is None
 
 
+@pytest.mark.slow
 def test_what_is_proved_in_vain_is_counted(monkeypatch):
     """Where a start set is looked for, no sum of squares is made exact, and V is followed over few periods."""
     counts = {"falls": 0, "exact": 0, "likely": 0}

@@ -112,7 +112,7 @@ def test_the_wheel_law_converges_almost_always_whatever_the_wheels_store(gains, 
     assert certificate.outcome == "proved"
     main = certificate.claim("convergence")
     assert main.numbers["everything"]
-    assert [o.name for o in main.obligations][-1] == "rests at half turns only"
+    assert [o.name for o in main.obligations][-1] == "V is non-increasing"
     assert certificate.claim("inertia").numbers["tolerance"] is None
     assert "half turns" in sentence(main, certificate.subject)
 

@@ -1,4 +1,4 @@
-"""A command is declared in one file: all that offers commands has it from there."""
+"""A command is declared in one file, whichever its kind: all that offers commands has it from there."""
 
 import json
 import os
@@ -34,7 +34,18 @@ COMMAND = Command(
     "Tell the gains.", "told", study, present, options={"for_so_long": Option("simulation.duration", "how long")}
 )
 '''
+WRITTEN = '''"""A command that only says something."""
+
+
+def say(word: str, twice: bool = False) -> None:
+    """Say a word."""
+    print(" ".join([word] * (1 + twice)))
+
+
+COMMANDS = {"say": say}
+'''
 WORDS = {
+    "said": ["say", "so", "--twice"],
     "all": ["--help"],
     "help": ["tell-gains", "--help"],
     "done": ["tell-gains", "short.toml", "--law", "lyapunov", "--for-so-long", "0.1 min"],
@@ -42,8 +53,10 @@ WORDS = {
 }
 EXTENDED = """
 import json, sys
+from starhold.cli import commands as written
 from starhold.report import commands
 commands.__path__.append("more")
+written.__path__.append("written")
 import starhold as sh
 from starhold.report.results import MARKS
 from starhold.studio.worker import KINDS
@@ -59,6 +72,8 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("one-file")
     (folder / "more").mkdir()
     (folder / "more" / "tell_gains.py").write_text(FILE, encoding="utf-8")
+    (folder / "written").mkdir()
+    (folder / "written" / "saying.py").write_text(WRITTEN, encoding="utf-8")
     (folder / "short.toml").write_text(SHORT, encoding="utf-8")
     return folder
 
@@ -89,6 +104,11 @@ def test_the_command_line_has_a_command_from_one_file(folder, told):
     assert code == 2
     assert "results already there" in text
     assert {"tell-gains.csv", "tell-gains.png"} <= set(told["marks"])
+
+
+def test_a_command_that_is_a_function_is_one_file_too(told):
+    assert told["all"][1].index("schema") < told["all"][1].index("Say a word.")
+    assert told["said"] == [0, "so so\n"]
 
 
 def test_python_and_the_studio_have_it_too(told):

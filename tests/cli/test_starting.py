@@ -11,13 +11,13 @@ from tests.cli.short import SHORT
 from tests.tiers import leading
 
 COUNTED = """
-import json, sys
+import json, os, sys
 from pathlib import Path
 from starhold.cli import main, show
 from starhold.trace.recording import Recorder
 
-found, counts = {}, {"recorded": 0, "loops": 0}
-begin, program, told = Recorder.__init__, Recorder.program, show.print_outcome
+found, counts = {}, {"recorded": 0, "loops": 0, "processes": 0}
+begin, program, told, fork = Recorder.__init__, Recorder.program, show.print_outcome, os.fork
 
 
 def note(what):
@@ -35,12 +35,17 @@ def made(recorder, name, *given):
     return program(recorder, name, *given)
 
 
+def forked():
+    counts["processes"] += 1
+    return fork()
+
+
 def printed(flights):
     told(flights)
     note("table")
 
 
-Recorder.__init__, Recorder.program, show.print_outcome = begun, made, printed
+Recorder.__init__, Recorder.program, show.print_outcome, os.fork = begun, made, printed, forked
 sys.argv = ["starhold", *sys.argv[1:]]
 code = main.run_command()
 note("end")
@@ -79,7 +84,7 @@ def test_the_table_waits_for_nothing_that_it_does_not_need(words, loops, recorde
     assert packages(table["modules"]) & LARGE == mpc
     # Of several laws the first are written while the last waits to fly.
     assert {*table["modules"]} & LATER == ({"h5py"} if loops > 1 else set())
-    assert len(table["modules"]) < (1300 if loops > 1 else 758)
+    assert len(table["modules"]) < (1300 if loops > 1 else 762)
     # Flights, their notes and what the laws compute first; calls are timed elsewhere, and what the page asks comes after.
     assert (table["recorded"], table["loops"]) == (recorded, loops)
     assert table["drawn"] == []
@@ -87,8 +92,45 @@ def test_the_table_waits_for_nothing_that_it_does_not_need(words, loops, recorde
     assert end["loops"] == loops
     assert end["recorded"] <= 30 * loops
     assert end["drawn"] == sorted(["report.html", *(f"{name}.png" for name in PICTURES)])
+    # One draws, one times the laws' calls.
+    assert end["processes"] == 2
     assert not {"matplotlib", "plotly", "sympy", "xarray", "pandas"} & packages(end["modules"])
-    assert not {"scipy.optimize", "scipy.special", "scipy.stats"} & {*end["modules"]}
+    assert not {"scipy.optimize", "scipy.sparse", "scipy.special", "scipy.stats"} & {*end["modules"]}
+    assert len(end["modules"]) < 1075
+
+
+STARTED = """
+import json, sys
+from starhold.cli import main
+from starhold.report.painter import Painter
+
+
+def started(painter):
+    print(json.dumps(sorted(sys.modules)))
+    raise SystemExit
+
+
+Painter._start = started
+sys.argv = ["starhold", "run", "three-laws"]
+main.run_command()
+"""
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="it starts early where there is another processor")
+def test_the_process_that_draws_begins_to_load_before_the_scenario_is_read(tmp_path):
+    done = subprocess.run([sys.executable, "-c", STARTED], cwd=tmp_path, capture_output=True, text=True)
+    modules = json.loads(done.stdout)
+    assert not packages(modules) & {*LARGE, "numpy", "llvmlite", "rich"}
+    assert "starhold.scenario.reading" not in modules
+
+
+def test_what_is_in_use_is_not_collected_at_the_end(tmp_path):
+    # Handlers run before the interpreter collects, several times through all that was loaded.
+    code = "import atexit, gc, sys; atexit.register(lambda: print(len(gc.get_objects()), gc.get_freeze_count()))\n"
+    code += "from starhold.cli.main import main; sys.argv = ['starhold', '--help']; main()"
+    said = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True).stdout
+    left, frozen = map(int, said.splitlines()[-1].split())
+    assert left < 0.02 * frozen
 
 
 @pytest.mark.slow
@@ -123,9 +165,9 @@ def words_after(folder, typed):
 
 def assert_light(modules):
     assert not packages(modules) & {*LARGE, "numpy", "pydantic", "rich", "multiprocessing", "llvmlite", "flint", "h5py"}
-    # And one light file for each study.
-    studies = [name for name in modules if name.startswith("starhold.report.commands.")]
-    assert len([name for name in modules if name.startswith("starhold") and name not in studies]) < 19
+    # Beside the light files that declare commands.
+    rest = [name for name in modules if not name.startswith(("starhold.report.commands.", "starhold.cli.commands."))]
+    assert len([name for name in rest if name.startswith("starhold")]) < 11
 
 
 @pytest.mark.parametrize("option", ["--version", "--help"])

@@ -53,8 +53,12 @@ POINTING = {
     "calm": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(3))),
     "skew": ((SKEW, K_RATE, K_ATTITUDE, 0.25), (7.9e-7, WHEEL_ERROR, math.radians(10))),
     "noisy": (([0.05, 0.065, 0.025], K_RATE, K_ATTITUDE, 0.25), (7.9e-7, 0.0, math.radians(10))),
+    "half turn": (([2.0, 3.0, 4.0], 0.09, 0.009, 0.5), (1e-8, 0.0, math.radians(178))),
+    "overdamped": (([1.0, 1.0, 1.0], 1.95, 0.75, 1.0), (1e-6, 0.0, math.radians(0.5))),
 }
 """Inertia, gains and period; outside torque, error of the command, and the start."""
+ERRORS = {"half turn": 0.05}
+"""By how much the attitude is off that laws are told (rad)."""
 KALMAN = {"noise": 2e-5, "bias_walk": 1e-5, "cross": "10 arcsec", "roll": "60 arcsec", "boresight": [0, -1, 0]}
 NOISY = {
     "noisy": [
@@ -82,7 +86,7 @@ def flying(name):
     given = sh.scenario({"spacecraft": {"inertia": inertia}, "part": NOISY.get(name, [])} | kept)
     loop = Loop(make_subject(build(given, given.laws[0])))
     outside, error, *start = told
-    assert Pushed(loop, Pushes(outside, command=error), noisy=True).find(*start), loop.failed
+    assert Pushed(loop, Pushes(outside, attitude=ERRORS.get(name, 0.0), command=error), noisy=True).find(*start), loop.failed
     return loop
 
 

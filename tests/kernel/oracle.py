@@ -24,6 +24,8 @@ def turned(rng, least=-1.0):
 
 
 class Oracle(Driven):
+    """`J` is the inertia that the claim gives, `true` that of the body, which differs from it by the claim's tolerance."""
+
     def __init__(self, content, claim, seed=0):
         self.claim, self.rng = claim, np.random.default_rng(seed)
         self.programs = {role: written(content["programs"][name]) for role, name in claim["programs"].items()}
@@ -37,6 +39,7 @@ class Oracle(Driven):
             self.J = np.array([[self.subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in range(3)] for i in range(3)])
         if "near the inertia" in claim["theorem"]:
             self.J = self.near(self.J)
+        self.true = self.near(self.J) if claim["theorem"] == "points" and "tolerance" in self.numbers else self.J
         self.words = claim["taken"]
 
     def near(self, J):
@@ -61,7 +64,7 @@ class Oracle(Driven):
         return np.array([self.rng.choice([-1, 1]) * self.numbers.get(f"outside.{k}", 1e-3) for k in range(3)])
 
     def inputs(self, q, w, e, r, a, H):
-        h = H - self.J @ (w + r) if "wheels" in self.words else np.zeros(np.shape(w))
+        h = H - self.true @ (w + r) if "wheels" in self.words else np.zeros(np.shape(w))
         told = {
             "attitude": q, "rate": w, "body_rate": w + r, "target_rate": r, "target_acceleration": a - cross(w, r),
             "external_torque": e, "position": self.rng.normal(size=3), "wheel_momentum": h,

@@ -23,7 +23,7 @@ WRITTEN = {
 }
 
 
-@pytest.fixture(scope="module", params=[*WRITTEN])
+@pytest.fixture(scope="module", params=leading(WRITTEN))
 def made(request, tmp_path_factory):
     """A folder that a command wrote a certificate and the kernel into."""
     folder = tmp_path_factory.mktemp(request.param)

@@ -11,13 +11,15 @@ from functools import cache
 import numpy as np
 import pytest
 
+import starhold as sh
 from starhold.analysis.trial import BrokenClaimError, fly_claims
 from starhold.certification.certificate import Certificate, write
 from starhold.certification.certify import Wanted, certify
 from starhold.certification.comparison import differences
+from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.claims import find_claims
 from starhold.certification.evidence.finding import certificate as of_claims
-from starhold.certification.evidence.refuted import REFUTING, find_refuted
+from starhold.certification.evidence.refuted import REFUTING, against_far, find_refuted
 from starhold.certification.proofs import proved_claims
 from starhold.certification.subject import make_subject
 from starhold.checker import check_file, passed
@@ -28,6 +30,7 @@ from starhold.kernel.theorems import THEOREMS, refuted
 from starhold.laws import lqr, matrix_pd, pd
 from starhold.laws.sliding import Gains as Sliding
 from starhold.parts.environments.gravity_gradient import gravity_gradient
+from starhold.scenario.building import build
 from tests.certification.loops import FULL, LOPSIDED, PRINCIPAL, UNEVEN, loop_of
 from tests.kernel.certificates import text
 from tests.kernel.mutations import refusals
@@ -316,3 +319,9 @@ def test_nothing_false_is_accepted(name):
         return Against(content, claim).holds()
 
     assert refusals(content_of(name), random.Random(name), count, true) > count / 4
+
+
+def test_where_v_rises_nowhere_nothing_is_refuted():
+    given = sh.load("three-laws")
+    loop = Loop(make_subject(build(given, given.pick("lyapunov"))))
+    assert not against_far(loop, 0.1)

@@ -152,9 +152,7 @@ def test_what_cannot_be_recorded_is_told_in_one_line(kind, tmp_path):
 def test_a_law_of_another_package_that_does_not_load_is_left_out_with_a_warning(monkeypatch):
     points = [("broken", "no_such_package.law", "parts"), ("incomplete", "json", "parts"), ("old", "my_law", "laws")]
     offered = [EntryPoint(name, module, f"starhold.{group}") for name, module, group in points]
-    monkeypatch.setattr(
-        "starhold.parts.catalogue.entry_points", lambda group: [one for one in offered if one.group == group]
-    )
+    monkeypatch.setattr("starhold.parts.catalogue.entries", lambda group: [one for one in offered if one.group == group])
     with pytest.warns(UserWarning, match="is left out") as told:
         found = _installed.__wrapped__()
     assert set(found) == set(_installed())

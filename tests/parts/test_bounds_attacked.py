@@ -327,7 +327,7 @@ def test_every_part_that_says_a_bound_is_attacked():
 def climbed(share, x, random):
     """The largest share near states, by random steps that shrink."""
     best, step = share(x), 0.5
-    for _ in range(60):
+    for _ in range(fewer(60, 3)):
         tried = x + step * random.normal(size=x.shape) * (random.uniform(size=x.shape) < 0.5)
         found = share(tried)
         better = found > best

@@ -1,14 +1,22 @@
 """Magnetorquers and what they unload: against SciPy in the field of an independent implementation, and the balance of the
 angular momentum."""
 
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import starhold as sh
+from starhold.algebra.scalar import absolute, clip, maximum
+from starhold.algebra.several import each
+from starhold.algebra.vector import scale
 from starhold.parts.effectors.layouts import pyramid
 from starhold.parts.effectors.magnetorquers import dipole_for, within
 from starhold.scenario.reading import parse
+from starhold.trace.calling import Compiled
 from tests.making import spun
 from tests.missions import cubesat
 from tests.texts import toml
@@ -40,6 +48,31 @@ def test_the_body_turns_as_scipy_says_under_the_recorded_dipoles():
 
         _, end = spun(torque, (0.0, 0.5), attitude[k], rate[k], np.diag(INERTIA))
         assert np.abs(end[-1] - rate[k + 1]).max() < 1e-9
+
+
+def reduced_always(dipole, limit):
+    """The dipole by the formula for one that exceeds its limit, with no branch."""
+    x, y, z = (absolute(m) / most for m, most in zip(dipole, limit, strict=True))
+    return scale(1.0 / maximum(maximum(maximum(x, y), z), 1.0), dipole)
+
+
+WITHIN = Compiled(lambda dipole, limit: within(dipole, limit, 0), (0.0,) * 3, (0.0,) * 3)
+WHOLE = Compiled(lambda dipole, limit: each(clip, (reduced_always(dipole, limit), limit)), (0.0,) * 3, (0.0,) * 3)
+dipoles = st.one_of(st.floats(-1.5, 1.5), st.sampled_from([0.0, -0.0, 0.3, -0.3, 5e-324, math.inf, -math.inf, math.nan]))
+limits = st.sampled_from([0.0, 1e-308, 0.1, 0.3, 1.0, math.inf])
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(*[dipoles] * 3, *[limits] * 3), min_size=1, max_size=16))
+def test_a_dipole_within_its_limits_has_the_bits_that_the_formula_for_others_gives(cases):
+    """Alone, and in lanes of which some exceed theirs."""
+    columns = np.array(cases).T
+    expected = WHOLE.over(columns)
+    alone = np.array([WITHIN(case[:3], case[3:]) for case in cases]).T
+    for found in (alone, WITHIN.over(columns)):
+        assert np.array_equal(np.isnan(found), np.isnan(expected))
+        known = ~np.isnan(expected)
+        assert np.array_equal(found[known].view(np.uint64), expected[known].view(np.uint64))
 
 
 def test_a_dipole_gives_what_lies_across_the_field_and_no_more_than_it_can():

@@ -13,10 +13,11 @@ from scipy.stats import kstest, norm
 
 from starhold.algebra.words import bits_of, with_bits
 from starhold.parts.random import (
+    Dice,
+    Silent,
     _joined,
     _reduced,
     cosine_and_sine,
-    normal_vector,
     normals,
     threefry,
     to_angle,
@@ -24,6 +25,8 @@ from starhold.parts.random import (
     transform,
 )
 from starhold.trace.calling import Compiled
+from starhold.trace.program import Call, Op
+from starhold.trace.rows import RowRecorder
 
 ONES = 2**64 - 1
 FRACTION = 2**52 - 1
@@ -74,7 +77,7 @@ def squared_radius(x):
 
 
 FOUR, TWO = (0.0,) * 4, (0.0,) * 2
-THREEFRY = Compiled(on_bits(shown(lambda k0, k1, c0, c1: threefry((k0, k1), (c0, c1)))), *FOUR)
+THREEFRY = Compiled(on_bits(shown(lambda k0, k1, c0, c1: threefry((k0, k1), (c0, c1))[0])), *FOUR)
 UNIFORM = Compiled(on_bits(lambda word: (to_unit(word), to_angle(word))), 0.0)
 TRANSFORM = Compiled(on_bits(transform), *TWO)
 NINE = Compiled(on_bits(lambda seed, run, step: normals((seed, run), step, 0, 9)), *(0.0,) * 3)
@@ -88,7 +91,7 @@ def fast_threefry(key, counter):
 
 @pytest.mark.parametrize(("counter", "key", "answer"), KNOWN)
 def test_known_answers(counter, key, answer):
-    assert threefry(key, counter) == answer
+    assert threefry(key, counter) == (answer,)
     assert fast_threefry(key, counter) == answer
     on_lanes = THREEFRY.over(doubles(*([w] * 9 for w in (*key, *counter)))).view(np.uint64)
     assert [tuple(map(int, lane)) for lane in on_lanes.T] == [answer] * 9
@@ -96,8 +99,9 @@ def test_known_answers(counter, key, answer):
 
 @given(*[st.integers(-(2**70), 2**70)] * 4)
 def test_any_integer_stands_for_a_word_in_compiled_code_too(k0, k1, c0, c1):
-    found = threefry((k0, k1), (c0, c1))
-    assert found == threefry((k0 & ONES, k1 & ONES), (c0 & ONES, c1 & ONES)) == fast_threefry((k0, k1), (c0, c1))
+    (found,) = threefry((k0, k1), (c0, c1))
+    assert (found,) == threefry((k0 & ONES, k1 & ONES), (c0 & ONES, c1 & ONES))
+    assert found == fast_threefry((k0, k1), (c0, c1))
     assert all(0 <= word <= ONES for word in found)
 
 
@@ -219,14 +223,36 @@ def test_a_number_does_not_depend_on_what_else_is_drawn():
 
 def test_a_number_is_one_of_the_two_of_its_call():
     for number in range(10):
-        assert normals((4, 5), 6, number, 1) == transform(*threefry((4, 5), (6, number // 2)))[number % 2 :][:1]
+        assert normals((4, 5), 6, number, 1) == transform(*threefry((4, 5), (6, number // 2))[0])[number % 2 :][:1]
 
 
 def test_deviation_scales():
-    whole = normal_vector((1, 2), 3, 6, 1.0)
+    dice = Dice((1, 2), 3, 4)
+    whole = dice.vector(2, 1.0)
     assert whole == normals((1, 2), 3, 6, 3)
-    assert normal_vector((1, 2), 3, 6, 0.3) == tuple(0.3 * x for x in whole)
-    assert normal_vector((1, 2), 3, 6, 0.0) == (0.0, 0.0, 0.0)
+    assert dice.vector(2, 0.3) == tuple(0.3 * x for x in whole)
+    assert dice.vector(2, 0.0) == (0.0, 0.0, 0.0)
+
+
+def test_vectors_together_are_those_one_by_one():
+    dice = Dice((1, 2), 3, 4)
+    assert dice.vectors(1, 0.5, 2.0, 3.0) == (dice.vector(1, 0.5), dice.vector(4, 2.0), dice.vector(7, 3.0))
+    assert Silent().vectors(1, 0.5, 2.0) == ((0.0,) * 3,) * 2
+
+
+def test_vectors_together_cost_three_calls_side_by_side_and_one_transform():
+    recorder = RowRecorder()
+    with recorder.recording():
+        given, out = recorder.memory("given"), recorder.memory("out", writable=True)
+        key = (recorder.input("seed", "word"), recorder.input("run", "word"))
+        first, second = Dice(key, 3, 0).vectors(0, given[0], given[1])
+        for place, number in enumerate((*first, *second)):
+            out[place] = number
+    body = recorder.program("draws").main.body
+    rounds = [s for s in body if isinstance(s, Op) and s.operation.name == "rotate_left"]
+    assert [s.args[1] for s in rounds[::3]] == [s.args[1] for s in rounds[2::3]]
+    assert len(rounds) == 3 * 20
+    assert [s.rows for s in body if isinstance(s, Call)] == [3]
 
 
 def test_distribution():

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from starhold.algebra.quaternion import relative, stretch
 from starhold.algebra.vector import ZERO, add
 from starhold.parts.environments import random_torque
-from starhold.parts.random import Dice, normal_vector
+from starhold.parts.random import Dice
 from starhold.parts.sensors import gaussian, gyro, magnetometer
 from tests.algebra.readers import quaternions, small_vectors
 from tests.tiers import fewer
@@ -29,7 +29,7 @@ def measured(attitude, rate, deviations, step):
 
 
 def drawn(place, step, deviation):
-    return normal_vector(KEY, step, place, deviation)
+    return Dice(KEY, step, place).vector(0, deviation)
 
 
 @settings(max_examples=30)

@@ -14,6 +14,7 @@ from tests.making import built
 from tests.missions import cubesat
 from tests.refusals import refused
 from tests.texts import toml
+from tests.tiers import WHOLE
 
 RATE, ACCELERATION, PERIOD = math.radians(0.5), math.radians(0.02), 0.5
 LAW = '[[law]]\ntype = "lyapunov"\nk_rate = 0.006\nk_attitude = 0.0008\n'
@@ -100,7 +101,7 @@ def test_a_path_leads_around_the_cone_about_the_sun():
                 built(scenario(f"start = {turns[0].tolist()}\naxis = [3, 0, 4]\nkeep_out = 0.6981317\n", turns[1]))
             continue
         numbers = slew.prepare(params, 5.0)
-        goals = [slew.goal(numbers, None, step, None) for step in range(800)]
+        goals = [slew.goal(numbers, None, step, None) for step in (*range(0, 799, 1 if WHOLE else 5), 799)]
         path = Rotation.from_quat([goal.attitude for goal in goals], scalar_first=True)
         assert np.arccos(path.apply([0.6, 0.0, 0.8]) @ sun).min() > math.radians(39.98)
         assert abs(path[-1].as_quat(scalar_first=True) @ turns[1]) == pytest.approx(1.0, abs=1e-14)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from starhold.cli import reproduce as command
 from starhold.cli.arguments import FAILED_CHECK
+from starhold.cli.commands import reproduce as command
 from starhold.publications.desk import Desk
 from starhold.publications.figure import Curve, Figure, Panel
 from starhold.publications.paper import PAPERS, Paper, folder_of, read_paper, scenario_files

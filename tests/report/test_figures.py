@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from starhold.algebra.cosines import to_angles
 from starhold.analysis.rigid_body import METRICS
 from starhold.report.attitude_plots import KNOWN, collect, early, roll_pitch_yaw, until
 from starhold.report.body import report_of
-from starhold.report.figures import WORD_ROWS, word_rows
+from starhold.report.figures import WORD_ROWS, png, sharing_axes, word_rows
 from starhold.report.plots import COLOURS, Mark, colour, recorded_plots, thin, thin_times
 from starhold.report.text import number_text
 from starhold.report.ticks import as_text, label_ticks
@@ -54,6 +55,34 @@ def test_no_formula_is_parsed_to_label_ticks(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(mathtext.MathTextParser, "parse", noted)
     draw(flown.flights(), tmp_path, flown.scenario())
     assert not parsed
+
+
+def test_figures_of_one_form_share_their_axes_and_are_what_they_are_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    picture = report_of("rigid-body").picture(flown.flights(), flown.scenario())
+    # A logarithmic panel takes the axes of a linear one, one with few decades those of one with many, and the other way.
+    shown: Any = picture
+    log, linear = (shown[name].args[0].panels[0] for name in ("angle", "rate"))
+    few = replace(log, curves=[np.clip(curve, 0.5, 20.0) for curve in log.curves])
+    over_time: Any = picture["rate"]
+    first, times, _, *rest = over_time.args
+    for count, panels in enumerate([(log, linear), (linear, few), (few, log), (linear, linear)]):
+        plot = replace(first, panels=list(panels), dashed="level" * (count % 2))
+        given = plot, times, [Mark(0.5 * times[-1], "")] * (count % 2), *rest[:2], [(0.0, 0.2 * times[-1])] * (count % 2)
+        picture[f"mixed {count}"] = partial(over_time.func, *given)
+    alone = {name: png(make()) for name, make in picture.items()}
+    made: list[Figure] = []
+    begin = Figure.__init__
+
+    def noted(figure: Figure, *given: Any, **more: Any) -> None:
+        made.append(figure)
+        begin(figure, *given, **more)
+
+    monkeypatch.setattr(Figure, "__init__", noted)
+    with sharing_axes():
+        shared = {name: png(make()) for name, make in picture.items()}
+    assert [name for name in picture if shared[name] != alone[name]] == []
+    assert len(made) == 4
+    assert len(picture) == 11
 
 
 RANGES = [[0.25, 1.0], [1e5 + 1e-7, 1e5 + 3e-7], [2e-9, 4e12], [2e-3, 5e-3]]

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from starhold.processes import can_fork
 from starhold.report import body
 from starhold.report.painter import Painter
-from starhold.studies.timing import can_fork
 
 
 @pytest.fixture

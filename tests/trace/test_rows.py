@@ -1,5 +1,6 @@
 """One lane in short vectors: what is recorded for several rows at once, and that it gives the bits of plain Python."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -9,20 +10,21 @@ from hypothesis import strategies as st
 
 from starhold.algebra.scalar import less, sqrt, where
 from starhold.algebra.several import each, folded
-from starhold.algebra.structured import Buffer, repeat
+from starhold.algebra.structured import Buffer, repeat, when
 from starhold.algebra.vector import multiply
 from starhold.algebra.words import bits_of, rotate_left, with_bits, word_and
 from starhold.trace.machine import load
-from starhold.trace.program import Call, Program, statements
-from starhold.trace.rows import ROWS, RowRecorder, unrolled
+from starhold.trace.program import Call, Op, Program, statements
+from starhold.trace.recording import Recorder
+from starhold.trace.rows import ROWS, LanesRecorder, RowRecorder, unrolled
 
 SIZE = 20
 NUMBERS = st.lists(st.floats(-1e9, 1e9), min_size=SIZE, max_size=SIZE)
 
 
-def recorded(equation: Any) -> Program:
+def recorded(equation: Any, recorder: Recorder | None = None) -> Program:
     """The program of an equation of numbers in memory, which are read before and within a loop of two turns."""
-    recorder = RowRecorder()
+    recorder = recorder or RowRecorder()
     with recorder.recording():
         given, out = recorder.memory("given"), recorder.memory("out", writable=True)
         early = tuple(given[k] for k in range(SIZE))
@@ -95,6 +97,42 @@ def test_products_of_matrices_give_the_bits_of_plain_python():
     program = recorded(equation)
     assert [call.rows for call in calls(program)] == [3, 3]
     both_give_the_bits(equation, program)
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 9])
+def test_rows_side_by_side_give_the_bits_of_plain_python(count):
+    """Rows that read what rows before them made, and compute the same as these, are among them."""
+    program = recorded(blended(count), LanesRecorder())
+    assert not calls(program)
+    same_bits(blended(count), program)
+
+
+def _powers(a: Any) -> Any:
+    for _ in range(6):
+        a = a * a
+    return a
+
+
+def test_rows_side_by_side_wait_for_no_other_row():
+    """Rows within rows go side by side too; those that branch stay one after the other."""
+
+    def inner(a: Any, b: Any) -> Any:
+        return each(_powers, ((a, b),))
+
+    def equation(_: Any, late: Any) -> Any:
+        made = each(inner, (late[:3], late[3:6]))
+        branched = each(lambda a: when(less(a, 0.0), lambda a: (a * 3.0,), a)[0], (late[6:8],))
+        return (*(x for pair in made for x in pair), *branched, *late[8:])
+
+    def rounds(recorder: Recorder) -> list[Op]:
+        every = statements(recorded(equation, recorder).main.body)
+        return [s for s in every if isinstance(s, Op) and s.operation.name == "product" and s.args[0] == s.args[1]]
+
+    one_by_one, together = rounds(Recorder()), rounds(LanesRecorder())
+    assert sorted(map(repr, one_by_one)) == sorted(map(repr, together))
+    waits = [sum(b.args[0] == a.ref for a, b in pairwise(ops)) for ops in (one_by_one, together)]
+    assert waits == [6 * 5, 0]
+    same_bits(equation, recorded(equation, LanesRecorder()))
 
 
 def _first(a: Any, b: Any) -> Any:

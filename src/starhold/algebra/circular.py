@@ -32,7 +32,7 @@ def cosine_sine(turns: Scalar) -> tuple[Scalar, Scalar]:
 
 
 def quartered(whole: Scalar, cosine: Scalar, sine: Scalar) -> tuple[Scalar, Scalar]:
-    """Return cosine and sine of an angle and so many quarters of a turn, from -2 to 2, from those of the angle."""
+    """Return cosine and sine of an angle plus `whole` quarter turns, from -2 to 2, from those of the angle."""
     # Two quarters turn both signs, one exchanges cosine and sine.
     size, sense = absolute(whole), side(whole)
     odd, half = less(absolute(size - 1.0), 0.5), less(1.5, size)

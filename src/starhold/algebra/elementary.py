@@ -45,7 +45,7 @@ def _pair(number: Fraction) -> tuple[float, float]:
 
 
 def _shares(count: int, bits: int, number: Fraction) -> tuple[float, ...]:
-    """Return a number as the sum of floats, of so many bits each but the last."""
+    """Split a number into `count` floats that add up to it, each of `bits` bits but for the last."""
     shares: list[float] = []
     for place in range(1, count):
         scale = 1 << bits * place

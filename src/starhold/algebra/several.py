@@ -24,7 +24,7 @@ def each(function: Callable[..., _Value], columns: tuple[tuple[Any, ...], ...], 
     elements of all columns, to the second ones, and so on. The columns are of one length; `shared` goes to every call as it
     is."""
     rows, recorder = [*zip(*columns, strict=True)], RECORDER.get()
-    if recorder is not None and recorder.by_rows:
+    if recorder is not None:
         return recorder.each(function, rows, shared)
     return tuple(function(*row, *shared) for row in rows)
 

@@ -28,8 +28,8 @@ class Noted(NamedTuple):
 
 
 def make_meter(recorded: Mapping[str, Quantity], steps: int, period: float, clock: str) -> Meter:
-    """The meter of these recorded quantities, for flights of so many steps of a period, or for samples at such intervals;
-    clock: the unit of time."""
+    """The meter of these recorded quantities, for flights of `steps` control periods, or for as many samples at such
+    intervals; clock: the unit of time."""
     recorded = _with_size(recorded)
     first = Noted(0.0, 0.0, (0.0,) * len(recorded))
     rows = places(first)

@@ -149,7 +149,7 @@ def _left(certificate: Certificate) -> list[Claim]:
 
 def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
     """Return whether a flight starts outside the claim's set, and when it leaves the set."""
-    left = [*_away(claim, span), *_misled(claim, span), *_swinging(claim, span)]
+    left = [*_away(claim, span), *_misled(claim, span), *_swinging(claim, span), *_unplanned(claim, programs, span)]
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
@@ -188,6 +188,17 @@ def _swinging(claim: Claim, span: Span) -> list[Departure]:
         return span.first(True, "how far its appendages move is not recorded")
     far = bool((np.abs(states[0]) > claim.numbers["begun"]).any())
     return span.first(far, "its appendages move more than the claim is about")
+
+
+def _unplanned(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
+    """Return when the command is farther from the best plan's than is claimed, where the law is told the state as recorded
+    and the target rests."""
+    loop, off = span.loop, claim.numbers.get("plan_error")
+    if off is None or loop.used("sensor") or loop.used("estimator") or loop.target.part.name != "inertial":
+        return []
+    planned = np.broadcast_arrays(*evaluated(programs["law"], measurement=span.shown, craft=loop.known), span["time"])[:3]
+    far = np.linalg.norm(span["command"] - np.transpose(planned), axis=1)
+    return span.first(far > off * (1.0 + 1e-6), "the command is not that of the best plan")
 
 
 def _misled(claim: Claim, span: Span) -> list[Departure]:
@@ -233,8 +244,6 @@ def covered(
 
 def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
     """Return whether the loop starts in the sets of the proved claims about a level of V."""
-    if loop.remembers:
-        return {}
     # The true start, not as measured.
     loop, inside = loop.without("sensor", "estimator"), dict[str, bool]()
     shown = shown_at(loop, loop.start)

@@ -105,7 +105,7 @@ class Noted(NamedTuple):
 def make_meter(
     steps: int, period: float, limit: str, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float
 ) -> Meter:
-    """The meter of flights of so many steps of a period (scaled), or of samples at such intervals, in SI.
+    """The meter of flights of `steps` control periods (scaled), or of as many samples at such intervals, in SI.
 
     limit: how the control is limited; tolerance: scaled distance that counts as near."""
     circle = isinstance(goal, CircleGoal)

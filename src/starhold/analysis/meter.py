@@ -27,7 +27,7 @@ from starhold.simulation.lane import Recording
 from starhold.trace.program import Program
 
 TOLD = "told."
-"""Begins the names of the quantities that the law is told, as sensors or its estimator tell them."""
+"""Begins the names of the quantities that the law is given, as sensors or its estimator report them."""
 LAST = 0.25
 """The share of the run over which chatter and the final error are measured."""
 ALMOST = 1.0 - 1e-9

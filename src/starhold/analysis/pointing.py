@@ -66,7 +66,7 @@ def spacing(runs: int, instants: int, length: int) -> int:
 
 
 def shortfall(apart: int, length: int) -> float:
-    """Bound the share by which the largest relative error is too small where windows begin so many instants apart. A window
+    """Bound the share by which the largest relative error is too small where windows begin `apart` instants apart. A window
     and the next one taken with the same instant differ by k < apart instants at either end. With M the largest relative
     error of all windows their means differ by at most 2 k M / (length - k).
     """

@@ -43,7 +43,7 @@ def begun(masses: Masses | None) -> Any:
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], masses: Any) -> Any:
-    """The notes of an instant. What no part tells, the law is told exactly."""
+    """The notes of an instant. What no part reports is given to the law exactly."""
     if not seen:
         return seen
     attitude, rate = (quantities[name] for name in ("attitude", "rate"))

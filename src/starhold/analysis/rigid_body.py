@@ -143,7 +143,7 @@ def make_meter(
     transient: tuple[float, float] | tuple[()] = (),
     masses: premise_notes.Masses | None = None,
 ) -> Meter:
-    """The meter of flights of so many steps of a period (s), or of samples at such intervals.
+    """The meter of flights of `steps` control periods (s), or of as many samples at such intervals.
 
     limit: how the command is limited; tolerances: of the attitude (rad) and of the rate (rad/s); extras: those of EXTRAS
     that are to be noted; cones: by the names of their metrics; every: control steps in a period; still: the target is at
@@ -240,8 +240,8 @@ def recorded_meter(
     estimated: bool = False,
     transient: tuple[float, float] | tuple[()] = (),
 ) -> Meter:
-    """Return the meter of a recording of so many samples less one, at intervals of `every` control periods (s); with cones,
-    even an empty mapping, the meter for requirements."""
+    """Return the meter of a recording of `steps` + 1 samples, at intervals of `every` control periods (s); with cones, even
+    an empty mapping, the meter for requirements."""
     tolerances = attitude_tolerance, rate_tolerance
     there: Any = {"every": every, "wheels": wheels, "estimated": estimated, "transient": transient}
     meter = make_meter(steps, period * every, limit, tolerances, EXTRAS, cones or {}, **there)

@@ -41,7 +41,7 @@ class Watched(NamedTuple):
 
 
 def noted(seen: Any, quantities: Mapping[str, Any], now: Any, ends: Any) -> Any:
-    """Return the notes after an instant; nothing where no transient is asked for."""
+    """Return the notes after an instant; nothing if no transient is measured."""
     if not seen:
         return seen
     q, left, rate = (quantities[name] for name in ("attitude_error", "rate_error", "rate"))
@@ -61,7 +61,7 @@ def noted(seen: Any, quantities: Mapping[str, Any], now: Any, ends: Any) -> Any:
 
 
 def table(seen: Any, period: float, every: int) -> dict[str, Metric]:
-    """Return the metrics of notes at these rows, of samples every so many control periods (s)."""
+    """Return the metrics of notes at these rows, of samples at intervals of `every` control periods (s)."""
     if not seen:
         return {}
     peaks = Metric("rad/s", "root", (seen.peak_rate,)), Metric("rad/s^2", "most", seen.peak_acceleration)

@@ -25,7 +25,7 @@ from starhold.trace.straight_line import evaluated
 
 FLIGHTS = 10_000
 LEGS = (1, 250, 250, 500)
-"""Each flight is checked after legs of so many control steps; the first shows the torque at the start."""
+"""Control steps of the legs after each of which a flight is checked; the first shows the torque at the start."""
 SLACK = 1e-6
 """The relative increase of V between checks that the held torque and the integration may cause."""
 TURN = 0.05

@@ -11,7 +11,7 @@ from starhold.analysis.meter import Array, Window
 FINE = 4
 """Binary digits of the mantissa that number the bins of an octave: sixteen bins."""
 LEAST, OCTAVES = -90, 110
-"""Values are binned from 2^LEAST on, over so many octaves; smaller and larger ones go into the end bins."""
+"""Values from 2^LEAST to 2^(LEAST + OCTAVES) are binned; smaller and larger ones go into the end bins."""
 BINS = OCTAVES << FINE
 _SHIFT = 52 - FINE
 _FIRST = (1023 + LEAST) << FINE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from starhold.scenario.building import build
 from starhold.scenario.campaign import CampaignTable
 from starhold.scenario.reading import Scenario, parse
 from starhold.scenario.requirement import RequirementTable
-from starhold.simulation.batched import begin_metered
+from starhold.simulation.batched import Flights, begin_metered
 from starhold.simulation.device import Pool, begin_on_device
 from starhold.simulation.lane import Progress
 from starhold.studies.body import study_of
@@ -58,21 +58,14 @@ class Job:
     source: Source
     table: CampaignTable
     progress: Callable[[str, int], None] | None = None
-    """Called with a law and how many more of its runs were flown, as a block goes on; not from other processes."""
+    """Called with a law and how many more of its runs were flown, while a block is flown; not from other processes."""
     extras: tuple[str, ...] = ()
-    """Names of metrics that are measured beside those that the campaign asks for."""
+    """Names of metrics that are measured in addition to the campaign's own."""
     _lanes: dict[str, Lanes] = field(default_factory=dict[str, Lanes])
     _meters: dict[str, Meter] = field(default_factory=dict[str, Meter])
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            "source": self.source,
-            "table": self.table,
-            "progress": None,
-            "extras": self.extras,
-            "_lanes": {},
-            "_meters": {},
-        }
+        return vars(replace(self, progress=None, _lanes={}, _meters={}))
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -186,8 +179,7 @@ class Job:
         meter = self._meter_of(lot.loop, lot.phases[0].gains)
         lanes, runs = len(lot.runs), lot.runs
         along = bool((np.diff(runs) == 1).all())
-        begin = partial(begin_on_device, pool) if isinstance(pool, Device) else partial(begin_metered, pool)
-        wait = begin(
+        flights = Flights(
             lot.loop,
             lot.carries,
             lot.phases,
@@ -198,6 +190,7 @@ class Job:
             meter.marks[-1],
             [window.row for window in meter.windows.values()],
         )
+        wait = begin_on_device(pool, flights) if isinstance(pool, Device) else begin_metered(pool, flights)
 
         def finish(progress: Progress | None) -> tuple[Metrics, Any]:
             flown = wait(None if progress is None else lambda done, total: progress(lanes * done // total, lanes))

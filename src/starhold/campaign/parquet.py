@@ -1,4 +1,4 @@
-"""One chunk as the bytes of one Parquet file: its rows as columns, its counts and extremes beside the schema.
+"""One chunk as the bytes of one Parquet file: its rows as columns, its counts and extremes in the schema's metadata.
 
 A missing number (NaN) is stored as null, so that every reader of Parquet omits it from averages. Only the counts are
 compressed, because results are random in nearly all of their bits.

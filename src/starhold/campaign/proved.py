@@ -1,4 +1,4 @@
-"""Brackets by the claim about a loop as it flies: each flight is looked at for when it has the claim's premises, and from
+"""Brackets by the claim about a loop as it flies: for each flight it is found when it meets the claim's premises, and from
 then on the claim bounds it.
 
 A flight has them from the start where it starts in the claim's set, or from a window of time on in which its angles and
@@ -37,9 +37,9 @@ from starhold.studies.body import Issued, study_of
 Array = NDArray[np.float64]
 Notice = Callable[..., None]
 MOST, BLOCK = 20_000, 512
-"""The first so many runs of a campaign are looked at, in blocks of so many."""
+"""Runs of a campaign that are compared with the claim, from the first on, and those of a block."""
 APART = 1_000
-"""The first so many runs, where each has a loop of its own."""
+"""Runs that are compared where each has a loop of its own."""
 SLACK = 1e-6
 """The share of a bound by which the integration may take a flight beyond it, or beyond a premise."""
 NEARLY = 0.9
@@ -51,9 +51,9 @@ OUTSIDE, OTHER, MOVED = "do not come into its set", "fly another loop", "have mo
 
 
 class Looked(NamedTuple):
-    """Flights (lanes,) are looked at for this: from which control step on they are in the claim's set with an estimate that
-    has settled, -1 for never; whether their momentum is within its bound from then on; whether the law is told more wrongly
-    than is assumed; whether they fly the claim's loop; and their metrics from then on."""
+    """This is found of flights (lanes,): from which control step on they are in the claim's set with an estimate that has
+    settled, -1 for never; whether their momentum is within its bound from then on; whether the law is told more wrongly than
+    is assumed; whether they fly the claim's loop; and their metrics from then on."""
 
     begun: Array
     kept: NDArray[np.bool_]
@@ -87,7 +87,7 @@ class Subject(NamedTuple):
 
 
 def look(job: Job, law: str, threads: int, notice: Notice | None = None) -> ByClaim:
-    """Return what is proved of a law beside the flights of its campaign, which are flown once more. notice: called with the
+    """Compare what is proved of a law with the flights of its campaign, which are flown once more. notice: called with the
     law and how many more are flown, and what for."""
     watching = Job(job.source, job.table, extras=(PREMISES,))
     lanes = watching.lanes(law)

@@ -101,10 +101,10 @@ class Within:
 
 @dataclass(frozen=True)
 class ByClaim:
-    """A claim about a law's loop as it flies stands beside its flights. text: the claim, or why nothing is claimed of them;
-    runs: flights that were looked at; left: how many have not its premises, by the reason; share: of flights of which the
-    claim holds, None for all; misled: in how many of the others the law was told more wrongly than the claim assumes for
-    this share, None where what it is told is not recorded; within: the metrics that it bounds."""
+    """A claim about a law's loop as it flies, compared with its flights. text: the claim, or why nothing is claimed of them;
+    runs: flights that were compared with it; left: how many do not meet its premises, by the reason; share: of flights of
+    which the claim holds, None for all; misled: in how many of the others the law was told more wrongly than the claim
+    assumes for this share, None where what it is told is not recorded; within: the metrics that it bounds."""
 
     text: str
     runs: int = 0
@@ -119,8 +119,8 @@ class ByClaim:
         return self.runs - sum(self.left.values())
 
     def is_rare(self, failures: int, runs: int) -> bool:
-        """Whether so many of the runs may be outside the share: the probability of as many is more than `CHANCE`. Each run
-        has its own noise, however the dispersions are drawn."""
+        """Whether `failures` of the runs may be outside the share: the probability of as many is more than `CHANCE`. Each
+        run has its own noise, however the dispersions are drawn."""
         if self.share is None or not failures:
             return not failures
         from starhold.campaign.verdicts import failure_bounds

@@ -88,7 +88,7 @@ def bounds(failures: int, runs: int, confidence: float) -> Bounds:
 
 
 def decided(failures: int, runs: int, share: float, confidence: float) -> Literal["met", "missed"] | None:
-    """Return whether so many failures decide that at least `share` of all flights keep a requirement ("met") or fewer
+    """Return whether `failures` among `runs` decide that at least `share` of all flights keep a requirement ("met") or fewer
     ("missed"). None: fly on. Even if called after every run and stopped at the first answer, each answer is wrong with
     probability 1 - `confidence` at most.
     """
@@ -104,12 +104,12 @@ def decided(failures: int, runs: int, share: float, confidence: float) -> Litera
 
 
 def runs_to_meet(share: float, confidence: float, failures: int) -> int:
-    """Return the least number of runs at which `decided` says "met" if no more than so many failures are seen by then."""
+    """Return the least number of runs at which `decided` says "met" if no more than `failures` are seen by then."""
     return least(lambda runs: decided(failures, runs, share, confidence) == "met", failures)
 
 
 def failures_to_meet(share: float, confidence: float, runs: int) -> int | None:
-    """Return the greatest number of failures among so many runs at which `decided` says "met"; None where there is none."""
+    """Return the greatest number of failures among `runs` at which `decided` says "met"; None where there is none."""
     return greatest(lambda failures: decided(failures, runs, share, confidence) == "met", runs)
 
 

@@ -35,7 +35,7 @@ MARKS = (manifests.FILE, TOTALS, RUNS)
 BESIDE = ("worst-*.toml", "recorded/*.nc", "report.html")
 """Files with results that are written beside it."""
 _MOST_BYTES = 2**25
-"""Columns of so many bytes, 8 a number, are read at once where all are needed, because each read opens all files again."""
+"""Bytes of columns, 8 a number, that are read at once where all are needed, because each read opens all files again."""
 _NAME = re.compile(r"(\d{9,})-(\d{9,})\.([0-9a-f]{16})\.parquet")
 
 

@@ -23,11 +23,11 @@ from starhold.studies.requirements import Requirement
 BARS, WIDE = 60, 100.0
 """The most bars of a histogram; and the ratio of largest to least value above which a metric has a logarithmic scale."""
 MOST_DRIVEN = 200_000
-"""Drivers are sought among the first so many runs."""
+"""Runs, from the first on, among which drivers are sought."""
 KINDS: Mapping[str, Any] = {"morris": sensitivity.morris, "saltelli": sensitivity.sobol}
 """The functions that compute sensitivity indices, by the samplings designed for them."""
 FAILURES = 3
-"""The number of failed runs worth flying again, beside the worst of each requirement."""
+"""The number of failed runs worth flying again, in addition to the worst of each requirement."""
 
 
 def summarise(store: Store, job: Job, laws: Sequence[str], until_decided: bool = False) -> tuple[LawResult, ...]:

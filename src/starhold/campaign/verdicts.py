@@ -39,7 +39,7 @@ def failure_bounds(failures: int, runs: int, confidence: float, sides: int = 2) 
 
 
 def acceptance(share: float, runs: int, failures: int) -> float:
-    """Return the probability that at most so many of the runs fail, if flights keep the requirement with probability
+    """Return the probability that at most `failures` of the runs fail, if flights keep the requirement with probability
     `share`."""
     require_share("share", share)
     require_counts(failures, runs)
@@ -47,8 +47,7 @@ def acceptance(share: float, runs: int, failures: int) -> float:
 
 
 def runs_needed(share: float, risk: float, failures: int) -> int:
-    """Return the least number of runs with which at most so many failures are accepted at a consumer's risk of at most
-    `risk`.
+    """Return the least number of runs with which at most `failures` are accepted at a consumer's risk of at most `risk`.
 
     A share of 99.73 % and a risk of 10 % need 852, 1440, 1970, 3433 and 5704 runs for 0, 1, 2, 5 and 10 failures (Hanson
     and Beard)."""

@@ -72,7 +72,7 @@ def box(job: Job) -> list[tuple[float, float]]:
 
 
 class Sought(NamedTuple):
-    """Flights beside those of the campaign are for this, and so many at most."""
+    """A search: what it is for, and the most flights that it adds to those of the campaign."""
 
     name: str
     flights: int

@@ -150,6 +150,7 @@ ASSUMPTIONS = {
     FRICTIONLESS: Assumption("wheels without friction", _friction),
     "bounded-momentum": Assumption("total momentum at most as told"),
     "spare-momentum": Assumption("no wheel filled by momentum that friction moves between wheels", _filled),
+    "best-plan": Assumption("torque of a plan as told, of nearly the least cost", _limited),
     "no-wheels": Assumption("no stored momentum"),
     "no-outside-torque": Assumption("no torque from outside", _pulled),
     "known-outside-torque": Assumption("no torque from outside but what the law cancels", _uncancelled),
@@ -218,7 +219,9 @@ def standing(claim: Claim, reads: Set[str]) -> Standing:
         # A set on which the torque is within its limit also serves every larger limit.
         limit = "any" if free else "above" if "limit" in claim.numbers else "given"
     tolerance: float | None = claim.numbers.get("tolerance")
-    true = "given" if "tolerance" not in claim.numbers else "any" if tolerance is None else "box"
+    # V of the loop as it flies is that of the inertia as given.
+    given = "tolerance" not in claim.numbers or claim.kind == "pointing"
+    true = "given" if given else "any" if tolerance is None else "box"
     return Standing(
         "inertia" not in reads and true != "given",
         true,

@@ -149,8 +149,9 @@ class Certificate:
 
     @property
     def law(self) -> str:
-        """Return the digest of the law's program that the proofs are about; empty where there are none."""
-        return next((proof.claim["programs"]["law"] for proof in self.proofs if "law" in proof.claim["programs"]), "")
+        """Return the digest of the law's program that the proofs are about; empty where none is about the one that flies."""
+        flown = [proof.claim for proof in self.proofs if {"memory", "plan"}.isdisjoint(proof.claim["taken"])]
+        return next((claim["programs"]["law"] for claim in flown if "law" in claim["programs"]), "")
 
     def claim(self, kind: str) -> Claim | None:
         """Return the claim of this kind, or None."""

@@ -14,7 +14,7 @@ from starhold.certification.certificate import EXACT, NOT_SOUGHT, Certificate, C
 from starhold.certification.evidence.attitude import CONVERGES, NEARBY, SAMPLED, SLIDING, STRICTLY
 from starhold.certification.evidence.detumbling import is_about
 from starhold.certification.evidence.isotropic import ISOTROPIC
-from starhold.certification.evidence.pointing import POINTS
+from starhold.certification.evidence.starts import POINTS
 from starhold.certification.proofs import HELD_AND_PUSHED, detumbled, pointed, proved_claims
 from starhold.certification.subject import Subject, above, described, direction, exact_craft, make_subject
 from starhold.certification.unmodelled import named
@@ -104,7 +104,7 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
         return _remembering(subject, wanted, unsound)
     unflown = unsound
     if not unflown and wanted.alone:
-        claim, reason = pointed(subject, wanted.like, wanted.begun)
+        claim, reason = pointed(subject, wanted.like, wanted.begun, wanted.inertia_tolerance)
         claims.append(claim or undecided("pointing", {"torque": wanted.disturbance}, subject, reason))
     elif not unflown:
         pointing = wanted.pointing or wanted.disturbance > 0.0
@@ -140,16 +140,17 @@ def _remembering(subject: Subject, wanted: Wanted, unsound: str) -> tuple[list[C
     if is_about(loop):
         claim, reason = detumbled(subject)
         return [*claims, claim or undecided("detumbling", {}, subject, reason)], REMEMBERS
+    plans = loop.law.hook("plan") is not None
     if unsound or not (wanted.pointing or wanted.alone or wanted.disturbance > 0.0):
         memory = loop.law.remember(loop.gains, loop.known, loop.period)
-        return claims, unsound or (NOT_SOUGHT if any(labelled("memory", memory)) else REMEMBERS)
+        return claims, unsound or (NOT_SOUGHT if plans or any(labelled("memory", memory)) else REMEMBERS)
     try:
-        claim, reason = pointed(subject, wanted.like, wanted.begun)
+        claim, reason = pointed(subject, wanted.like, wanted.begun, wanted.inertia_tolerance)
     except (UnreadableError, InputError):
         claim, reason = None, ""
     if claim is not None:
         return [*claims, claim], ""
-    return claims, f"{REMEMBERS}: {reason}" if reason else REMEMBERS
+    return claims, (reason if plans else f"{REMEMBERS}: {reason}") if reason else REMEMBERS
 
 
 def between_samples(subject: Subject, proved: Mapping[str, Claim], failed: Mapping[str, str]) -> list[Claim]:

@@ -1,6 +1,7 @@
 """Compares the programs and numbers of a proof with those of a loop that flies."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from math import inf, isfinite
 from typing import Any
@@ -10,17 +11,19 @@ from starhold.certification.evidence.appendages import APPENDED
 from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop
 from starhold.certification.evidence.detumbling import DETUMBLES, bounds_of
 from starhold.certification.evidence.finding import NotFoundError
-from starhold.certification.evidence.pointing import POINTS
+from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.refuted import REFUTING
+from starhold.certification.evidence.starts import POINTS
 from starhold.certification.evidence.station import Station
 from starhold.certification.hand_over import Ends
 from starhold.certification.matrices import fraction
 from starhold.certification.subject import above, make_subject
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes, samples_of
+from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, samples_of
 from starhold.kernel.held import CHANGE
 from starhold.kernel.loops import HANDED, HYSTERESIS, OUTSIDE, SHORTEST, WHEELS
-from starhold.kernel.numbers import rational
+from starhold.kernel.numbers import RefusedError, rational
+from starhold.kernel.plans import PLANNED
 from starhold.kernel.theorems.noise import BESIDE
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import DEVIATIONS
@@ -38,7 +41,7 @@ def differences(claim: Mapping[str, Any], loop: ClosedLoop, ends: Ends | None = 
     apart = [*_programs(claim, recorded.roles, recorded.subject)]
     if claim["theorem"] == DETUMBLES:
         return [*apart, *_of_detumbling(claim, recorded)]
-    apart += _numbers(claim, recorded)
+    apart += [*_numbers(claim, recorded), *_planned(claim, recorded)]
     return [*apart, *_words(claim, recorded), *_handed_over(claim, ends)]
 
 
@@ -95,8 +98,9 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
     if claim["theorem"] in (POINTS, APPENDED):
+        known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
-        pushed = pushes(loop, envelope).numbers
+        pushed = known.against(envelope).numbers
         if not numbers.keys().isdisjoint(CHANGE):
             # Without both a torque may turn over at once.
             numbers = dict.fromkeys(CHANGE, Fraction(0)) | numbers
@@ -132,6 +136,27 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
             for name, x in most.items()
             if "." in name and name[0] in "ms" and isfinite(x) and name not in numbers
         )
+
+
+def _planned(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
+    plan = recorded.plan
+    if plan is None or claim["theorem"] != POINTS:
+        if PLANNED in claim["taken"]:
+            yield "its law does not plan"
+        return
+    if PLANNED not in claim["taken"]:
+        yield "the law plans its moves"
+    yield from (
+        f"{name} is not told" for name in recorded.subject if name.startswith("plan.") and name not in claim["subject"]
+    )
+    try:
+        numbers, _ = told_of(recorded, plan)
+    except RefusedError as reason:
+        yield str(reason)
+        return
+    for name in ("plan.gap", "plan.stiffness"):
+        if rational(claim["numbers"].get(name, "0")) < fraction(numbers[name]):
+            yield f"{name} is exceeded"
 
 
 def _handed_over(claim: Mapping[str, Any], ends: Ends | None) -> Iterator[str]:

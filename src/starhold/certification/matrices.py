@@ -45,7 +45,7 @@ def least(a: Rows) -> Fraction:
     """Return a number just below the smallest eigenvalue of a symmetric matrix; positive where the matrix is definite."""
     Account.open()
     if definite(a):
-        # A small one beside a large one would drown in the rounding of the large one.
+        # A small one next to a large one would drown in the rounding of the large one.
         return 1 / greatest(inverted(a))
     return -greatest(negative(a))
 

@@ -1,4 +1,4 @@
-"""How far forces beside that of a point mass move an orbit, and what that does to a frame that turns with it.
+"""How far forces other than that of a point mass move an orbit, and what that does to a frame that turns with it.
 
 In the orbital frame, radial r, along the motion t and normal n, a force f per mass gives h' = r f_t and turns the frame
 about the radial direction by r f_n/h, beside h/r2 about the normal. A target that knows two-body motion alone gives h/r2
@@ -17,7 +17,7 @@ from starhold.parts.orbit import angular_momentum, highest, highest_speed, lowes
 from starhold.parts.part import Fitted
 
 ROOM = 1.4
-"""Forces of a share of the point mass's move an orbit by so many times that share: flights with oblateness come to 1.34."""
+"""Forces move an orbit by this multiple of their share of the point mass's force: flights with oblateness reach 1.34."""
 MORE = 1.0 + 1e-9
 
 
@@ -33,7 +33,7 @@ class Band(NamedTuple):
 
 
 def movers(loop: ClosedLoop) -> list[Fitted]:
-    """Return the parts that move the orbit beside the point mass, and tell by how much."""
+    """Return the parts that move the orbit besides the point mass, and tell by how much."""
     return [f for f in loop.used("environment") if f.part.hook("perturbation") is not None]
 
 

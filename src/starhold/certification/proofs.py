@@ -14,7 +14,6 @@ from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.detumbling import DETUMBLES, find_detumbling
 from starhold.certification.evidence.finding import certificate, obligations
-from starhold.certification.evidence.pointing import POINTS, find_pointed
 from starhold.certification.evidence.recorded import RecordedLoop
 from starhold.certification.evidence.refuted import (
     AWAY,
@@ -26,6 +25,7 @@ from starhold.certification.evidence.refuted import (
     UNSETTLED,
     find_refuted,
 )
+from starhold.certification.evidence.starts import POINTS
 from starhold.certification.subject import Subject, above, below
 from starhold.kernel.check import Proved, check
 from starhold.kernel.numbers import Account, RefusedError
@@ -59,12 +59,12 @@ def proved_claims(
     """Return the claims about a loop for which evidence was found and checked by the kernel, by their kinds: proved ones,
     and refuted ones among the others; and why no evidence was found for other theorems. turn: the rotation that the set
     within limits must contain (rad); rate: up to which motions should converge from every attitude (rad/s, inf for any);
-    tolerance: of the inertia, by default the largest; pointing: whether to find the pointing bound of the loop as it flies,
-    of motions that begin at the rate `begun` (rad/s).
+    tolerance: of the inertia, by default the largest, in the pointing bound none; pointing: whether to find the pointing
+    bound of the loop as it flies, of motions that begin at the rate `begun` (rad/s).
     """
     loop = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
-        find_pointed(loop, begun=begun)
+        _find_pointed(loop, None, begun, tolerance)
         find_appended(loop)
     find_refuted(loop, turn, rate)
     claims = met(checked(loop))
@@ -73,12 +73,31 @@ def proved_claims(
     return {claim.kind: claim for claim in (*reversed(claims), *against)}, loop.failed
 
 
-def pointed(subject: Subject, like: Claim | None = None, begun: float | None = None) -> tuple[Claim | None, str]:
+def pointed(
+    subject: Subject, like: Claim | None = None, begun: float | None = None, tolerance: float | None = None
+) -> tuple[Claim | None, str]:
     """Return the pointing claim of a loop as it flies, or why no evidence was found. like: the claim of another loop, for
-    the same start set and limits; begun: the rate (rad/s) at which motions begin."""
+    the same start set, limits and tolerance; begun: the rate (rad/s) at which motions begin; tolerance: of the inertia."""
     loop = Loop(subject)
-    find_pointed(loop, None if like is None or like.proof is None else like.proof.claim["numbers"], begun)
+    numbers = None if like is None or like.proof is None else like.proof.claim["numbers"]
+    _find_pointed(loop, numbers, begun, tolerance)
     return next(iter(checked(loop)), None), loop.failed.get(POINTS, "no proof was found")
+
+
+def _find_pointed(loop: Loop, like: Mapping[str, Any] | None, begun: float | None, tolerance: float | None) -> None:
+    """Find the pointing bound with the tolerance of the inertia, or without if none is proved with it."""
+    # Loaded here, because its matrices need a large library.
+    from starhold.certification.evidence.pointing import find_pointed
+
+    if like is not None:
+        tolerance = float(Fraction(like["tolerance"])) if "tolerance" in like else None
+    loop.known = replace(loop.known, tolerance=tolerance)
+    if find_pointed(loop, like, begun) or tolerance is None or like is not None:
+        return
+    why = loop.failed.get(POINTS, "no proof was found")
+    loop.known = replace(loop.known, tolerance=None)
+    if find_pointed(loop, like, begun):
+        loop.failed[POINTS] = f"with the inertia's tolerance: {why}"
 
 
 def taken_over(subject: Subject, rate: float | None, angle: float | None) -> tuple[dict[str, Claim], dict[str, str]] | None:
@@ -255,9 +274,11 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
         **{name: float(numbers.get(key, Fraction(0))) for name, key in most.items()},
         **errors,
         "told": "outside.0" in numbers,
+        **({"tolerance": below(numbers["tolerance"])} if "tolerance" in numbers else {}),
         "share": below(1 - numbers["share"]) if "share" in numbers else None,
         "samples": int(numbers.get("samples", 0)),
         **{name: float(numbers[name]) for name in ("momentum", "memory") if name in numbers},
+        **({"plan_error": above(numbers["plan.error"])} if "plan.error" in numbers else {}),
         **{name: above(numbers[key]) for name, key in ends.items()},
     }
 

@@ -13,7 +13,7 @@ from starhold.algebra.vector import Matrix, Vector
 from starhold.certification.matrices import fraction, greatest, inverted, least, matrix_of, negative, number, rows
 from starhold.certification.orbit_band import band_of
 from starhold.certification.spline import spline_bounds
-from starhold.certification.unmodelled import assumed_away, envelope_of, is_read
+from starhold.certification.unmodelled import Pushes, assumed_away, envelope_of, is_read, pushes
 from starhold.errors import InputError
 from starhold.kernel.numbers import Rows, plus
 from starhold.laws.catalogue import Law
@@ -25,7 +25,7 @@ from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.parts.targets.history import Knots
 
 GATHERED = 0.05
-"""The part of the wheels' momentum at which a mode ends that may be added before it does."""
+"""The momentum that may be added before a mode ends, as a share of the wheels' momentum at which it ends."""
 SPLINE = "rotation spline"
 """The curve that a tabulated target follows between its knots, see `parts.targets.history.Knots`."""
 
@@ -36,7 +36,9 @@ class Subject:
 
     modelled: bound on each axis of the torque the models know (N m); target_rate, target_acceleration: bounds on the
     target's motion (rad/s, rad/s2), zero for one at rest; disturbance: bound on the norm of any further torque (N m);
-    total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels."""
+    total_momentum: bound on the norm of the body's and the wheels' angular momentum (N m s) in claims about wheels;
+    tolerance: in the pointing claim the inertia's entries are off by this share of sqrt(J_ii J_kk) at most, None where the
+    inertia is as given; pull: bound of the torque that an inertia of one has by the gravity gradient (1/s2)."""
 
     loop: ClosedLoop
     disturbance: Any
@@ -45,10 +47,23 @@ class Subject:
     target_rate: Any
     target_acceleration: Any
     total_momentum: Any
+    tolerance: float | None = None
+    pull: Any = 0
+
+    @property
+    def off(self) -> float:
+        """A bound of the norm of what the inertia is off by (kg m2)."""
+        return (self.tolerance or 0.0) * float(np.trace(tensor(self.loop.craft.inertia))) * (1.0 + 1e-12)
 
     def envelope(self, noisy: bool) -> Envelope:
         """Return the envelope of its motions, for the bounds of parts; noisy: except for a share of times."""
-        return envelope_of(self.loop, above(self.total_momentum), noisy)
+        given = envelope_of(self.loop, above(self.total_momentum), noisy)
+        return given._replace(moment=given.moment + self.off)
+
+    def against(self, envelope: Envelope) -> Pushes:
+        """Return bounds of what acts on the loop and is told to no law, the pull on what the inertia is off by included."""
+        bounds = pushes(self.loop, envelope)
+        return bounds._replace(outside=bounds.outside + float(self.disturbance) + above(self.pull) * self.off)
 
     @property
     def moving(self) -> bool:
@@ -63,17 +78,17 @@ def make_subject(
     momentum (N m s); if absent what the loop starts with, or what it has at rest on target if that is more, but with no more
     than `stored` in the wheels."""
     rate, acceleration = _target_bounds(loop)
-    axes, norm = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0)
+    axes, norm, pull = (fmpq(0), fmpq(0), fmpq(0)), fmpq(0), fmpq(0)
     if loop.has("gravity-gradient"):
-        axes, norm = _gravity_gradient_bounds(loop)
+        axes, norm, pull = gravity_gradient_bounds(loop)
     # The subject is what its file says.
-    axes, (norm, rate, acceleration) = (
-        tuple(exact(above(x)) for x in bounds) for bounds in (axes, (norm, rate, acceleration))
+    axes, (norm, pull, rate, acceleration) = (
+        tuple(exact(above(x)) for x in bounds) for bounds in (axes, (norm, pull, rate, acceleration))
     )
     total = fmpq(0)
     if loop.wheels is not None:
         total = exact(_momentum(loop, rate, stored) if momentum is None else momentum)
-    return Subject(loop, exact(disturbance), axes, norm, rate, acceleration, total)
+    return Subject(loop, exact(disturbance), axes, norm, rate, acceleration, total, pull=pull)
 
 
 def described(subject: Subject, kinds: Collection[str] = ()) -> dict[str, Any]:
@@ -214,8 +229,9 @@ def perigee(loop: ClosedLoop) -> tuple[arb, arb, arb, arb]:
     return h2 / gravity / (1 + eccentricity), h2.sqrt(), eccentricity, gravity
 
 
-def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
-    """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m)."""
+def gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any, Any]:
+    """Bounds on the axes and on the norm of the gravity-gradient torque over the whole orbit (N m), and on the norm for an
+    inertia of one (1/s2)."""
     nearest, _, _, gravity = perigee(loop)
     # A part more, for the inertia with the rotors is what is flown up to rounding.
     strength = upper(3 * gravity / (nearest * (1 - exact(band_of(loop).share))) ** 3) * exact(1.0 + 1e-12)
@@ -224,7 +240,7 @@ def _gravity_gradient_bounds(loop: ClosedLoop) -> tuple[Any, Any]:
     torque: Any = gravity_gradient(direction("p"), cast(Any, Polynomial.constant(1)), whole)
     axes = [strength * _largest_form(component) for component in torque]
     # |n x Jn| is the deviation of the moments about their mean in direction n, so at most half their range.
-    return tuple(axes), strength * exact(greatest(full) - least(full)) / 2
+    return tuple(axes), strength * exact(greatest(full) - least(full)) / 2, strength
 
 
 def _with_rotors(loop: ClosedLoop) -> Rows:

@@ -262,14 +262,14 @@ def _estimated(loop: ClosedLoop, driven: Driven | None) -> Collection[Fitted]:
 
 
 def _bounded(fitted: Fitted) -> Errors | None:
-    """Read the declared largest errors of a part beside its noise, where they are finite."""
+    """Read the declared largest errors of a part besides its noise, where they are finite."""
     tell: Any = fitted.part.hook("error") if fitted.part.role in TELLING else None
     largest = NO_ERRORS if tell is None else tell(fitted.params)
     return None if tell is None or not all(map(isfinite, largest)) else largest
 
 
 def _is_removed(errors: Errors | None, estimated: bool) -> bool:
-    """Return whether bounded errors beside noise do not reach the law: an estimator removes a bias of the rate alone. What
+    """Return whether bounded errors besides noise do not reach the law: an estimator removes a bias of the rate alone. What
     it makes of a tracker that is mounted askew, or of a reading in steps, no part states."""
     return errors is not None and (not estimated or (errors.attitude == 0.0 and errors.rate == errors.bias))
 

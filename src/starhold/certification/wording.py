@@ -146,8 +146,7 @@ def unclaimed(subject: Mapping[str, Any]) -> str:
 
 def _even(subject: Mapping[str, Any]) -> bool:
     """Return whether the law treats both quaternions of an attitude alike."""
-    law = known_law(subject.get("law", ""))
-    return law is not None and law.card.quaternion_sign == "even"
+    return (law := known_law(subject.get("law", ""))) is not None and law.card.quaternion_sign == "even"
 
 
 def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -209,21 +208,20 @@ def _wheels(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     return f"{place(n, subject)} {while_}, {' and '.join(parts)}{_followed(subject)}"
 
 
+OFF = "every entry of the inertia off by up to {} of sqrt(J_ii J_jj)"
+
+
 def _inertia(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if n["tolerance"] is None:
         return f"{place(n, subject)} it converges whatever the inertia of the body really is"
-    share = shown(100.0 * n["tolerance"], " %")
-    return (
-        f"{place(n, subject)} it converges with every entry of the inertia off by up to {share} of sqrt(J_ii J_jj)".strip()
-    )
+    return f"{place(n, subject)} it converges with {OFF.format(shown(100.0 * n['tolerance'], ' %'))}".strip()
 
 
 def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     if "angle" not in n:
         return f"a torque from outside of up to {shown(n['torque'], ' N m')} leaves the body near the target"
-    start = f"rest at up to {angle(n['slew_angle'])}"
-    if n["rate_start"]:
-        start = f"up to {angle(n['slew_angle'])} at up to {speed(n['rate_start'])}"
+    turned = angle(n["slew_angle"])
+    start = f"up to {turned} at up to {speed(n['rate_start'])}" if n["rate_start"] else f"rest at up to {turned}"
     start += f" with states of the appendages of up to {', '.join(map(shown, n['begun']))}" if "begun" in n else ""
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
     beside = " beside those that the law is told" if n["told"] else ""
@@ -237,7 +235,9 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
     bounds += [f"{what} of up to {write(n[name])}" for name, write, what in kinds if n[name]]
     bounds += [f"errors of the command {pushed('error')}"] if n["error"] else []
     bounds += [f"a total momentum of up to {shown(n['momentum'], ' N m s')}"] if "momentum" in n else []
+    bounds += [OFF.format(shown(100.0 * n["tolerance"], " %"))] if "tolerance" in n else []
     bounds += [f"a memory that adds up to {shown(n['memory'], ' N m')} about each axis"] if "memory" in n else []
+    bounds += [f"a plan within {shown(n['plan_error'], ' N m', up=True)} of a polynomial"] if "plan_error" in n else []
     span = "orbits" if subject["orbit"] else f"spans of {n['samples'] * n['period']:.6g} s"
     share = f", in at least {shown(100.0 * n['share'], ' %')} of {span}" if n["share"] else ""
     near = f"within {angle(n['angle'], up=True)} of the target after {shown(n['settling'], ' s', up=True)} at all times"

@@ -37,7 +37,7 @@ class Rate(ProgressColumn):
 
 @contextmanager
 def flying_campaign(laws: Sequence[str], runs: int, drawn: bool = True) -> Iterator[Callable[..., None]]:
-    """Show a bar for each law, of so many runs, and for each search for a worst case, with the rate and the time left; yield
+    """Show a bar for each law, of `runs` runs, and for each search for a worst case, with the rate and the time left; yield
     the function to call with a law and how many more of its runs are done, or also with what is `Sought`, from any thread.
     If an error comes before the first run, the bars disappear. drawn: whether runs differ in more than their noise."""
     titles = [f"{counted(runs, 'run')} of {counted(len(laws), 'law')}"]

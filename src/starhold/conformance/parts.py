@@ -39,7 +39,7 @@ def examine_part(part: Part) -> Iterator[Verdict]:
 
 
 def find_part(given: str) -> Part:
-    """The part that is installed under a name, or stands in a file. InputError where there is none."""
+    """The part that is installed under a name, or is in a file. InputError where there is none."""
     installed = {part.name: part for role in ("body", *ROLES) for part in parts(role).values()}
 
     def read(path: Path) -> Part:
@@ -85,8 +85,8 @@ def is_pure(part: Part) -> None:
     """A flight depends on nothing but its loop."""
     _loops_only(part)
     for params in part.examples():
-        # Plain Python runs the file at every step; recording a kernel runs it once.
-        ends = [numbers_of(fly_plainly(loop_with(part, params), STEPS)) for _ in range(2)]
+        # Plain Python runs the file at every step, so that few suffice; recording a kernel runs it once.
+        ends = [numbers_of(fly_plainly(loop_with(part, params), STEPS // 4)) for _ in range(2)]
         require(bool(np.array_equal(*ends, equal_nan=True)), "two flights of the same loop differ")
 
 
@@ -214,7 +214,7 @@ def draws_in_its_range(part: Part) -> None:
 
 def keeps_what_it_says(part: Part) -> None:
     """No torque is larger than its `bound` or changes faster than its `torque_change`, no error is larger than its `error`,
-    beside its `noise`, and no motion of a target than its `motion`."""
+    besides its `noise`, and no motion of a target than its `motion`."""
     tell_torque, tell_errors, tell_change = part.hook("bound"), part.hook("error"), part.hook("torque_change")
     # A body has an equation of this name.
     tell_motion = part.hook("motion") if part.role == "target" else None
@@ -327,9 +327,9 @@ def _draws(part: Part) -> bool:
     places: list[int] = []
 
     class Watched(Dice):
-        def vector(self, place: int, deviation: Any) -> Any:
+        def vectors(self, place: int, *deviations: Any) -> Any:
             places.append(place)
-            return super().vector(place, deviation)
+            return super().vectors(place, *deviations)
 
     loop = loop_with(part, part.examples()[0])
     fitted = next(f for f in loop.parts if f.part == part)

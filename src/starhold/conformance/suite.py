@@ -14,6 +14,6 @@ def examine(law: Law) -> Iterator[Verdict]:
 
 
 def find_law(given: str) -> Law:
-    """The law for any body that is installed under a name, or stands in a file. InputError where there is none."""
+    """The law, for any body, that is installed under a name, or is in a file. InputError where there is none."""
     installed = {name: law for body in parts("body") for name, law in catalogue(body).items()}
     return find(given, installed, lambda path: from_file(path, installed), "law")

@@ -101,7 +101,7 @@ def agree(loop: Any, starts: Sequence[Any], lanes: Sequence[int]) -> None:
 
 
 def gives_reasons(certificate: Certificate) -> None:
-    """Check that a certificate says of everything it does not prove why."""
+    """Check that a certificate gives a reason for everything that it does not prove."""
     for claim in certificate.claims:
         for obligation in claim.obligations:
             explained = obligation.outcome == "proved" or bool(obligation.evidence)

@@ -274,7 +274,7 @@ class Lines:
         return instant, values
 
     def attitude(self, line: str, count: int) -> tuple[int, list[float]]:
-        """Return the instant (ns) and the quaternion of a line of so many numbers."""
+        """Return the instant (ns) and the quaternion of a line of `count` numbers."""
         instant, values = self.row(line, (count,))
         length = math.hypot(*values[:4])
         if not abs(length - 1.0) <= OFF_UNIT:
@@ -296,7 +296,7 @@ def instant_of(epoch: str) -> int:
 
 
 def stamp_of(instant: int) -> str:
-    """Return the epoch so many nanoseconds from the year 1."""
+    """Return the epoch at an instant (ns since the year 1)."""
     seconds, part = divmod(instant, SECOND)
     days, second = divmod(seconds, 86400)
     clock = f"{second // 3600:02}:{second // 60 % 60:02}:{second % 60:02}"

@@ -218,8 +218,8 @@ _READINGS = SimpleNamespace(
 
 @dataclass(frozen=True)
 class Counted:
-    """This has in place of the module of a target one whose numbers have the count of control steps, which the law keeps,
-    beside them, for it flies without the clock of a simulation."""
+    """Replaces the module of a target: its numbers include the count of control steps, which the law keeps, because it flies
+    without the clock of a simulation."""
 
     module: Any
 
@@ -236,7 +236,7 @@ class Counted:
 
 
 class _Clock:
-    """A control step that notes whether it is looked at."""
+    """A control step that notes whether it is read."""
 
     reader, seen = "itself", False
 

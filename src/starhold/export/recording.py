@@ -38,7 +38,7 @@ class Copies:
         self._callers: dict[Any, Callable[..., Any]] = {}
 
     def seen(self, value: Any) -> Any:
-        """Return what stands for a value in a copy: for an equation a function that hands on the call, for a table or a
+        """Return the substitute for a value in a copy: for an equation a function that forwards the call, for a table or a
         module of equations another one of such functions."""
         if isinstance(value, FunctionType):
             return self._caller(value)

@@ -24,7 +24,7 @@ _PRIME, _BASIS = 0x100000001B3, 0xCBF29CE484222325
 
 
 class Vector(NamedTuple):
-    """Before a step: whether the state is set anew, and the measured numbers that are read; after it the numbers of the
+    """Before a step: whether the state is reset, and the measured numbers that are read; after it the numbers of the
     command, and the digest of those of the state."""
 
     first: bool
@@ -81,7 +81,7 @@ def with_numbers(value: Any, column: NDArray[np.float64]) -> Any:
 
 class Stepper:
     """The step that C must equal, step(state, inputs) -> (command, state): the equations of the simulation, recorded and
-    compiled as there, so that it goes on beyond a division by zero as C does."""
+    compiled as there, so that it continues past a division by zero as C does."""
 
     def __init__(self, code: Code) -> None:
         flight, recorder = code.flight, Recorder()

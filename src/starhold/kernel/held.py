@@ -11,15 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
-from itertools import product
 
 from .loops import AXES, NONE, AttitudeLoop
-from .near import near_target, spinning
+from .near import CHANGE, MOMENTA, between, near_target
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
+from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
+from .reader import Reader
 from .regions import (
     ANGLE,
     AT_REST,
+    LOAD,
     PULL,
     RATE,
     SPEED,
@@ -30,6 +32,8 @@ from .regions import (
     Region,
     Sizes,
     Tube,
+    as_told,
+    beyond,
     factored,
     felt,
     first,
@@ -37,30 +41,22 @@ from .regions import (
     least_form,
     lengths,
     named,
+    outweighed,
     settled,
     stretch,
     with_momentum,
 )  # fmt: skip
 
 WEIGHT, ZERO, ORDER, LONG = Fraction(8), Fraction(0), 4, 800
-MOMENTA = ("h1", "h2", "h3")
-CHANGE = "told.change", "told.change.per.rate"
-"""How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
-HALF_ROOT = Fraction(7072, 10000)
-"""At least the root of 1/2."""
-AROUND = [
-    *([c * HALF_ROOT for c in signs] for signs in product((-1, 1), repeat=3)),
-    *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
-]
-"""The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
-class Held:
+class Held(Reader):
     """A loop with its torque held for a period, and V = s (1 - q0) + x.Gx."""
 
-    def __init__(self, loop: AttitudeLoop) -> None:
+    def __init__(self, loop: AttitudeLoop, plan: Plan | None = None) -> None:
         numbers, V, x = loop.claim.numbers, loop.lyapunov, [var(name) for name in STATE]
         self.loop, self.h = loop, numbers["period"]
+        self.plan = plan or (Plan(loop) if loop.claim.taken.get(PLANNED) else None)
         # What noise adds near the target, and what momentum makes of that.
         self.swayed = self.apart = AT_REST
         self.constant = {name: numbers[name] for name in ("outside", "error")}
@@ -70,6 +66,7 @@ class Held:
             [numbers.get(f"{kind}.{name}") or Fraction(0) for name in ("attitude", "rate")] for kind in ("noise", "error")
         )
         self.turned, self.rated = (x + y for x, y in zip(self.noise, errors, strict=True))
+        self.off = loop.off if "tolerance" in numbers else ZERO
         self.led, self.hurried = (numbers.get(f"error.target.{name}") or Fraction(0) for name in ("rate", "acceleration"))
         demand(self.h > 0 and min(self.per_rate.values()) >= 0, "a number is not positive")
         given = {"e": loop.outside, "r": loop.moving, "a": loop.moving, "h": loop.wheels}
@@ -99,6 +96,8 @@ class Held:
         self.rigid = {x: [first(p, x) for p in minus(left, self.slow)] for x in ("e", "a", "h", "r")}
         self.near = near_target(loop, self.h)
         self.N, h = inverse(loop.given), self.h
+        self.widths, self.light = [norm(row) for row in self.N], stretch(self.N)
+        demand(self.off * self.light < 1, "the inertia is known too badly")
         # What torques at the beginning and at the end of a period do, half of each if they are held, and what turns do.
         ends = (
             [[h / 2 * x for x in row] for row in self.N] + [[c * x for x in row] for row in self.N] for c in (h * h / 4, 0)
@@ -192,37 +191,19 @@ class Held:
         sizes |= {"q0": Fraction(1)} | {x: min(sizes[x], turn) for x in (*STATE[TURN], ANGLE)}
         return Region(X, sizes | self.others, least)
 
-    def misread(self, region: Region) -> tuple[Fraction, Fraction]:
-        """Return how far the torque is from what the law asks for at the true state, for errors of what it is told; and how
-        far from there and what errors that noise drives add linearly on target."""
-        if not self.turned + self.rated + self.led + self.hurried:
-            return Fraction(0), Fraction(0)
-        r, a = self.size("r"), self.size("a")
-        turn = {"r": self.led + self.turned * r, "a": self.hurried + self.turned * a}
-        wrong = {"q": self.turned / 2, "w": self.rated + turn["r"]} | turn
-        wrong["h"] = stretch(self.loop.given) * self.rated
-        # A torque that turns over at once is what the law is told.
-        wrong["e"] = self.change[1] * self.turned if self.change else Fraction(0)
-        sizes = {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in region.sizes.items()}
-        full = {letter: felt(self.loop.u, letter, sizes) for letter in wrong}
-        all_told = sum((full[letter] * x for letter, x in wrong.items()), Fraction(0))
-        # A turn t by e takes q to qt: |qt - q - e/2| <= |q - 1| |t - 1| + |t - 1 - e/2|, and 1 - q0 <= |q|^2 where q0 >= 0.
-        away, (turned, rated) = sizes[ANGLE], self.noise
-        near = sizes | {"v": away * away}
-        linear = {"q": turned / 2, "w": rated}
-        curved = {"q": root(Fraction(2)) * away * turned / 2 + turned * turned / 8, "w": Fraction(0)}
-        less = [(full[k] - felt(self.unlike, k, near)) * x - full[k] * curved[k] for k, x in linear.items()]
-        return all_told, all_told - max(sum(less), Fraction(0)) * (region.least > self.turned / 2)
-
-    def size(self, letter: str) -> Fraction:
-        """Return a bound of the norm of a vector from outside."""
-        sizes = [x for name, x in self.others.items() if name[0] == letter]
-        return norm(sizes) if letter == "e" else max(sizes, default=Fraction(0))
+    def planned(self, sizes: Sizes) -> Fraction:
+        """Return how far the torque is at most from that of a plan's moves, if there is one."""
+        return self.plan.error(as_told(sizes, self.wrong)) if self.plan else ZERO
 
     def pushed(self, sizes: Sizes) -> dict[str, Fraction]:
-        """Return bounds of the torque from outside and of the error of the command at rates, to which the target's adds."""
+        """Return bounds in a tube of the torque from outside and of the error of the command, where a target turns too."""
         outside, error = (x + self.per_rate[name] * (sizes[SPEED] + self.size("r")) for name, x in self.constant.items())
-        return {"outside": outside, "both": outside + error}
+        return {"outside": outside + sizes[LOAD], "both": outside + error + sizes[LOAD] + self.planned(sizes)}
+
+    def load(self, sizes: Sizes, acceleration: Fraction) -> Fraction:
+        """Return how far the torque that the body takes is from that of the given inertia."""
+        w, r = sizes[SPEED], self.size("r")
+        return self.off * (acceleration + self.size("a") + w * r + (w + r) ** 2)
 
     def changes(self, sizes: Sizes, turning: int = 1) -> dict[str, Fraction]:
         """Return by how much target, momentum and torque from outside change in the mean of a period: those from nothing on;
@@ -270,29 +251,29 @@ class Held:
         steady, uneven = self.misread(region)
         rigid = sum((felt(within_tube, x, sizes) * self.size(x) for x, within_tube in self.rigid.items()), Fraction(0))
         steady, uneven = steady + rigid + self.lasting, uneven + rigid + self.lasting
-        widths = [norm(row) for row in self.N]
 
-        def within(wide: list[Fraction]) -> Sizes:
-            drift = norm(x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True))
-            return sizes | named(STATE[RATE], wide) | {SPEED: sizes[SPEED] + drift}
+        def within(wide: list[Fraction], load: Fraction) -> Sizes:
+            return sizes | named(STATE[RATE], wide) | {SPEED: sizes[SPEED] + norm(beyond(wide, sizes)), LOAD: load}
 
-        def reached(wide: list[Fraction]) -> list[Fraction]:
-            within_tube = within(wide)
-            push = steady + self.pushed(within_tube)["both"] + self.stale(within_tube, self.beside)
+        def reached(bounds: list[Fraction]) -> list[Fraction]:
+            *wide, load = bounds
+            within_tube = within(wide, load)
+            stale = self.stale(within_tube, self.beside)
+            push = steady + self.pushed(within_tube)["both"] + stale
             slopes = [[most(p.slope(name), within_tube) for name in STATE[RATE]] for p in self.bend]
-            further = reach(slopes, [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)])
-            columns = zip(STATE[RATE], begun, further, widths, strict=True)
-            return [sizes[x] + self.h * (u + more + push * n) for x, u, more, n in columns]
+            columns = zip(begun, reach(slopes, beyond(wide, sizes)), self.widths, strict=True)
+            faster = [u + more + push * n for u, more, n in columns]
+            wide = [sizes[x] + self.h * more for x, more in zip(STATE[RATE], faster, strict=True)]
+            return [*wide, self.load(within_tube, norm(faster) + stale * self.light)]
 
-        wide = settled(reached, [sizes[name] for name in STATE[RATE]])
-        far = within(wide)
+        *wide, load = settled(reached, [*(sizes[name] for name in STATE[RATE]), ZERO])
+        far = within(wide, load)
         turned = self.h / 2 * far[SPEED]
         far |= {"q0": Fraction(1)} | {name: min(sizes[name] + turned, Fraction(1)) for name in (*STATE[TURN], ANGLE)} | asks
         demand(not self.even or region.least > turned, "motions pass a half turn")
-        drift = [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
         pushed, stale = self.pushed(far)["both"], self.stale(far, self.beside)
         bent = [[most(p.slope(name), far) for name in STATE[RATE]] for p in self.bend]
-        return Tube(region, far, drift, turned, steady, pushed, stale, uneven, bent)
+        return Tube(region, far, beyond(wide, sizes), turned, steady, pushed, stale, uneven, bent)
 
     def fall(self, tube: Tube) -> tuple[Rows, Rows, Rows, Fraction, Fraction]:
         """Return Q, H, F, p and r such that V changes in a period by h (p |Fx| + r - x.Qx) at most, and V <= x.Hx."""
@@ -301,10 +282,10 @@ class Held:
         push = tube.steady + tube.pushed
         demand(push > 0, "nothing pushes")
         # How far pushes take the rates from where they go without: momentum turns with the body, less what they do to that.
-        widths, (calm, slower) = [norm(row) for row in self.N], self.unlike_body(tube.sizes, self.parted)
+        calm, slower = self.unlike_body(tube.sizes, self.parted)
         away = settled(
             lambda d: [
-                h * ((push + calm + slower * norm(d)) * n + y) for n, y in zip(widths, reach(tube.bent, d), strict=True)
+                h * ((push + calm + slower * norm(d)) * n + y) for n, y in zip(self.widths, reach(tube.bent, d), strict=True)
             ]
         )
         slope = {name: most(L.slope(name), tube.sizes) for name in ("q0", *STATE)}
@@ -314,6 +295,8 @@ class Held:
         rest = calm + slower * norm(away) + share * fastest(last, tube.sizes, self.speeds(tube.sizes))
         # What pushes do to V grows with what the state does in the period: linearly, and what is left.
         drift = self.astray(tube)
+        # Of the acceleration that an inertia resists the part that is linear in the state is no push.
+        kept = push - tube.sizes[LOAD] + self.load(tube.sizes, norm(drift) / h + tube.stale * self.light)
         turned = h / 2 * (tube.sizes[SPEED] * root(2 * (1 - region.least + tube.turned)) + norm(tube.drift) / 2)
         rest += push / 2 * norm(reach(self.felt, [*drift, *[turned] * 3]))
         # So does what V' has of the rates, which pushes change.
@@ -323,12 +306,13 @@ class Held:
         rest += h / 12 * norm(away) * norm(slope[name] for name in ("q0", *STATE[TURN]))
         onward = self.near.rates + beside(scalar(Fraction(1, 2)), scalar(0))
         growing = [[h / 2 * y for y in row] for row in times(self.felt, onward)]
-        growing += [[norm(away) / (2 * push) * y for y in row] for row in self.steepness]
+        growing += [[norm(away) / (2 * kept) * y for y in row] for row in self.steepness]
         # |a| + |b| + |c| <= sqrt(1 + 2/w) |(a, wb, wc)| with w = sqrt(WEIGHT).
         F = self.felt + [[root(WEIGHT) * y for y in row] for row in growing]
         # q0 >= least: s (1 - q0) <= s |q|^2 / (1 + least).
         over = self.form(self.s / (1 + region.least))
-        return least_form(falling, region), over, F, push * root(1 + 2 / WEIGHT), rest
+        more = root(1 + 2 / WEIGHT)
+        return outweighed(least_form(falling, region), self.off * more, F, self.near.rates), over, F, kept * more, rest
 
     def swing(self, tube: Tube) -> Fraction:
         """Return a bound of |V'| between samples."""
@@ -345,10 +329,7 @@ class Held:
 
     def corners(self) -> list[Rows]:
         """Return A of samples that are followed by Ax: with all momenta of wheels there may be it is between these."""
-        if not self.loop.wheels:
-            return [self.near.A]
-        every = ([x * self.size("h") for x in corner] for corner in AROUND)
-        return [plus(self.near.A, self.near.spun(*spinning(self.loop, at))) for at in every]
+        return between(self.near, self.loop, self.size("h")) if self.loop.wheels else [self.near.A]
 
     @property
     def away(self) -> Radii:
@@ -373,7 +354,7 @@ class Held:
         near = region.sizes | {"v": turn * turn}
         odd = norm(most(p, near) for p in self.left) + felt(self.turning, "w", near) * (fast + self.apart[0])
         # What noise adds has in it what momentum makes of it, but not what it makes of that.
-        noisy = felt(self.heeded, "w", near) * self.noise[1] * stretch(self.N)
+        noisy = felt(self.heeded, "w", near) * self.noise[1] * self.light
         drift = norm(self.astray(tube, self.lasting + tube.steady - tube.uneven))
         drift += h * (pulled + self.pulled(self.apart) + noisy)
         growing = "rh" + "e" * (self.gradual(tube.sizes) < 2 * self.size("e"))
@@ -396,5 +377,5 @@ class Held:
 
     def bend_between(self, tube: Tube) -> Fraction:
         """Return how far q is at most, between two samples, from the straight line between them."""
-        fastest, sizes = norm(tube.drift) / self.h + tube.stale * stretch(self.N), tube.sizes
+        fastest, sizes = norm(tube.drift) / self.h + tube.stale * self.light, tube.sizes
         return self.h * self.h / 16 * (fastest + sizes[SPEED] ** 2 / 2 * sizes[ANGLE])

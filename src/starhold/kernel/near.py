@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import reduce
+from itertools import product
 from typing import NamedTuple
 
 from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
 from .numbers import Rows, beside, inverse, plus, scalar, times
 from .regions import STATE, with_momentum
+
+CHANGE = "told.change", "told.change.per.rate"
+"""How fast the torque changes that the law is told, per second, and more for each rad that the body turns."""
+MOMENTA = ("h1", "h2", "h3")
+HALF_ROOT = Fraction(7072, 10000)
+"""At least the root of 1/2."""
+AROUND = [
+    *([c * HALF_ROOT for c in signs] for signs in product((-1, 1), repeat=3)),
+    *([2 * c * (i == k) * HALF_ROOT for i in AXES] for k in AXES for c in (-1, 1)),
+]
+"""The corners of a rhombic dodecahedron, which holds the unit ball: |x| + |y| <= sqrt 2 for each two axes."""
 
 
 class Near(NamedTuple):
@@ -42,6 +55,12 @@ def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
     names = {f"h{k + 1}": x for k, x in enumerate(at)}
     law, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
     return law, body
+
+
+def between(near: Near, loop: AttitudeLoop, size: Fraction) -> list[Rows]:
+    """Return matrices between which A is with each momentum of wheels of up to a size."""
+    ways = [near.spun(*spinning(loop, way)) for way in scalar(size)]
+    return [reduce(lambda A, one: plus(A, *one), zip(ways, corner, strict=True), near.A) for corner in AROUND]
 
 
 def over_period(feedback: Rows, h: Fraction) -> Rows:

@@ -97,8 +97,8 @@ def matrix(given: Any, rows: int, columns: int) -> Rows:
 
 def whole(numbers: Sequence[Fraction | int]) -> tuple[list[int], int]:
     """Return whole numbers and their common denominator."""
-    below = lcm(*(x.denominator for x in numbers))
-    return [x.numerator * (below // x.denominator) for x in numbers], below
+    below = lcm(*[x.denominator for x in numbers])
+    return [x.numerator * (below // x.denominator) if below > 1 else x.numerator for x in numbers], below
 
 
 def added(numbers: Sequence[Fraction]) -> Fraction:

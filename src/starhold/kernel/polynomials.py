@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from functools import reduce
+from functools import cached_property, reduce
 from itertools import product
 from math import gcd, lcm
 from operator import mul
@@ -22,24 +22,26 @@ class Poly:
     """A polynomial holds its coefficients, none of them zero, by monomial: whole numbers (`upper`) over one of their own
     (`lower`), with no factor that all share. Nothing changes it."""
 
-    __slots__ = ("_slopes", "_terms", "lower", "upper")
-
     def __init__(self, terms: Mapping[Monomial, Fraction | int], lower: int = 1) -> None:
         """Take coefficients over a positive number."""
         numbers, below = whole([*terms.values()])
         common = gcd(below * lower, *numbers)
         self.upper = {m: c // common for m, c in zip(terms, numbers, strict=True) if c}
         self.lower = below * lower // common
-        self._terms, self._slopes = dict[Monomial, Fraction](), dict[str, Poly]()
+        self._slopes = dict[str, Poly]()
         demand(len(self.upper) <= TERMS, "a polynomial is too long")
 
-    @property
+    @cached_property
     def terms(self) -> dict[Monomial, Fraction]:
         """Return the coefficients by monomial."""
-        self._terms = self._terms or {m: Fraction(c, self.lower) for m, c in self.upper.items()}
-        return self._terms
+        return {m: Fraction(c, self.lower) for m, c in self.upper.items()}
 
-    @property
+    @cached_property
+    def degree(self) -> int:
+        """Return the most factors of a term."""
+        return max(map(len, self.upper), default=0)
+
+    @cached_property
     def bits(self) -> int:
         """Return the bits of the longest of its whole numbers."""
         return max(map(int.bit_length, (self.lower, *self.upper.values())))
@@ -50,8 +52,7 @@ class Poly:
     def __mul__(self, other: Poly | Fraction | int) -> Poly:
         other = poly(other)
         Account.spend(len(self.upper) * len(other.upper) + 1, self.bits + other.bits)
-        highest = max(map(len, self.upper), default=0) + max(map(len, other.upper), default=0)
-        demand(highest <= DEGREE, "a degree is too high")
+        demand(self.degree + other.degree <= DEGREE, "a degree is too high")
         upper = dict[Monomial, int]()
         for (m, c), (n, d) in product(self.upper.items(), other.upper.items()):
             both = tuple(sorted(m + n)) if n else m
@@ -70,7 +71,7 @@ class Poly:
 
     __radd__, __rmul__ = __add__, __mul__
 
-    @property
+    @cached_property
     def names(self) -> set[str]:
         """Return the variables that occur."""
         return {name for m in self.upper for name in m}
@@ -175,11 +176,10 @@ def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
         return Fraction(0)
     names = [*p.names]
     numbers, lower = whole([sizes[name] for name in names])
-    ratios, degree = dict(zip(names, numbers, strict=True)), max(map(len, p.upper))
-    bits = max(map(int.bit_length, (lower, *numbers)))
-    Account.spend(len(p.upper), p.bits + degree * bits)
+    ratios, bits = dict(zip(names, numbers, strict=True)), max(map(int.bit_length, (lower, *numbers)))
+    Account.spend(len(p.upper), p.bits + p.degree * bits)
     # The sums of the terms of each degree.
-    sums = [0] * (degree + 1)
+    sums = [0] * (p.degree + 1)
     for m, c in p.upper.items():
         c = abs(c)
         for name in m:
@@ -188,7 +188,7 @@ def most(p: Poly, sizes: Mapping[str, Fraction]) -> Fraction:
     bound = 0
     for terms in sums:
         bound = bound * lower + terms
-    return up(Fraction(bound, p.lower * lower**degree))
+    return up(Fraction(bound, p.lower * lower**p.degree))
 
 
 def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fraction]) -> Fraction:
@@ -198,7 +198,7 @@ def fastest(p: Poly, sizes: Mapping[str, Fraction], speeds: Mapping[str, Fractio
     changing = [name for name in moving if sizes[name]]
     numbers, lower = whole([up(speeds[name] / sizes[name]) for name in changing])
     shares = dict(zip(changing, numbers, strict=True))
-    along = Poly({m: c * sum(shares.get(name, 0) for name in m) for m, c in p.upper.items()}, p.lower * lower)
+    along = Poly({m: c * sum([shares.get(name, 0) for name in m]) for m, c in p.upper.items()}, p.lower * lower)
     still = (most(p.slope(name), sizes) * speeds[name] for name in moving if not sizes[name])
     return sum(still, most(along, sizes))
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from .loops import AXES, RATES, TURNS
-from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, up, whole
+from .numbers import RefusedError, Rows, demand, plus, reach, root, scalar, times, transpose, up, whole
 from .polynomials import Monomial, Poly, most, total
 
 STATE = (*RATES, *TURNS)
 RATE, TURN, ITERATIONS = slice(0, 3), slice(3, 6), 60
-SPEED, ANGLE, PULL = "|w", "|q", "|u"
-"""Under which the sizes have those of |w| and |q|, and of the acceleration that is linear in the state where it is known."""
+SPEED, ANGLE, PULL, LOAD = "|w", "|q", "|u", "|j"
+"""Under which the sizes have those of |w| and |q|, of the acceleration that is linear in the state where it is known, and in
+a tube of the torque that an inertia near the given one adds."""
 TURNED = [[[(i - k) * (j - k) * (j - i) // 2 for j in AXES] for k in AXES] for i in AXES]
 """The matrix of (x, y, z) × has x, y and z in these places with these signs: the permutation symbol."""
 Sizes = dict[str, Fraction]
@@ -102,17 +104,32 @@ def least_form(parts: Factored, region: Region) -> Rows:
     return middle
 
 
+def outweighed(Q: Rows, c: Fraction, F: Rows, M: Rows) -> Rows:
+    """Return the matrix of a form that is no more than x.Qx - c |Fx| |Mx|: 2 |Fx| |Mx| <= s |Fx|^2 + |Mx|^2 / s."""
+    if not c:
+        return Q
+    s = stretch(M) / stretch(F)
+    return plus(plus(Q, times(transpose(F), F), -c * s / 2), times(transpose(M), M), -c / (2 * s))
+
+
 def felt(parts: list[Poly], letter: str, sizes: Sizes) -> Fraction:
     """Return how much parts change at most with a vector, in norms: not at all with one that none of them has."""
     names = [name for name in sizes if name[0] == letter]
     demand(all(name in names for p in parts for name in p.names if name[0] == letter), "how large a vector is is not told")
-    return stretched([[p.slope(name) for name in names] for p in parts], sizes) if names else Fraction(0)
+    if not names:
+        return Fraction(0)
+    rows, turned = taken_apart(tuple(tuple(p.slope(name) for name in names) for p in parts))
+    bound = stretch([[most(p, sizes) for p in row] for row in rows])
+    for letter, c in turned:
+        bound += c * (sizes[SPEED] if letter == "w" else max(sizes[f"{letter}{k + 1}"] for k in AXES))
+    return bound
 
 
-def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
-    """Return a bound of how much longer a matrix of polynomials makes a vector: |y x z| <= |y| |z|, and what is left by its
-    entries. Vectors from outside are no longer than each of their components may be."""
-    bound = Fraction(0)
+@lru_cache(256)
+def taken_apart(rows: tuple[tuple[Poly, ...], ...]) -> tuple[tuple[tuple[Poly, ...], ...], list[tuple[str, Fraction]]]:
+    """Return what is left of a matrix of polynomials without those of y x z, and how often each y is in it: |y x z| <= |y|
+    |z|, and the rest is bounded by its entries. Vectors from outside are no longer than each of their components may be."""
+    turned = list[tuple[str, Fraction]]()
     for letter in "wrah" if len(rows) == len(rows[0]) == 3 else "":
         names = [f"{letter}{k + 1}" for k in AXES]
         c = rows[1][0].terms.get((names[2],))
@@ -120,9 +137,14 @@ def stretched(rows: list[list[Poly]], sizes: Sizes) -> Fraction:
             continue
         slopes = [[[p.terms.get((name,), 0) for name in names] for p in row] for row in rows]
         if slopes == [[[(0, c, -c)[x] for x in axis] for axis in row] for row in TURNED]:
-            rows = [[p.only(lambda m, names=names: len(m) != 1 or m[0] not in names) for p in row] for row in rows]
-            bound += abs(c) * (sizes[SPEED] if letter == "w" else max(sizes[name] for name in names))
-    return bound + stretch([[most(p, sizes) for p in row] for row in rows])
+            rows = tuple(tuple(p.only(lambda m, names=names: len(m) != 1 or m[0] not in names) for p in row) for row in rows)
+            turned.append((letter, abs(c)))
+    return rows, turned
+
+
+def as_told(true: Sizes, wrong: Sizes) -> Sizes:
+    """Return the sizes of what a law is told that is off by so much, by letters."""
+    return {name: x + wrong.get(name[-1 if name in (SPEED, ANGLE) else 0], 0) for name, x in true.items()}
 
 
 def lengths(X: Rows) -> Sizes:
@@ -159,6 +181,11 @@ def growing(parts: list[Poly]) -> list[Poly]:
 def named(names: tuple[str, ...], values: list[Fraction]) -> Sizes:
     """Return values by names."""
     return dict(zip(names, values, strict=True))
+
+
+def beyond(wide: list[Fraction], sizes: Sizes) -> list[Fraction]:
+    """Return by how much bounds of the rates are more than those in a region."""
+    return [x - sizes[name] for x, name in zip(wide, STATE[RATE], strict=True)]
 
 
 def stretch(rows: Rows) -> Fraction:

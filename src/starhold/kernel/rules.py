@@ -29,9 +29,7 @@ def form(rows: Any, z: Sequence[Poly], strictly: bool) -> Poly:
     """Return z'Gz, with a G of the evidence that is positive definite, or is nowhere negative."""
     gram = matrix(rows, len(z), len(z))
     demand(definite(gram, strictly), "a matrix is not positive definite")
-    return total(
-        a * b * gram[i][k] * (1 + (i != k)) for i, a in enumerate(z) for k, b in enumerate(z[: i + 1]) if gram[i][k]
-    )
+    return total(a * dot([x * (1 + (i != k)) for k, x in enumerate(gram[i][: i + 1])], z[: i + 1]) for i, a in enumerate(z))
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ ASSUMPTIONS = {
     "changing-outside-torque": "a torque from outside is told as at the attitude told, and changes no faster than told",
     "bounded-push": "torques from outside and errors of the command are no larger than told",
     "held-torque": "the torque is what the law asks for at the last sample, and the error",
+    "best-plan": "the law's torque is of a plan as told, for the given inertia and motion linearised about the rate told",
     "gaussian-noise": "noise is Gaussian, and independent from sample to sample",
     "linear-estimate": "noise drives errors of what the law is told linearly, as for the target's rate at the start",
     "settled-estimate": "an estimate has settled before",

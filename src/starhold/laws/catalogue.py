@@ -95,7 +95,7 @@ class Law(Part):
             teller(gains, craft)
 
     def remember(self, gains: Any, craft: Any, period: float) -> Any:
-        """The memory at the start of a run, made anew for each trajectory."""
+        """The memory at the start of a run, new for each trajectory."""
         maker = getattr(self.module, "remember", None)
         return NoMemory() if maker is None else maker(gains, craft, period)
 

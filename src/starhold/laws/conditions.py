@@ -35,7 +35,7 @@ SETTINGS: Mapping[str, Field] = {
 
 
 class Sight(NamedTuple):
-    """Flight software sees this beside the law's measurement: the body's state as sensors and estimator give it, the
+    """Flight software sees this in addition to the law's measurement: the body's state as sensors and estimator give it, the
     readings of all sensors, and the estimate."""
 
     state: Any
@@ -251,7 +251,7 @@ TESTED: Mapping[str, Tested] = {
         estimates="attitude_deviation",
     ),
 }
-"""Quantities that a condition may test, beside time."""
+"""Quantities that a condition may test, besides time."""
 MEASURED = tuple(f"{name}_{side}" for name in TESTED for side in ("below", "above"))
 TIMES: Mapping[str, Gain] = {
     "not_before": Gain("s", at_least=0.0, text="since the start, or a date: it holds from then on"),

@@ -1,4 +1,4 @@
-"""Only the component of PD feedback across the magnetic field acts, which is all that magnetorquers can give."""
+"""Only the component of PD feedback perpendicular to the magnetic field acts: magnetorquers can give no other."""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@ A law file holds `CARD`, `class Gains(NamedTuple)`, the equation `torque(measure
 memory)` and `examples()`. It may add `lyapunov(measurement, gains, craft)`, design forms (`FORMS` with `design(craft,
 spec)`, `complete(spec, start)` for inputs that the scenario gives, and `design_all(cases)` for many pairs of craft and
 spec, if that is faster than one after another), `check(gains, craft)` that refuses gains that cannot be stable,
-`remember(gains, craft, period)` for a memory that is not empty, and `record(memory, period)` for its recorded
+`remember(gains, craft, period)` for a memory that is not empty, `plan(gains, craft, period)` for the proof of one whose
+torque is the first move of a plan (`predictive.free.Plan`), and `record(memory, period)` for its recorded
 quantities, a NamedTuple whose fields are annotated with `Quantity`. `FROM_OUTSIDE = True`: the torque has to come from
 outside the spacecraft, as that of magnetorquers does and that of wheels does not.
 """

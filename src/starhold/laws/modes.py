@@ -41,7 +41,7 @@ NAME = "modes"
 """The type of such a law in a scenario."""
 AFTER = Gain("s", at_least=0.0, text="least time in the mode")
 DWELL = Gain("s", at_least=0.0, text="time for which all of it must have held without a break")
-WHEELS_LOST = Gain("1", at_least=1.0, text="so many wheels lost, as diagnosed, begin the mode")
+WHEELS_LOST = Gain("1", at_least=1.0, text="how many wheels must be diagnosed as lost for the mode to begin")
 
 
 class Switch(NamedTuple):
@@ -250,7 +250,7 @@ class Modes:
 
     def _noticed(self, gains: Any, losses: Losses, now: Facts, mode: Scalar) -> tuple[Truth, Losses]:
         """Whether a mode is to begin because of a loss in this one: as long as a monitor is tripped, and as the last wheel
-        is lost of those that may be. A monitor begins anew with its modes."""
+        is lost of those that may be. A monitor restarts with its modes."""
         guards, tripped = list[Guard](), 0.0
         numbers = iter(gains[len(gains) - 2 * len(self.monitors) :])
         for place, (monitor, guard) in enumerate(zip(self.monitors, losses.guards, strict=True), 1):

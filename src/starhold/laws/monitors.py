@@ -22,7 +22,7 @@ KINDS: dict[Kind, str] = {
     "residual": "largest difference of a new reading from the estimate",
 }
 """A monitor is of one of these kinds; each comes with the meaning of its limit."""
-TIMES = Gain("1", at_least=1.0, text="so many values in a row, or instants of a range, must be beyond the limit")
+TIMES = Gain("1", at_least=1.0, text="how many values in a row, or instants of a range, must be beyond the limit")
 
 
 class Monitor(NamedTuple):

@@ -15,15 +15,16 @@ from starhold.algebra.scalar import less, maximum, where
 from starhold.algebra.structured import Buffer, when
 from starhold.algebra.vector import Matrix, Vector, add, clip_axes, clip_norm, scale
 from starhold.laws.interface import Card, Gain, Measurement, tracking_torque
+from starhold.laws.predictive.free import Plan, free_moves
 from starhold.laws.predictive.motion import linearise, sample
 from starhold.laws.predictive.problem import COUNTERS, Problem, Store, carve, put_limits, size
 from starhold.laws.predictive.sixes import triple
-from starhold.laws.predictive.solver import Solved, advance, improve
+from starhold.laws.predictive.solver import STALLED, Solved, advance, improve
 from starhold.parts.craft import Craft, tensor
 
 CARD = Card(
     title="Predictive",
-    summary="minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised anew, inside the torque limit",
+    summary="minimises the sum of x'Qx + u'Ru over a horizon of the motion linearised at each step, within the torque limit",
     sources=("published comparison of Lyapunov, sliding-mode and predictive attitude control",),
     assumptions=(
         "rigid body",
@@ -57,7 +58,7 @@ optimum, and whether limits shaped the last plan (1) or not (0), which decides h
 
 
 class Memory(NamedTuple):
-    """The law keeps the numbers of its program between calls, changed in place and made anew for each trajectory, see
+    """The law keeps the numbers of its program between calls, changed in place and new for each trajectory, see
     `predictive.problem`."""
 
     numbers: Buffer
@@ -120,6 +121,16 @@ def terminal_weight(gains: Gains, moments: Matrix | Vector, period: float) -> tu
     if not (np.isfinite(p).all() and np.isfinite(feedback).all()):
         raise ValueError("the weights give no feedback: they are too large, too small, or differ too much in size")
     return p, feedback
+
+
+def plan(gains: Gains, craft: Craft, period: float) -> Plan:
+    """Return what the law plans, for proofs. Errors as of `remember`."""
+    end, _ = terminal_weight(gains, craft.inertia, period)
+    order = [3, 4, 5, 0, 1, 2]
+    end, state = end[np.ix_(order, order)], (*gains.q_rate, *gains.q_attitude)
+    limit = math.inf if gains.limit == UNLIMITED else craft.torque_limit
+    free, cost = free_moves(state, gains.r, end, tensor(craft.inertia), period, gains.horizon)
+    return Plan(gains.horizon, state, gains.r, end, limit, gains.limit == BALL, STALLED, free, cost)
 
 
 def torque(measurement: Measurement, gains: Gains, craft: Craft, memory: Memory) -> tuple[Vector, Memory]:

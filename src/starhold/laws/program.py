@@ -13,6 +13,7 @@ from starhold.kernel.programs import digest
 from starhold.laws.catalogue import Law
 from starhold.laws.interface import Measurement
 from starhold.laws.point import PointMeasurement
+from starhold.laws.predictive.free import Plan, first_move
 from starhold.trace.straight_line import straight_line
 
 ASKED: dict[str, Any] = {
@@ -33,6 +34,15 @@ def law_program(law: Law, gains: Any, craft: Any, period: float, remembers: bool
         return law.command(measurement, gains, craft, memory)[0]
 
     return straight_line(command, measurement=ASKED[law.body], gains=gains, craft=craft)
+
+
+def planned_program(plan: Plan, craft: Any) -> dict[str, Any]:
+    """Return the torque of a plan's first move where its limits shape none, as a program; the craft is an input."""
+
+    def command(measurement: Any, craft: Any) -> Any:
+        return first_move(measurement, plan.free[0], craft)
+
+    return straight_line(command, measurement=ASKED["rigid-body"], craft=craft)
 
 
 def law_digest(law: Law, gains: Any, craft: Any, period: float) -> str:

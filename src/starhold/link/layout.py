@@ -15,7 +15,7 @@ from starhold.simulation.stepper import Readings, Stepper, sensed_of
 
 
 class Field(NamedTuple):
-    """Numbers of one name: where they begin after the time, and how many there are."""
+    """A named block of numbers: its offset after the time, and its length."""
 
     name: str
     first: int

@@ -39,8 +39,8 @@ class Ending(StrEnum):
 
 
 class Rules(NamedTuple):
-    """The flight has so many control steps. rate: how many times faster than the clock it goes, None for lockstep, in which
-    the plant waits; missing: what flies a period without a command in real time."""
+    """steps: the control steps of the flight; rate: how many times faster than the clock it goes, None for lockstep, in
+    which the plant waits; missing: what flies a period without a command in real time."""
 
     steps: int
     rate: float | None = None
@@ -51,7 +51,7 @@ class Plant:
     """A plant that its flight software commands.
 
     `received` takes the bytes that came; `send`, which the owner sets, takes those to be sent. In real time the owner calls
-    `tick` at the time `due` by `clock`. After the end, which `ending` tells, nothing moves."""
+    `tick` at the time `due` by `clock`. After the end, whose reason is `ending`, nothing moves."""
 
     def __init__(
         self, flight: Stepper, about: dict[str, Any], rules: Rules, clock: Callable[[], float] = time.perf_counter
@@ -218,7 +218,7 @@ class Plant:
 
 
 def status(plant: Plant) -> str:
-    """Say in a line how a flight in real time goes: its step, the latest latencies, and what was missed."""
+    """Summarise a flight in real time in one line: the current step, the latest latencies and the missed periods."""
     latest = plant.latencies[-KEPT:]
     latency = f"{1e3 * np.median(latest):.3g} ms, at most {1e3 * max(latest):.3g} ms" if latest else "none yet"
     late = f"plant late by {1e3 * plant.behind:.3g} ms"

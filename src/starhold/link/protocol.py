@@ -101,9 +101,10 @@ def line(message: Message) -> bytes:
 
 
 class Decoder:
-    """Makes messages of the bytes that come, in pieces of any size. The first byte tells the form: `{` begins lines of JSON.
+    """Decodes messages from the bytes received, in pieces of any size. The first byte gives the form: `{` begins lines of
+    JSON.
 
-    What is wrong comes out as a fault, after which the decoder goes on with the next line, or the next frame that is whole.
+    What is wrong comes out as a fault, after which the decoder continues with the next line, or the next complete frame.
     by_plant: the messages are those of a plant, and else of flight software, whose numbers are checked."""
 
     def __init__(self, by_plant: bool = False) -> None:
@@ -161,7 +162,7 @@ class Decoder:
             if fits and len(buffer) < end + TAIL.size:
                 return
             if not fits or TAIL.unpack_from(buffer, end)[0] != zlib.crc32(buffer[:end]):
-                # The next frame may begin within what was taken for one.
+                # The next frame may begin within what looked like one.
                 del buffer[:1]
                 self._skipping = True
                 yield Fault.MALFORMED if version == VERSION or zero != 0 else Fault.VERSION

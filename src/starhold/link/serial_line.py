@@ -11,8 +11,8 @@ from starhold.link.server import Line, Stream, refused
 
 
 async def serial_line(line: Line, device: str, baud: int) -> tuple[str, Callable[[], None]]:
-    """Open a serial device, 8N1 without flow control, whose bytes are one stream of messages. A board that starts anew says
-    hello again. InputError where it cannot be opened, and without the extra `serial`."""
+    """Open a serial device, 8N1 without flow control, whose bytes are one stream of messages. After a reset a board sends
+    its hello message again. InputError where it cannot be opened, and without the extra `serial`."""
     serial = optional("serial", "serve --serial", "serial")
     with refused("--serial, --baud", f"{device} at {baud} baud", "a serial device that nobody else uses, and its baud rate"):
         try:

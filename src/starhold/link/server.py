@@ -20,7 +20,7 @@ SECOND = 1.0
 """The least time between two looks at a flight in real time (s)."""
 
 Listen: TypeAlias = Callable[["Line"], Coroutine[Any, Any, tuple[str, Callable[[], None]]]]
-"""A transport: it begins to listen for a line, and tells its address and what closes it."""
+"""A transport: it begins to listen for a line, and returns its address and a function that closes it."""
 
 
 def serve(
@@ -54,7 +54,7 @@ async def _serve(
 
 @contextlib.contextmanager
 def refused(keys: str, given: str, allowed: str = "an address of this machine, and a port that is free") -> Generator[None]:
-    """Refuse as the user's input what cannot be listened on."""
+    """Report an address that cannot be listened on as an error of the user's input."""
     try:
         yield
     except OSError as error:

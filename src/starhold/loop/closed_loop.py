@@ -294,7 +294,7 @@ class ClosedLoop:
         )
 
     def phases(self, steps: int) -> list[Phase]:
-        """The phases of a run of so many control steps, divided at the events."""
+        """The phases of a run of `steps` control steps, divided at the events."""
         events = (Event(0, self.parts, self.gains, self.craft, self.known), *self.events)
         # Gains and crafts have one form in all phases, so that one kernel flies them all.
         gains = alike([event.gains for event in events])

@@ -85,7 +85,7 @@ def _in_common(value: tuple[Any, ...]) -> str | None:
 
 
 def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
-    """Return the carry of a loop without events after so many control steps in plain Python."""
+    """Return the carry of a loop without events after `steps` control steps in plain Python."""
     step, carry, setup = make_step(loop.composition()), loop.carry(), loop.setup()
     key = (loop.seed, loop.run if run is None else run)
     for k in range(steps):

@@ -17,7 +17,7 @@ from starhold.parts.part import Part
 from starhold.parts.random import Silent
 from starhold.trace.program import Loop, Program, Store
 from starhold.trace.recording import Cells, Recorder
-from starhold.trace.rows import RowRecorder
+from starhold.trace.rows import LanesRecorder, RowRecorder
 from starhold.trace.sharing import differing, split
 
 _HALVES: dict[Any, tuple[tuple[Kernel, Kernel], tuple[int, ...]]] = {}
@@ -95,7 +95,7 @@ def many(
     """The flight of many lanes, recorded: control steps first .. first+count-1 of every lane of `blocks` blocks of lanes, in
     place. Lane 0 is run number `run` and the others follow, or each lane has its own of `runs`. The observer's notes lie
     in `noted`. alike: places of numbers of the carry that are equal in all lanes; they lie in `common`, in this order."""
-    recorder = Recorder()
+    recorder = LanesRecorder()
     with recorder.recording():
         cells = recorder.memory("carry", lanes=True, writable=True)
         common = recorder.memory("common")

@@ -1,6 +1,6 @@
 """Sensors as they are built: mounted a little otherwise than law and filter take them, with axes of another scale that are
-not at right angles, in steps and within limits, read late and a little beside the control instant. What is not asked for
-leaves a sensor's equations as they are."""
+not at right angles, in steps and within limits, read late and a little off the control instant. What is not asked for leaves
+a sensor's equations as they are."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ DELAY = Parameter(
 LONGEST = 64
 """Control periods that a dead time may last."""
 ALMOST = 1e-9
-"""A dead time this near to a control period's multiple, in control periods, is taken for it."""
+"""A dead time is rounded to a multiple of the control period if it is this near to one, in control periods."""
 
 
 def resolution(unit: str) -> Parameter:
@@ -84,7 +84,7 @@ def axes_of(mounting: Vector, errors: Matrix | Vector) -> Axes:
 
 
 def along(axes: Axes, vector: Vector) -> Vector:
-    """A vector as it is along the axes of a sensor."""
+    """The components of a vector along the actual axes of a sensor."""
     return apply(axes, vector) if axes else vector
 
 
@@ -168,7 +168,7 @@ def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dic
 
 
 def kept(sensor: Any, seen: Any) -> Any:
-    """The memory of a sensor for the next control step, with what it has seen."""
+    """A sensor's memory for the next control step, which includes this reading."""
     return Waiting(sensor, seen) if seen else sensor
 
 

@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
@@ -46,7 +46,7 @@ DEMANDED: dict[str, tuple[str, ...]] = {
     "target": ("Params", "examples", "goal"),
     "actuator": ("Params", "examples"),
 }
-"""The attributes that a part of each role must define, beside `CARD` and `ROLE`."""
+"""The attributes that a part of each role must define, besides `CARD` and `ROLE`."""
 EITHER: dict[str, tuple[str, ...]] = {"environment": ("torque", "acceleration"), "actuator": ("command", "rates")}
 """Equations that parts of a role have at least one of."""
 BOUNDS: dict[str, tuple[str, ...]] = {
@@ -108,11 +108,17 @@ def telling(readings: Iterable[str]) -> list[Fitted]:
     return list(chosen.values())
 
 
+@cache
+def entries(group: str) -> tuple[EntryPoint, ...]:
+    """Return what all installed packages offer in a group. They are searched once, not for each role."""
+    return tuple(entry_points(group=group))
+
+
 def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str, AnyPart]:
     """The parts of a role by name: those of a package of starhold, and those that other packages offer."""
     modules = pkgutil.iter_modules(import_module(package).__path__, f"{package}.")
     collected = [make(import_module(entry.name)) for entry in modules if _declares_card(entry.name)]
-    for point in entry_points(group="starhold.parts"):
+    for point in entries("starhold.parts"):
         try:
             module = _loaded(point)
         except BaseException as error:
@@ -132,7 +138,7 @@ def installed(package: str, role: str, make: Callable[..., AnyPart]) -> dict[str
         except ValueError as error:
             _leave_out(point.value, error)
     if role == "law":
-        for point in entry_points(group="starhold.laws"):
+        for point in entries("starhold.laws"):
             _leave_out(point.value, ValueError("its entry point is called starhold.laws, now starhold.parts"))
     return {part.name: part for part in sorted(collected, key=lambda part: part.name)}
 
@@ -219,7 +225,7 @@ def from_file(path: Path, known: Mapping[str, AnyPart], make: Callable[..., AnyP
 
 
 def read_module(path: Path) -> ModuleType:
-    """A file of Python run as a module, again where its text has changed. Errors as of `from_file`."""
+    """Run a Python file as a module, again if its text has changed. Errors as of `from_file`."""
     given, path = path, _real(path)
     source = read_bytes(path)
     # The suffix as given counts too: a link that is called a table is not run.

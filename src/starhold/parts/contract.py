@@ -42,7 +42,7 @@ class NoParams(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """The largest errors that a sensor makes, beside its noise: of the attitude (rad), of the rate (rad/s) and of the
+    """The largest errors that a sensor makes besides its noise: of the attitude (rad), of the rate (rad/s) and of the
     magnetic field (T) that it gives, in norm; `inf` for one without a bound. `bias`: the part of that of the rate that stays
     as it is in body axes (rad/s), which a filter takes out; it takes out no other error."""
 
@@ -61,8 +61,8 @@ DEVIATIONS = 8.0
 
 class Noise(NamedTuple):
     """The Gaussian errors of sensors, as multiples of independent standard normal vectors: of an attitude (3, 3; rad), which
-    is new every so many control periods, and at each control step of the rate (rad/s) and of the change of a gyro's bias
-    until the next (rad/s); the deviation about each axis of that of the magnetic field (T); of the attitudes of further
+    is new after each `every` control periods, and at each control step of the rate (rad/s) and of the change of a gyro's
+    bias until the next (rad/s); the deviation about each axis of that of the magnetic field (T); of the attitudes of further
     sensors (3, 3; rad), new at the same steps."""
 
     attitude: Matrix = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

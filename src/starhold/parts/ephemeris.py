@@ -1,4 +1,4 @@
-"""Sun and Moon by series, to a thousandth of a degree, for parts that are asked for it.
+"""Sun and Moon by series, to a thousandth of a degree, for parts that are set to use it.
 
 The Sun's longitude is that of VSOP87 (Bretagnon and Francou 1988) with the terms above 0.3", less the aberration; its
 latitude, below 1.2", is left out. The Moon's place is that of Meeus, Astronomical Algorithms, chapter 47, without light
@@ -154,8 +154,8 @@ def solar(epoch: Date) -> Solar:
 
 
 def sun_at(time: Scalar, params: Solar) -> tuple[Vector, Scalar]:
-    """The unit vector from the Earth to the Sun as it is seen, and its distance (astronomical units), so many seconds after
-    the start."""
+    """The unit vector from the Earth to the apparent Sun, and its distance (astronomical units), at a time (s) after the
+    start."""
     speeds = [speed for _, _, speed in (*SUN[:2], *QUICK)]
     turns = [begin + speed / (tau * _MILLENNIUM) * time for begin, speed in zip(params.angles, speeds, strict=True)]
     # The first angle is the anomaly less a quarter of a turn.
@@ -185,7 +185,7 @@ def lunar(epoch: Date) -> Lunar:
 
 
 def moon_at(time: Scalar, params: Lunar) -> Vector:
-    """The Moon's place (m, inertial axes, from the Earth's centre) so many seconds after the start."""
+    """The Moon's place (m, inertial axes, from the Earth's centre) at a time (s) after the start."""
     per_second = 1.0 / (360.0 * CENTURY * DAY)
     mean = params.mean + (_MEAN[1] - _PRECESSION) * per_second * time
     units = [

@@ -67,13 +67,13 @@ def iso_text(epoch: Date) -> str:
 
 
 def date_after(epoch: Date, time: float) -> str:
-    """The date in ISO 8601, UTC, so many seconds after an epoch, to the millisecond."""
+    """The date in ISO 8601, UTC, at a time (s) after an epoch, to the millisecond."""
     return (_instant(epoch) + timedelta(seconds=time)).isoformat(timespec="milliseconds")
 
 
 def precession(days: float) -> Quaternion:
-    """The turn from the mean equator and equinox of J2000 to those so many days later (IAU 2006; Capitaine, Wallace and
-    Chapront, Expressions for IAU 2000 precession quantities, 2003)."""
+    """The turn from the mean equator and equinox of J2000 to those `days` later (IAU 2006; Capitaine, Wallace and Chapront,
+    Expressions for IAU 2000 precession quantities, 2003)."""
     t = days / 36525.0
     zeta = 2.650545 + t * (2306.083227 + t * (0.2988499 + t * (0.01801828 + t * (-5.971e-6 - 3.173e-7 * t))))
     z = -2.650545 + t * (2306.077181 + t * (1.0927348 + t * (0.01826837 + t * (-2.8596e-5 - 2.904e-7 * t))))
@@ -85,8 +85,8 @@ def precession(days: float) -> Quaternion:
 
 
 def true_to_mean(days: float) -> Quaternion:
-    """The turn from the true equator and mean equinox (TEME) so many days after J2000 to the mean equator and equinox of
-    that date, to 0.2": the four largest terms of the nutation (Meeus, Astronomical Algorithms, chapter 22)."""
+    """The turn from the true equator and mean equinox (TEME) `days` after J2000 to the mean equator and equinox of that
+    date, to 0.2": the four largest terms of the nutation (Meeus, Astronomical Algorithms, chapter 22)."""
     t = days / 36525.0
     node, sun, moon = (
         radians(at + rate * t) for at, rate in ((125.04452, -1934.136261), (280.4665, 36000.7698), (218.3165, 481267.8813))
@@ -122,14 +122,14 @@ def date_text(epoch: Date) -> str:
 
 def sidereal(days: float) -> float:
     """The turns, from 0 to 1, by which the meridian of Greenwich is ahead of the equinox: mean sidereal time, of days since
-    J2000 (Meeus, Astronomical Algorithms, 12.4). Universal Time is taken for UT1, which is right to 0.9 s."""
+    J2000 (Meeus, Astronomical Algorithms, 12.4). UTC is used as UT1, from which it differs by less than 0.9 s."""
     centuries = days / 36525.0
     more = (280.46061837 + 0.000387933 * centuries**2) / 360.0 + (SIDEREAL - 1.0) * days
     return (days % 1.0 + more) % 1.0
 
 
 def turned(start: float, time: Scalar) -> Scalar:
-    """The turns of the Earth so many seconds after the start, where it was at `start`."""
+    """The turns of the Earth at a time (s) after the start, where it was at `start`."""
     return start + (SIDEREAL / DAY) * time
 
 

@@ -129,14 +129,14 @@ def _known(epoch: Date) -> float:
 
 
 def _at(days: float, rows: tuple[Row, ...]) -> Iterator[tuple[int, int, float, float]]:
-    """Degree, order and coefficients (nT) so many days after J2000."""
+    """Degree, order and coefficients (nT) at this many days after J2000."""
     years = 5.0 * (days - FIRST) / (LAST - FIRST)
     for n, m, g, h, g_change, h_change in rows:
         yield n, m, g + years * g_change, h + years * h_change
 
 
 def field(position: Vector, time: Scalar, params: Numbers) -> Vector:
-    """The magnetic field (T) at a position (m) so many seconds after the start, both in inertial axes; not defined at the
+    """The magnetic field (T) at a position (m) and a time (s) after the start, both in inertial axes; not defined at the
     centre."""
     cosine, sine = cosine_sine(turned(params.turn, time))
     return spun(earth_fixed(spun(position, cosine, -sine), params), cosine, sine)

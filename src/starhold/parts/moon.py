@@ -65,7 +65,7 @@ def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
 
 
 def position(time: Scalar, params: Numbers) -> Vector:
-    """The Moon's place (m, inertial axes, from the Earth's centre) so many seconds after the start."""
+    """The Moon's place (m, inertial axes, from the Earth's centre) at a time (s) after the start."""
     if isinstance(params, series.Lunar):
         return series.moon_at(time, params)
 

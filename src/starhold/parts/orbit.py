@@ -31,7 +31,7 @@ BODIES: dict[str, Body] = {
 """By name. GM from the ephemeris DE440 (Park et al. 2021), equatorial radii of the IAU (Archinal et al. 2018), the Earth's
 of WGS 84."""
 ALIKE = 0.01
-"""Share by which a gravitational parameter may differ from that of the body it is taken for."""
+"""The relative difference up to which a gravitational parameter is recognised as that of a known body."""
 NEWTON = 6.6743e-11
 """Constant of gravitation, m3/(kg s2)."""
 
@@ -110,11 +110,12 @@ def highest_speed(position: Vector, velocity: Vector, gravity: float) -> float:
 
 
 def meets_at(position: Vector, velocity: Vector, gravity: float, radius: float) -> float:
-    """When (s) the motion first comes down to this distance (m) from the centre, infinity for never. The start is beyond."""
+    """When (s) the motion first comes down to this distance (m) from the centre, infinity if never. The motion starts beyond
+    it."""
     distance, energy, radial, _ = _invariants(position, velocity, gravity)
     if lowest(position, velocity, gravity) >= radius:
         return math.inf
-    # A parabola is taken for an ellipse that returns after ages.
+    # A parabola is treated as an ellipse with a very long period.
     energy = energy if abs(energy) > 1e-12 * gravity / distance else -1e-12 * gravity / distance
     a = -0.5 * gravity / energy
     size, rate = abs(a), math.sqrt(gravity / abs(a) ** 3)

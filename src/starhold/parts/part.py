@@ -41,7 +41,7 @@ class Part:
 
     @property
     def table(self) -> str:
-        """The table of a scenario that gives it; "" for one that stands in a [[part]] table."""
+        """The table of a scenario that gives it; "" for one that is given by a [[part]] table."""
         return getattr(self.module, "TABLE", "")
 
     @property

@@ -107,7 +107,7 @@ def largest_torque(
         arms = [float(np.linalg.norm(M - (low + (high - low) * k / 32.0) * np.eye(3), 2)) for k in range(33)]
         others = np.linalg.norm(third[seen].T @ faces, 2) + np.linalg.norm(second[seen].T @ squares[seen], 2)
         largest = max(largest, float(min(arms) + others))
-    # A little more, for what is seen nearly edge on may be taken for hidden.
+    # A little more, because plates seen nearly edge on may count as hidden.
     return largest + TOLERANCE * float(sum(np.linalg.norm(arms, axis=1).sum() for arms in (first, second, third)))
 
 

@@ -1,4 +1,4 @@
-"""Forces that move the orbit, where a part is asked for it: what parts declare for it, and what they share."""
+"""Forces that move the orbit, for parts that are set to apply them: what parts declare for it, and what they share."""
 
 from __future__ import annotations
 

@@ -42,9 +42,9 @@ class Loads(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """All that a measurement is made of beside the state: the goal (None where the loop has no target), whether it
-    never turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s, body), the control
-    period, the limit of the command, and all readings of the sensors, an attribute for each."""
+    """All that a measurement is made of besides the state: the goal (None where the loop has no target), whether it never
+    turns, the modelled torque from outside (N m, body), the effectors' momentum (N m s, body), the control period, the limit
+    of the command, and all readings of the sensors, an attribute for each."""
 
     goal: Any
     still: bool

@@ -11,7 +11,7 @@ from starhold.algebra.vector import most
 from starhold.parts.contract import Parameter
 
 SHORTEST, LONGEST = 0.5, 2.0
-"""Lengths between which four numbers are taken for a direction among quaternions; [0, 1, 1, 1] is one."""
+"""Lengths between which four numbers are read as a quaternion that is to be normalised, such as [0, 1, 1, 1]."""
 ALLOWED = f"a quaternion of length 1, or between {SHORTEST:g} and {LONGEST:g} to be normalised"
 START = Parameter(
     "1", shape=(4,), spread=False, text="assumed attitude at the start: quaternion, inertial to body, scalar first"

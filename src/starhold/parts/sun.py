@@ -71,7 +71,7 @@ def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
 
 
 def sun(time: Scalar, params: Numbers) -> Sun:
-    """The Sun so many seconds after the start."""
+    """The Sun at a time (s) after the start."""
     if isinstance(params, series.Solar):
         return Sun(*series.sun_at(time, params))
     c, s = cosine_sine(params.anomaly + _ANOMALY[1] / (360.0 * DAY) * time)
@@ -85,8 +85,8 @@ def sun(time: Scalar, params: Numbers) -> Sun:
 def in_view(position: Vector, seen: Sun) -> Scalar:
     """The share of the Sun's disc, from 0 to 1, that the Earth leaves in view at a position (m, inertial) outside it.
 
-    The Earth's edge is taken for straight across the disc, which is small beside it: up to geostationary height that changes
-    the share by less than 0.4 %."""
+    The Earth's edge is modelled as straight across the disc, which is small compared with it: up to geostationary height
+    that changes the share by less than 0.4 %."""
     square = dot(position, position)
     # In the form that the Earth's attraction has, so that a kernel computes it once.
     inverse = sqrt(1.0 / square)

@@ -50,7 +50,7 @@ def known_from(deviations: Any, epoch: Date, ephemeris: int, unit: float = 1.0) 
 
 
 def pairs_of(readings: Any, time: Scalar, known: Known) -> list[Pair]:
-    """All directions among the readings of all sensors, so many seconds after the start."""
+    """All directions among the readings of all sensors at a time (s) after the start."""
     every = getattr(readings, "every", (readings,))
     light = sun.sun(time, known.sun).direction if known.sun else ZERO
     pull = magnetic_field.field(readings.position, time, known.field) if known.field else ZERO

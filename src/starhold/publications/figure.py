@@ -49,7 +49,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """Panels side by side in so many columns, row by row."""
+    """Panels in `columns` columns, filled row by row."""
 
     panels: Sequence[Panel] = field(default_factory=tuple[Panel, ...])
     columns: int = 1

@@ -73,8 +73,8 @@ class Printed:
 
 
 def judge(finding: Finding, printed: Sequence[Printed], tolerance: float) -> Verdict:
-    """The verdict on a finding; that of several numbers is the worst of theirs. ValueError where the finding is not of the
-    kind that is printed."""
+    """The verdict on a finding; that of several numbers is the worst of theirs. ValueError where the finding and the printed
+    value are of different kinds."""
     value = finding.value
     if isinstance(value, dict):
         if printed or not value:

@@ -37,7 +37,7 @@ DECADES = 2.0
 DEEPEST = 12.0
 """The most powers of ten that are shown of a quantity over time."""
 NEAR = 1.0
-"""A bound is not drawn if it is farther from all values than so many times their range."""
+"""A bound is not drawn if its distance from all values exceeds this multiple of their range."""
 
 
 def histograms(result: CampaignResult, words: Wording) -> list[dict[str, Any]]:

@@ -138,7 +138,7 @@ def metrics(result: CampaignResult, words: Wording, most: int | None = None) -> 
 
 
 def again(result: CampaignResult, most: int) -> Section | None:
-    """List the runs worth flying again, at most so many of each law, with the command."""
+    """List the runs worth flying again, at most `most` of each law, with the command."""
     rows = [
         [law_cell(result, number), str(item.run), item.why, Cell(item.command, "typed")]
         for number, law in enumerate(result.laws)
@@ -210,7 +210,7 @@ def _claimed(claim: ByClaim) -> str:
         return said
     share = f"{said} It holds for at least {percent(claim.share)} of flights of this duration"
     if claim.misled is None:
-        return f"{share}; what the law is told is not recorded."
+        return f"{share}; the readings that the law is given are not recorded."
     return f"{share}, and the law is told more wrongly than it assumes in {count_text(claim.misled)} of these."
 
 
@@ -225,7 +225,7 @@ UP, DOWN, BOTH = "213,94,0", "0,114,178", "123,63,160"
 
 
 def drivers(causes: Drivers, words: Wording, most: int) -> Section:
-    """List what makes runs of a law fail and what drives its metrics, at most so many of a kind."""
+    """List what makes runs of a law fail and what drives its metrics, at most `most` of a kind."""
     kinds = [
         [_failure(item) for item in causes.inputs if item.significant],
         [_pair(item) for item in causes.pairs if item.significant],

@@ -2,7 +2,8 @@
 
 import warnings
 from base64 import b64encode
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -31,10 +32,26 @@ def without_runs(flights: Sequence[Flight]) -> list[Flight]:
 
 def paint(what: Picture, folder: Path) -> list[Path]:
     """Write the figures into `folder`, which exists, and return their paths."""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), sharing_axes():
         # A name in a script that the font lacks is drawn as boxes; a warning would not help the user.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         return [save(make(), folder / f"{key}.png") for key, make in what.items()]
+
+
+_shared: dict[tuple[Any, ...], tuple[Any, Any, float]] | None = None
+"""The figures whose axes are used again, with their axes and height, by what `blank` makes of them; None: none are."""
+
+
+@contextmanager
+def sharing_axes() -> Generator[None]:
+    """Let figures of one form be one figure, drawn anew, because axes and their ticks take long to make: each figure has to
+    be saved before the next is made."""
+    global _shared
+    _shared = {}
+    try:
+        yield
+    finally:
+        _shared = None
 
 
 def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[Flight], name: str, shaded: Any = ()) -> Any:
@@ -52,11 +69,13 @@ def over_time(plot: Plot, times: Any, marks: Sequence[Mark], flights: Sequence[F
             curve = panel.curves[number]
             width = width_of(number, len(flights), plot.chatters)
             axis.plot(times[: len(curve)], curve, color=colour(number), linewidth=width)
+        axis.set_yscale("log" if panel.log else "linear")
+        # Ticks take most of the drawing time: there are few, and no minor ones are compared with them where there are none.
+        minor = panel.log and panel.decades() <= 2.0
+        axis.xaxis.remove_overlapping_locs, axis.yaxis.remove_overlapping_locs = False, minor
         if panel.log:
-            axis.set_yscale("log")
             label_ticks(axis.yaxis, log=True)
-            # Ticks take most of the drawing time.
-            if panel.decades() > 2.0:
+            if not minor:
                 axis.minorticks_off()
         else:
             # Digits of small numbers would push the labels out of the figure.
@@ -111,13 +130,34 @@ def blank(
     rows: int, columns: int, height: float, title: str, flights: Sequence[Flight], name: str, dashed: str, above: float = 0.0
 ) -> tuple[Any, Any]:
     """Make a figure with its title, its legend and its axes, which leave room above (inches)."""
+    form = rows, columns, height, above, *map(_legend_text, flights)
+    if _shared is not None and form in _shared:
+        figure, axes, total = _shared[form]
+        _clear(figure, axes)
+        _entitle(figure, total, title, name, dashed)
+        return figure, axes
     figure, total, top = headed(height, title, flights, name, dashed, (0.28 if columns > 1 else 0.06) + above)
     grid: Any = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.subplots_adjust(left=0.098, right=0.978, bottom=0.48 / total, top=top, hspace=0.09, wspace=0.14)
     axes = grid.ravel()
     for axis in axes:
         plain(axis)
+    for axis in grid[:-1].ravel():
+        # The place of a label is sought among those of ticks even where there is no label.
+        axis.xaxis.set_label_coords(0.5, 0.0)
+    if _shared is not None:
+        _shared[form] = figure, axes, total
     return figure, axes
+
+
+def _clear(figure: Any, axes: Sequence[Any]) -> None:
+    """Remove what was drawn, and leave the legend, the axes and their ticks."""
+    drawn = [artist for axis in axes for kind in (axis.lines, axis.patches, axis.texts) for artist in kind]
+    for artist in [*figure.texts, *drawn]:
+        artist.remove()
+    for axis in axes:
+        axis.relim()
+        axis.set_autoscaley_on(True)
 
 
 def plain(axis: Any, lines: str = "both") -> None:
@@ -145,10 +185,7 @@ def headed(
     total = height + 0.20 * lines
     figure = Figure(figsize=(8.0, total), dpi=DPI)
     figure.set_layout_engine("none")
-    heading = shortened(f"{name}: {title}" if name else title, 86 - len(dashed))
-    figure.text(0.098, 1.0 - 0.26 / total, heading, fontsize=11, fontweight="bold", parse_math=False)
-    if dashed:
-        figure.text(0.978, 1.0 - 0.26 / total, f"– –  {dashed}", fontsize=8.5, ha="right", color="0.3")
+    _entitle(figure, total, title, name, dashed)
     legend = figure.legend(
         [Line2D([], [], color=colour(number), linewidth=2.2) for number in range(len(flights))],
         [f"law {number}" for number in range(len(flights))],
@@ -166,6 +203,13 @@ def headed(
         text.set_parse_math(False)
         text.set_text(words)
     return figure, total, 1.0 - head / total
+
+
+def _entitle(figure: Any, total: float, title: str, name: str, dashed: str) -> None:
+    heading = shortened(f"{name}: {title}" if name else title, 86 - len(dashed))
+    figure.text(0.098, 1.0 - 0.26 / total, heading, fontsize=11, fontweight="bold", parse_math=False)
+    if dashed:
+        figure.text(0.978, 1.0 - 0.26 / total, f"– –  {dashed}", fontsize=8.5, ha="right", color="0.3")
 
 
 def _legend_text(flight: Flight) -> str:
@@ -222,5 +266,5 @@ def save(figure: Any, path: Path) -> Path:
     """Write a figure to `path`, in a folder that exists, and return the path."""
     with atomic_write(path) as hidden:
         # Fast compression: the files are small either way.
-        hidden.write_bytes(png(figure, 3))
+        hidden.write_bytes(png(figure, 1))
     return path

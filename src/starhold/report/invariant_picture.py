@@ -83,7 +83,8 @@ def _panel(axis: Any, item: Portrait) -> None:
     axis.tick_params(labelsize=8.5)
     name = item.claim.witness["name"] or item.claim.numbers["theorem"]
     shown = "" if level is None else f", V ≤ {down(level)}"
-    shown += "" if item.u is not None else f", projected on {item.names[0]}, {item.names[1]}"
+    # On a line of its own it fits into every panel.
+    shown += "" if item.u is not None else f"\nprojected on {item.names[0]}, {item.names[1]}"
     axis.set_title(f"{name}: {item.claim.outcome}{shown}", fontsize=9.5, loc="left", parse_math=False)
     for side in ("top", "right"):
         axis.spines[side].set_visible(False)

@@ -161,7 +161,7 @@ def _measured(law: Reflown, flight: Flight, table: Any) -> dict[str, Any]:
 
 
 def _script(program: Program) -> dict[str, str]:
-    """A program's text, and the functions in it to call."""
+    """A program's text, and the names of the functions in it that are called."""
     text = JavaScript(program)
     return {"text": str(text), "name": text.name}
 
@@ -171,7 +171,7 @@ def _bytes(numbers: Any) -> str:
 
 
 def _claims(flights: Sequence[Flight], laws: Mapping[str, Reflown]) -> list[dict[str, Any]]:
-    """State the conditions under which each claim of the page stands."""
+    """State the conditions under which each claim of the page remains valid."""
     claims: list[dict[str, Any]] = []
     for number, flight in enumerate(flights):
         if flight.name not in laws:

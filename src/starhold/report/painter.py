@@ -16,17 +16,21 @@ from typing import TYPE_CHECKING, Any
 
 from starhold.errors import InputError
 from starhold.files import clear_unfinished
-from starhold.studies.timing import can_fork
+from starhold.processes import can_fork
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
 
 
+LIBRARY = ("matplotlib.backends.backend_agg", "matplotlib.figure", "starhold.report.ticks", "starhold.report.accuracy")
+"""What figures are drawn with, beside `starhold.report.figures`."""
+
+
 class Painter:
     """A process that draws the figures of flights that `draw` sends it; `finish` waits until it has. Where this process can
-    be copied and there is another processor, it starts at once, and loads its library while laws fly. Leaving the context
-    ends it. Unless `wanted`, nothing is drawn, no process starts, and figures of earlier flights are removed."""
+    be copied and there is another processor, it starts at once, and loads its library beside all that comes before. Leaving
+    the context ends it. Unless `wanted`, nothing is drawn, no process starts, and figures of earlier flights are removed."""
 
     def __init__(self, wanted: bool = True) -> None:
         self._wanted, self._process = wanted, None
@@ -35,7 +39,6 @@ class Painter:
             self._start()
 
     def _start(self) -> None:
-        # A copy of this process has nearly everything loaded.
         context: Any = get_context("fork" if can_fork() else "spawn")
         (self._failures, self._failed), (requests, self._requests) = (context.Pipe(duplex=False) for _ in range(2))
         self._process = context.Process(target=_draw, args=(requests, self._failed, self._requests))
@@ -91,7 +94,8 @@ def _draw(requests: Connection, failures: Connection, other: Connection) -> None
     try:
         from starhold.report.figures import paint
 
-        import_module("matplotlib.backends.backend_agg")
+        for name in LIBRARY:
+            import_module(name)
         picture, folder = requests.recv()
         paint(picture, folder)
     except EOFError:

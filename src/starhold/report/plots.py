@@ -32,7 +32,7 @@ def colour(number: int) -> str:
 Curve: TypeAlias = NDArray[np.float64]
 
 OFF_SCALE = 5.0
-"""Limits more than so many times above all curves are not drawn."""
+"""Limits above this multiple of the largest value of all curves are not drawn."""
 ACTING = ("N", "N m", "N m s", "A m^2")
 """Units of what acts on a body."""
 FLAG = "_is_new"

@@ -65,7 +65,7 @@ PICTURES = ("angle", "wheel-momentum")
 
 
 class Open(str):
-    """A sentence about what is left open."""
+    """A sentence about an open point."""
 
 
 class Listed(Open):

@@ -21,7 +21,7 @@ SAME = 1e-9
 class StabilityMap(NamedTuple):
     """The contents of the map.
 
-    K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: torque asked for over the budget, of the
+    K_a: (POINTS,); K_w: (POINTS,); eta: (POINTS, POINTS), by K_w, then K_a; ask: commanded torque over the budget, of the
     same shape; best: the optimum; ratios: (3,); alpha (rad), omega (1/t0) and budget as given."""
 
     K_a: Any

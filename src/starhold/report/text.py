@@ -20,7 +20,7 @@ ROUNDING = 1e-13
 
 def number_text(value: Any, digits: int = 6) -> str:
     """Show a number, vector or matrix for reading: a diagonal matrix by its diagonal, equal numbers as one, a name
-    unchanged. An entry that is only a rounding error beside the largest reads as 0."""
+    unchanged. An entry that is only a rounding error compared with the largest reads as 0."""
     if isinstance(value, str):
         return value
     array = np.asarray(value, dtype=float)

@@ -1,4 +1,4 @@
-"""Labels of ticks as plain text, because the parser of formulas takes longer than all else that is drawn."""
+"""Labels of ticks as plain text, because matplotlib's parser of formulas takes longer than the rest of a figure."""
 
 import re
 from typing import Any

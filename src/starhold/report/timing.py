@@ -17,7 +17,7 @@ BINS = 60
 
 
 def write_timing(timing: dict[str, Any], folder: Path) -> Path:
-    """Write what `Served.timing` tells into a folder, as JSON and as a picture, and return the picture's path."""
+    """Write `Served.timing` into a folder, as JSON and as a picture, and return the picture's path."""
     numbers, picture = (folder / name for name in TIMING)
     write_text(numbers, json.dumps(timing, allow_nan=False) + "\n")
     return save(draw_timing(timing), picture)

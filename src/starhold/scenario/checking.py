@@ -120,7 +120,7 @@ def pick_law(
 
 
 def _refuse_other_way(law: Law, form: str | None, name: str, where: str, key: str) -> None:
-    """Raise InputError for a gain beside a form, and for an input without its form."""
+    """Raise InputError for a gain given together with a form, and for an input without its form."""
     inputs = {way: {item.name: None for item in law.fields(way)} for way in (None, *law.forms)}
     if name in inputs[form]:
         return

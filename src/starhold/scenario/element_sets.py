@@ -4,7 +4,7 @@ orbit ephemeris message (OEM) by interpolation.
 SGP4 (Hoots and Roehrich 1980; Vallado et al. 2006), of the package `sgp4`, gives position and velocity in axes of the true
 equator and the mean equinox (TEME), which are turned to the mean equator and equinox of date.
 
-What flies from there is the scenario's own motion: `say_distance` says how far it comes to lie from the file's.
+From there on the scenario's own motion is flown: `say_distance` warns how far it departs from the file's.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
 KINDS = ("tle", "omm", "oem")
 BESIDE = ("epoch", "ephemeris")
-"""Keys of [orbit] that may stand beside a file."""
+"""Keys of [orbit] that may accompany a file."""
 FRAMES = (OF_J2000, "ICRF", "GCRF", OF_DATE, "TEME")
-"""Reference frames of an ephemeris that are read. ICRF and GCRF are taken for EME2000, which is 0.02" off."""
+"""Reference frames of an ephemeris that are read. ICRF and GCRF are treated as EME2000, from which they differ by 0.02"."""
 NEAREST = 6
 """States of an ephemeris between which it is interpolated."""
 OLD = 14.0
@@ -75,7 +75,7 @@ class ElementSet(NamedTuple):
         return date_of(import_module("sgp4.conveniences").sat_epoch_datetime(self.satellite()))
 
     def state(self, epoch: Date, later: float = 0.0) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s) so many seconds after an epoch (UTC), in the mean equator and equinox of that
+        """Position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of that
         epoch. ValueError where SGP4 has none."""
         days = days_of(epoch)
         error, position, velocity = self.satellite().sgp4(2451545.0, days + later / 86400.0)
@@ -114,7 +114,7 @@ class Ephemeris(NamedTuple):
         return self.rows[-1][0]
 
     def state(self, epoch: Date, later: float = 0.0) -> tuple[Vector, Vector]:
-        """Position (m) and velocity (m/s) so many seconds after an epoch (UTC), in the mean equator and equinox of that
+        """Position (m) and velocity (m/s) `later` seconds after an epoch (UTC), in the mean equator and equinox of that
         epoch: the polynomial through the nearest positions and velocities. ValueError where there are no states."""
         from scipy.interpolate import KroghInterpolator
 
@@ -180,7 +180,7 @@ def with_orbit(data: Mapping[str, Any], folder: Path, where: str) -> Mapping[str
 
 
 def say_distance(scenario: Scenario) -> None:
-    """Warn how far the motion that flies comes to lie from that of the file that [orbit] names, where it names one."""
+    """Warn how far the flown motion departs from that of the file that [orbit] names, if it names one."""
     orbit = getattr(scenario.table, "orbit", None)
     kind = next((kind for kind in KINDS if getattr(orbit, kind, None) is not None), None)
     if orbit is None or kind is None:

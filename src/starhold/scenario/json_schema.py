@@ -43,8 +43,8 @@ def _file_schema(body: Body) -> dict[str, Any]:
 
 
 def _law_schemas(body: Body, base: type[LawTable], known: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return JSON Schemas of the tables of all laws for a body, and of a law from a file, with the keys of `base` beside the
-    gains; add their definitions to the known ones."""
+    """Return JSON Schemas of the tables of all laws for a body, and of a law from a file, with the keys of `base` besides
+    the gains; add their definitions to the known ones."""
     tables: list[dict[str, Any]] = []
     for model in (
         law_model(law, form, base, tuple(body.tables.SHARED)) for law in body.laws().values() for form in (None, *law.forms)

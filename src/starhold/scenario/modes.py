@@ -166,7 +166,7 @@ CONDITIONS = ("until", "back")
 
 
 class ModeTable(LawTable):
-    """The keys of every mode's table beside its law's own gains."""
+    """The keys of every mode's table besides its law's own gains."""
 
     name: Annotated[Name, Field(description="how switches, recordings and certificates call it")]  # pyright: ignore
     target: Annotated[

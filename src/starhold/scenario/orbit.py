@@ -84,7 +84,7 @@ def _file(what: str, gives: str = "SGP4 gives the state at the epoch, by default
 
 
 def _read_elements(given: Any) -> Any:
-    """Elements are read with the file; what stands here without has no folder."""
+    """Elements are read with the file; a table without one has no folder."""
     if given is not None and not isinstance(given, ElementSet | Ephemeris):
         raise refuse("a key of [orbit] of a scenario, which has a folder")
     return given

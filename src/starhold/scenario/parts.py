@@ -36,14 +36,14 @@ SINGLE = {"estimator": "one estimator for the law; others with watches = true", 
 
 
 class PartTable(Table):
-    """The keys of a part's table beside the part's own parameters."""
+    """The keys of a part's table besides the part's own parameters."""
 
     type: str
     name: Annotated[Name | None, Field(description="its name in recordings and errors; the type if absent")] = None
 
 
 class EstimatorTable(PartTable):
-    """The keys of an estimator's table beside its own parameters."""
+    """The keys of an estimator's table besides its own parameters."""
 
     watches: Annotated[bool, Field(description="whether it is only recorded and compared; the law uses another one")] = False
     started_by: Annotated[

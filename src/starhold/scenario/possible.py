@@ -83,7 +83,7 @@ def _wheels(parts: Iterable[Fitted]) -> list[Fitted]:
 
 
 def _stored(parts: Iterable[Fitted]) -> float:
-    """The largest momentum (N m s) that the parts of a loop which take the command can store, in norm, as laws are told it:
+    """The largest momentum (N m s) that the parts of a loop which take the command can store, in norm, as laws are given it:
     wheels, of which each is full one way or the other; infinity where others may store any."""
     acting = [fitted for fitted in parts if fitted.part.role == "effector" and fitted.part.flag("ACTS")]
     wheels = _wheels(acting)

@@ -40,7 +40,7 @@ class LawEntry:
     law: Law
     gains: Any
     options: Any
-    """The values of the keys that a body adds to law tables beside gains, a NamedTuple."""
+    """The values of the keys that a body adds to law tables besides gains, a NamedTuple."""
     form: str | None = None
     spec: Any = None
     """The design form of the gains, and its inputs; None where the file gives the gains themselves."""

@@ -52,7 +52,7 @@ class ScenarioTable(Table):
 
 
 class LawTable(Table):
-    """The keys of every law table beside the law's own gains; a body's own class adds to them."""
+    """The keys of every law table besides the law's own gains; a body's own class adds to them."""
 
     type: str
     name: Annotated[Name | None, Field(description="its name in tables and folders; the type if absent")] = None

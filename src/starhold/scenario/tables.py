@@ -13,7 +13,7 @@ from starhold.parts.contract import Field as Parameter
 class Table(BaseModel):
     """A table that refuses keys it does not know."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 Flag: TypeAlias = Annotated[bool, Field(strict=True)]

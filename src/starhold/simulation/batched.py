@@ -197,25 +197,28 @@ def windows_of(
         done = cut
 
 
-def begin_metered(
-    pool: ThreadPool,
-    loop: ClosedLoop,
-    carries: Array,
-    phases: Sequence[Phase],
-    first_run: int | NDArray[np.int64],
-    observers: tuple[Observer, Observer],
-    noted: Array,
-    cuts: Sequence[int],
-    late: int,
-    rows: Sequence[int],
-) -> Callable[..., Metered]:
-    """Begin to fly lanes through phases, noting also the instant after the last step, whose command does not fly. Return a
-    function that waits for the end and reports progress.
+class Flights(NamedTuple):
+    """Lanes that fly through phases, from `carries` (numbers, lanes), see `carry_columns`, and what is noted of them.
 
-    carries: (numbers, lanes), see `carry_columns`; observers: one before the control step `late` and one from it on; noted:
-    notes before the flight (numbers, lanes); cuts: control steps at which windows end, `late` among them unless it is 0, the
-    last, which includes the last instant, at the end of the flight or after it; rows: notes that restart at 0 in each
-    window."""
+    observers: one before the control step `late` and one from it on; noted: notes before the flight (numbers, lanes); cuts:
+    control steps at which windows end, `late` among them unless it is 0, the last, which includes the last instant, at the
+    end of the flight or after it; rows: notes that restart at 0 in each window."""
+
+    loop: ClosedLoop
+    carries: Array
+    phases: Sequence[Phase]
+    first_run: int | NDArray[np.int64]
+    observers: tuple[Observer, Observer]
+    noted: Array
+    cuts: Sequence[int]
+    late: int
+    rows: Sequence[int]
+
+
+def begin_metered(pool: ThreadPool, flights: Flights) -> Callable[..., Metered]:
+    """Begin to fly lanes, noting also the instant after the last step, whose command does not fly. Return a function that
+    waits for the end and reports progress."""
+    loop, carries, phases, first_run, observers, noted, cuts, late, rows = flights
     batch = RunningBatch(loop, carries, first_run, widest(len(carries), len(noted)), observers[0], noted)
     for phase in phases:
         for observer in observers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,7 +12,7 @@ from starhold.algebra.structure import places
 from starhold.loop.closed_loop import ClosedLoop, Phase
 from starhold.loop.kernels import Arguments, Numbers, Observer, make_program
 from starhold.loop.programs import CHUNK, many
-from starhold.simulation.batched import Metered, windows_of
+from starhold.simulation.batched import Flights, Metered, windows_of
 from starhold.simulation.lanes import ThreadPool, numbered
 from starhold.trace.device import Device, Rows
 
@@ -58,19 +58,9 @@ class DeviceBatch:
         return self._ready[key][1:]
 
 
-def begin_on_device(
-    device: Device,
-    loop: ClosedLoop,
-    carries: Array,
-    phases: Sequence[Phase],
-    first_run: int | NDArray[np.int64],
-    observers: tuple[Observer, Observer],
-    noted: Array,
-    cuts: Sequence[int],
-    late: int,
-    rows: Sequence[int],
-) -> Callable[..., Metered]:
-    """Begin to fly lanes through phases on a GPU; arguments and results are those of `begin_metered`, to the last bit."""
+def begin_on_device(device: Device, flights: Flights) -> Callable[..., Metered]:
+    """Begin to fly lanes on a GPU; the results are those of `begin_metered`, to the last bit."""
+    loop, carries, phases, first_run, observers, noted, cuts, late, rows = flights
     batch = DeviceBatch(device, loop, carries, first_run, noted)
     lanes, size = batch.lanes, 8 * batch.lanes
     by_window = Rows(device, len(cuts) * len(rows), lanes)

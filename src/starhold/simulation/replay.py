@@ -16,7 +16,7 @@ from starhold.simulation.stepper import sensed_of
 
 
 def given_like(loop: ClosedLoop) -> Given:
-    """Make the row of a loop at a control instant, as it is at the start."""
+    """Make the row of a loop at a control instant, with its values at the start."""
     carry = loop.carry()
     return Given(sensed_of(loop)[1], carry.state, carry.effectors, carry.command)
 

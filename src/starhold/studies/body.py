@@ -80,7 +80,7 @@ class BodyStudy:
         return [name for name in run.columns if name in run.arrays]
 
     def resources(self, entry: LawEntry) -> Values:
-        """List the options of a law beside its gains."""
+        """List the options of a law besides its gains."""
         return {}
 
     def compile_calls(self, loop: Any) -> None:

@@ -175,7 +175,7 @@ def _grown(one: Issued, claim: Claim, until: float) -> str:
     n, subject = claim.numbers, one.certificate.subject
     loop = one.loop.without("sensor", "estimator")
     begun = float(momentum_of(loop, shown_at(loop, loop.start)))
-    # What a law is told comes beside what it is not told.
+    # The modelled torque, which the law is given, adds to the unmodelled one.
     torque = n.get("torque", 0.0) + (subject["modelled_torque_norm"] if n.get("told", True) else 0.0)
     most = math.inf if n.get("torque_per_rate") else begun + torque * until
     if most <= n["momentum"] * (1.0 + 1e-9):

@@ -33,7 +33,7 @@ Array: TypeAlias = NDArray[np.float64]
 FULL = 0.99
 """Share of its momentum limit at which a wheel counts as saturated: beyond it the motor loses its outward torque."""
 HORIZON = 1000
-"""Growth is extrapolated over so many orbits; slower growth counts as none."""
+"""The most orbits over which growth is extrapolated; slower growth counts as none."""
 WEAK = 1e-3
 """Singular values of the axes below this share of the largest mark directions without authority."""
 SINGULAR = 1e-9

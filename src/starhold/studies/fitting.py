@@ -32,7 +32,7 @@ from starhold.trace.tangent import MARK, tangent
 Array: TypeAlias = NDArray[np.float64]
 Nodes: TypeAlias = Callable[[int, Array], Array]
 START = tuple(f"{name}_{axis}" for name in ("initial turn", "initial rate") for axis in "xyz")
-"""The start is always free: a rotation vector (rad) of the attitude, body axes, and the rate (rad/s)."""
+"""The start is always estimated: a rotation vector (rad) that corrects the attitude, in body axes, and the rate (rad/s)."""
 WIDTH = 16
 """Slopes that are computed at once."""
 NUDGE = 1e-6
@@ -199,7 +199,7 @@ class Predictor:
     def __call__(
         self, x: Array, steps: int, commands: Array, cuts: Sequence[int] = (), nodes: Nodes | None = None
     ) -> Prediction:
-        """Fly for so many control steps and one more, which shows the last readings.
+        """Fly for `steps` control steps and one more, which shows the last readings.
 
         x: (free + 4,), see `begun`; commands: (steps + 1, 3) N m; cuts: the steps at which `nodes` gives what the next
         segment begins with, attitude and rate (7,), of its number and of what the last one ended with."""

@@ -33,7 +33,7 @@ class Flat:
 
     @classmethod
     def of(cls, loop: ClosedLoop, steps: int, entered: bool = False) -> Flat:
-        """Return the numbers of a loop that flies so many control steps; `entered`: with the carry after the first phase has
+        """Return the numbers of a loop that flies `steps` control steps; `entered`: with the carry after the first phase has
         begun, which may change it."""
         phases = loop.phases(steps)
         carry = phases[0].entered(loop.carry()) if entered else loop.carry()

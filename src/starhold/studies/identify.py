@@ -21,7 +21,7 @@ from starhold.scenario.building import build
 from starhold.scenario.checking import nearest
 from starhold.scenario.reading import LawEntry, Scenario
 from starhold.studies.fitting import START, Array, Free, Nodes, Prediction, Predictor, Reading
-from starhold.studies.observable import UNTOLD, Posterior, posterior_of
+from starhold.studies.observable import UNDETERMINED, Posterior, posterior_of
 from starhold.studies.residuals import Weighed, ljung_box, noise_of
 from starhold.studies.telemetry import Telemetry, read
 
@@ -31,10 +31,10 @@ COMMANDS = {
     "none": "No command acts: the craft tumbles freely.",
 }
 SPAN, SEGMENTS = 0.5, 500
-"""The craft turns by about so much in a segment of the flight (rad), of which there are at most so many."""
+"""The angle (rad) by which the craft turns in a segment of the flight, about, and the most segments."""
 STEPS = 40
 NEAR = 2.0
-"""A reading tells the state at an instant from which it is fewer control periods away."""
+"""A reading is used for the state at an instant if it is fewer control periods away than this."""
 TURN = 0.5
 """The initial attitude turns by at most so much in a step (rad)."""
 CLOSED = 1.0
@@ -49,9 +49,9 @@ HALVINGS = 12
 @dataclass(frozen=True)
 class Identified:
     """A fit gives these. values: of the free numbers; start: attitude and rate (7,) at time 0; posterior: their covariance,
-    and what is not told; residuals: by reading times and residuals (n, size) in deviations; readings: the rows that were
+    and what is undetermined; residuals: by reading times and residuals (n, size) in deviations; readings: the rows that were
     read, and those of the fit; whiteness: by residual the p-value of Ljung and Box; chi2: the sum of squared residuals, with
-    its degrees of freedom; units: of the readings; notes: sentences about what is left out."""
+    its degrees of freedom; units: of the readings; notes: sentences about omissions."""
 
     scenario: Scenario
     free: Free
@@ -103,7 +103,7 @@ class Identified:
         return {place.key: np.array(value).tolist() for place, value in zip(self.free.places, shaped, strict=True)}
 
     def learnt(self) -> Scenario:
-        """The scenario with the numbers that were found, and a campaign over what is left uncertain about them."""
+        """The scenario with the estimated numbers, and a campaign over their remaining uncertainty."""
         changed = self.scenario.with_(self.fitted())
         return self.posterior.over(changed, self.free, self.values)
 
@@ -129,7 +129,7 @@ def study(
 
 
 class Fit:
-    """Telemetry beside the predictor of a scenario. One predictor serves any number of flights."""
+    """Telemetry with the predictor of a scenario. One predictor serves any number of flights."""
 
     def __init__(self, scenario: Scenario, predictor: Predictor, telemetry: Telemetry, kind: str = "recorded") -> None:
         """kind: of the commands, see COMMANDS."""
@@ -251,7 +251,7 @@ class Fit:
             if lowered < SETTLED and settled:
                 break
             if lowered < SETTLED:
-                # Once more from where combinations that are not told are nearest to the file's numbers.
+                # Once more, with undetermined combinations as near to the file's numbers as possible.
                 settled, x = True, self._restored(x, slopes[:, :-1])
                 given = self._whole(x)
                 continue
@@ -267,8 +267,8 @@ class Fit:
         return x, given, number, settled
 
     def _step(self, values: Array, slopes: Array, relaxed: float) -> tuple[Array, float]:
-        """A Gauss-Newton step, (free,), and the part of it to go. It is damped, that what readings hardly tell does not run
-        away while they are far off, and 0 along what no reading depends on."""
+        """A Gauss-Newton step, (free,), and the part of it to go. It is damped, so that weakly observable directions do not
+        run away while residuals are large, and is 0 along unobservable ones."""
         if not np.isfinite(slopes).all():
             raise InputError(self.scenario.where, "", "", "the flight diverges under the numbers of the file")
         damping = self._damping * relaxed * np.sqrt(values @ values / len(values))
@@ -277,15 +277,15 @@ class Fit:
         rows = np.vstack([few[:, :-1], np.diag(damping)])
         sizes = np.linalg.norm(rows, axis=0)
         sizes[sizes == 0.0] = 1.0
-        step = np.linalg.lstsq(rows / sizes, -np.append(few[:, -1], np.zeros(len(damping))), rcond=UNTOLD)[0] / sizes
+        step = np.linalg.lstsq(rows / sizes, -np.append(few[:, -1], np.zeros(len(damping))), rcond=UNDETERMINED)[0] / sizes
         return step, min(1.0, TURN / max(1e-300, float(np.abs(step[:3]).max())))
 
     def _restored(self, x: Array, slopes: Array) -> Array:
         """The free numbers moved along what readings do not tell, to be as near to the file's as can be."""
         free, now = self.predictor.free, x[len(START) : -4]
         sizes = np.where(free.sizes > 0.0, free.sizes, 1.0)
-        untold, off = posterior_of(slopes, free, now).untold / sizes, (now - free.values) / sizes
-        back = untold.T @ np.linalg.lstsq(untold.T, off)[0] if len(untold) else 0.0 * off
+        undetermined, off = posterior_of(slopes, free, now).undetermined / sizes, (now - free.values) / sizes
+        back = undetermined.T @ np.linalg.lstsq(undetermined.T, off)[0] if len(undetermined) else 0.0 * off
         return np.concatenate([x[: len(START)], now - back * sizes, x[-4:]])
 
     def _whole(self, x: Array) -> Prediction:

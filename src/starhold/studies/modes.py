@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 NEXT = "another mode begins"
 SEEN = 2_000
-"""The number of samples of a run at which conditions that never held are looked at again."""
+"""The number of samples of a run at which conditions that never held are evaluated again."""
 SPARE, SLOW = 1.05, math.radians(0.3)
 """The margin of a rate that a mode hands over, and the least rate (rad/s) from which the next mode is to be proved."""
 STORED, RELEASED = "wheel_momentum_above", "wheel_momentum_below"
@@ -97,7 +97,7 @@ def never_begun(law: Law, gains: Any, run: Recording) -> tuple[str, ...]:
 
 def _missed(module: Modes, gains: Any, run: Recording, switch: Switch, numbers: list[Any]) -> str:
     """Why the condition of a switch, with these numbers, held nowhere in a run, as far as one of its tests says it alone;
-    the place of the craft and the time are all that is looked at."""
+    only the position of the craft and the time are considered."""
     (after, dwell, *levels), end = numbers, float(run["time"][-1])
     given = dict(zip(switch.keys, levels, strict=True))
     begin = max(after, given.get("not_before", 0.0)) + dwell

@@ -1,4 +1,4 @@
-"""A fit tells so much of its free numbers: their covariance, and by name the combinations that no reading depends on."""
+"""A fit determines this of its free numbers: their covariance, and by name the combinations that no reading depends on."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from starhold.scenario.checking import read_toml
 from starhold.scenario.reading import Scenario
 from starhold.studies.fitting import Array, Free
 
-UNTOLD = 1e-8
-"""A combination of free numbers, each measured by how much readings depend on it, is not told where its singular value is
-below this share of the largest."""
+UNDETERMINED = 1e-8
+"""A combination of free numbers, each measured by how much readings depend on it, counts as undetermined if its singular
+value is below this share of the largest."""
 SHARE = 1e-4
 """Numbers that take a smaller share in such a combination are not named."""
 ALIKE = 1e-4
 """Vectors are proportional where the square of the sine between them is below this."""
 SIZELESS = 1e4
-"""A key without a size is measured by so many times what its readings alone would leave uncertain."""
+"""A key without a size is measured in units of what its readings alone would leave uncertain, times this."""
 LEVEL = 0.95
 WIDTH = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
 """Half the interval of this level, in standard deviations."""
 
 
 class Posterior(NamedTuple):
-    """The covariance of the free numbers, infinite on the diagonal for those that are not told; untold: directions (m, free)
-    along which readings stay as they are, and sentences that name them; rank: combinations that are told, the start's
+    """The covariance of the free numbers, infinite on the diagonal for undetermined ones; undetermined: directions (m, free)
+    along which readings do not change, and sentences that name them; rank: combinations that are determined, the start's
     included; singular: the singular values of the weighted Jacobian with columns of length 1."""
 
     covariance: Array
-    untold: Array
+    undetermined: Array
     sentences: tuple[str, ...]
     rank: int
     singular: Array
 
     def barely(self, free: Free) -> Any:
-        """Which numbers are told no better than to the size of their key."""
-        return self.is_told & (free.sizes > 0.0) & (WIDTH * self.deviations > free.sizes)
+        """Which numbers are determined no better than to the size of their key."""
+        return self.is_determined & (free.sizes > 0.0) & (WIDTH * self.deviations > free.sizes)
 
     @property
     def deviations(self) -> Array:
@@ -46,18 +46,18 @@ class Posterior(NamedTuple):
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
-    def is_told(self) -> Any:
-        """Which numbers are told."""
+    def is_determined(self) -> Any:
+        """Which numbers are determined."""
         return np.isfinite(np.diagonal(self.covariance))
 
     @property
     def correlations(self) -> Array:
-        """Correlations of the free numbers, NaN of those that are not told."""
-        sizes = np.where(self.is_told, self.deviations, np.nan)
+        """Correlations of the free numbers, NaN of undetermined ones."""
+        sizes = np.where(self.is_determined, self.deviations, np.nan)
         return self.covariance / np.outer(sizes, sizes)
 
     def over(self, scenario: Scenario, free: Free, values: Array) -> Scenario:
-        """The scenario with a campaign over the numbers that are told, together, but for whole matrices."""
+        """The scenario with a campaign that draws the determined numbers jointly, whole matrices apart."""
 
         tables = dict[str, Any](read_toml(scenario.text, scenario.where).get("campaign", {}))
         dropped = {place.key for place in free.places}
@@ -70,7 +70,7 @@ class Posterior(NamedTuple):
         groups = [
             [k for k, name in enumerate(free.names) if name.startswith(p.key)] for p in free.places if len(p.shape) == 2
         ]
-        fit = self.is_told & ~self.barely(free)
+        fit = self.is_determined & ~self.barely(free)
         groups.append([k for k, whole in enumerate(matrix) if not whole and fit[k]])
         for group in groups:
             if group and fit[group].all():
@@ -88,7 +88,7 @@ def _table(covariance: Array) -> dict[str, Any]:
 
 
 def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
-    """Return what residuals of unit variance with these slopes (n, start + free) tell; the start is free beside."""
+    """Return what residuals of unit variance with these slopes (n, start + free) determine; the start is estimated too."""
     # As few rows as there are numbers have the same squares.
     few: Any = np.linalg.qr(slopes, mode="r")
     slopes = few
@@ -96,22 +96,22 @@ def posterior_of(slopes: Array, free: Free, values: Array) -> Posterior:
     lengths[lengths == 0.0] = 1.0
     first = slopes.shape[1] - len(free.names)
     _, singular, axes = linalg.svd(slopes / lengths, full_matrices=False)
-    kept = singular > UNTOLD * singular[0]
+    kept = singular > UNDETERMINED * singular[0]
     parts = (axes[kept] / singular[kept, None])[:, first:] / lengths[first:]
     covariance = parts.T @ parts
-    # Keys without a size are told unless they are as good as another.
+    # Keys without a size are determined unless they have the same effect as another.
     sizes = np.where(free.sizes > 0.0, free.sizes, SIZELESS / lengths[first:])
     _, among, combined = linalg.svd(axes[~kept][:, first:], full_matrices=False)
-    untold = _reduced(combined[among > SHARE] / lengths[first:] / sizes)
-    for k in np.flatnonzero((np.abs(untold) > SHARE).any(axis=0)):
+    undetermined = _reduced(combined[among > SHARE] / lengths[first:] / sizes)
+    for k in np.flatnonzero((np.abs(undetermined) > SHARE).any(axis=0)):
         covariance[k, k] = np.inf
     # What is left of the free numbers once the start has explained what it can.
     few = np.linalg.qr(slopes / np.append(lengths[:first], 1.0 / sizes), mode="r")
     _, known, axes = np.linalg.svd(few[first:, first:])
-    hardly = _reduced(axes[: len(axes) - len(untold)][known[: len(axes) - len(untold)] < WIDTH])
-    sentences = [_sentence(row, free, values / sizes, "do not determine") for row in untold]
+    hardly = _reduced(axes[: len(axes) - len(undetermined)][known[: len(axes) - len(undetermined)] < WIDTH])
+    sentences = [_sentence(row, free, values / sizes, "do not determine") for row in undetermined]
     sentences += [_sentence(row, free, values / sizes, "barely constrain") for row in hardly]
-    return Posterior(covariance, untold * sizes, tuple(sentences), int(kept.sum()), singular)
+    return Posterior(covariance, undetermined * sizes, tuple(sentences), int(kept.sum()), singular)
 
 
 def _reduced(rows: Array) -> Array:

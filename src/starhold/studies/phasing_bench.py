@@ -77,8 +77,8 @@ def blocks_of(stage: Stage) -> Iterator[tuple[Block, int]]:
 
 
 class Stimulus(NamedTuple):
-    """The craft is given this: words, the carry in which the loop stands, the torque that is asked for (None: the law
-    commands), the stages that answer to it, and the quantities of sensors and estimator that the sheet shows."""
+    """A stimulus: words, the carry of the loop, the commanded torque (None: the law commands), the stages that answer to it,
+    and the quantities of sensors and estimator that the sheet shows."""
 
     name: str
     carry: Any
@@ -89,7 +89,7 @@ class Stimulus(NamedTuple):
 
 
 class _Stand:
-    """This stands in for the module of a part, some of whose equations are others."""
+    """Replaces the module of a part, with some of its equations exchanged."""
 
     def __init__(self, module: Any, **equations: Any) -> None:
         self.__dict__ |= equations | {"_module": module}
@@ -99,7 +99,7 @@ class _Stand:
 
 
 class Bench:
-    """A loop without environment stands on target at rest, with sensors that have no noise and rotors that do not turn."""
+    """A loop at rest on target, without environment, sensor noise or rotor spin."""
 
     def __init__(self, loop: ClosedLoop, law: str) -> None:
         still = tuple(replace(f, start=None) if f.part.role == "effector" else f for f in loop.parts)
@@ -137,7 +137,7 @@ class Bench:
         return self._shown
 
     def _listened(self, fitted: Fitted) -> Part:
-        """A sensor or estimator that tells its vectors in body axes, and takes what is said for them."""
+        """A sensor or estimator that shows its vectors in body axes and accepts others in their place."""
         module, sensor = fitted.part.module, fitted.part.role == "sensor"
         kind = module.Reading if sensor else module.Estimate
         others = [n for n in kind._fields if sensor and n not in self.rest._fields]
@@ -170,7 +170,7 @@ class Bench:
         return replace(fitted.part, module=_Stand(module, **equation))  # pyright: ignore[reportArgumentType]
 
     def _watched(self, fitted: Fitted, params: Any) -> Part:
-        """An effector that tells what each of its units does and its torque, and takes what is said for the first."""
+        """An effector that shows its torque and what each of its units does, and accepts other values for the units."""
         module: Any = fitted.part.module
         acts = fitted.part.flag("ACTS")
         if not acts and not fitted.part.flag("OUTSIDE"):
@@ -259,7 +259,7 @@ class Bench:
         return tuple(stage for stage in self.stages if stage.kind in ("share", "torque") and stage.part in names)
 
     def _fields(self, magnet: Stage | None, k: int) -> Iterator[tuple[str, Any]]:
-        """The craft as it rests; or with the magnetic field along each of the two other axes."""
+        """The craft at rest; and with the magnetic field along each of the two other axes."""
         if magnet is None:
             yield "", self.rest
             return

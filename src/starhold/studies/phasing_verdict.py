@@ -30,14 +30,14 @@ NEAR = 0.35
 CLEAR = 0.15
 """A number has a sign from this share of the largest of its vector on."""
 TINY, FLOOR = 0.02, 0.1
-"""A vector below the first share of the expected one is none; up to the second share what is seen may be none."""
+"""An observed vector below the first share of the expected one counts as absent; up to the second it may be absent."""
 FAR = 3.0
 """A vector this many times longer or shorter than it should be has another size."""
 SIGNS = {"+": 1.0, "-": -1.0, "\N{MINUS SIGN}": -1.0, "0": 0.0}
 SHOWN = 12
-"""Explanations that are listed."""
+"""The most explanations that are listed."""
 ALIKE = 1
-"""Decimals of a vector, relative to its largest number, in which stages are told apart while they are searched."""
+"""Decimals of a vector, relative to its largest number, by which stages are distinguished in the search."""
 
 
 class Seen(NamedTuple):
@@ -189,8 +189,8 @@ def explained(sheet: Sheet, values: Sequence[float | str | None]) -> list[tuple[
 
 
 def _fitting(sheet: Sheet, tests: Mapping[tuple[int, int], Sequence[Test]], most: int) -> Iterator[tuple[Mistake, ...]]:
-    """All sets of so many mistakes that pass the tests, tried at once stage by stage along the loop. For each stimulus a
-    set has the number of a state, which is what the stages before show; the equations are called once for each state."""
+    """All sets of `most` mistakes that pass the tests, tried at once stage by stage along the loop. For each stimulus a set
+    has the number of a state, which is what the stages before show; the equations are called once for each state."""
     states: list[list[dict[Stage, Array]]] = [[{}] for _ in sheet.stimuli]
     shown = {cell.at[1] for cell in sheet.cells}
     sets, ids = np.zeros((1, 0), dtype=int), np.zeros((1, len(sheet.stimuli)), dtype=int)

@@ -1,4 +1,4 @@
-"""Recorded sensor data are replayed: what a scenario's estimator and law make of them, beside what was recorded."""
+"""Recorded sensor data are replayed: what a scenario's estimator and law make of them, compared with what was recorded."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, repr=False)
 class Comparison:
-    """A computed quantity beside a recorded one, at the times (n,) in s at which that was recorded: both (n, k), and of each
+    """A computed quantity with the recorded one, at the times (n,) in s at which that was recorded: both (n, k), and of each
     sample the size of the difference and the one that is allowed, (n,), in the quantity's unit, as angles (rad) for
     attitudes."""
 
@@ -150,7 +150,7 @@ def _given(loop: ClosedLoop, values: dict[str, Array], telemetry: Telemetry, fir
     known = {name: part(getattr(like.state, name), name if name in fields else "") for name in like.state._fields}
     state = like.state._replace(**known)
     if first and "position" in fields and "position" not in values:
-        # The orbit goes on by itself until the first sample.
+        # The orbit alone is propagated until the first sample.
         flown = fly(loop, first, first)[1].state
         for name in ("position", "velocity"):
             for column, number in zip(getattr(state, name), getattr(flown, name), strict=True):
@@ -215,7 +215,7 @@ def _readings(loop: ClosedLoop, like: Any, values: dict[str, Array], telemetry: 
 
 
 def _effector_names(loop: ClosedLoop) -> dict[tuple[int, str], str]:
-    """The recorded name of each number of an effector's state that goes on from one control step to the next."""
+    """The recorded name of each number of an effector's state that is carried from one control step to the next."""
     names = [name for name, _, _ in recorded(loop)][len(loop.body.module.Sample._fields) :]
     matched: dict[tuple[int, str], str] = {}
     for place, (fitted, inner) in enumerate(zip(loop.used("effector"), loop.carry().effectors, strict=True)):
@@ -265,7 +265,7 @@ def _angles(computed: Array, seen: Array) -> Array:
 
 
 def _deviation(loop: ClosedLoop, run: Recording, name: str) -> Array | None:
-    """The standard deviation (n,) of an estimate: the one that the estimator tells, else that of the sensors' noise."""
+    """The standard deviation (n,) of an estimate: the one that the estimator reports, else that of the sensors' noise."""
     if f"{name}_deviation" in run.columns:
         return np.linalg.norm(run[f"{name}_deviation"], axis=1)
     prefix, _, field = name.rpartition("_")

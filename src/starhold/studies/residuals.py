@@ -20,7 +20,7 @@ SINGULAR = 1e-9
 LAGS = 20
 """Lags of the test of Ljung and Box."""
 TURNS = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.6, 0.8, 0.0, 0.0), (0.6, 0.0, 0.8, 0.0))
-"""A sensor that sees nothing at the start is looked at in these attitudes."""
+"""The attitudes in which a sensor is tried that sees nothing at the start."""
 
 
 class Noise(NamedTuple):
@@ -47,7 +47,8 @@ class Weighed(NamedTuple):
 
     @classmethod
     def of(cls, reading: Reading, rows: Array, times: Array, steps: int, noise: Noise) -> Weighed:
-        """A reading at times up to so many control steps: predictions between instants are those of a cubic through four."""
+        """A reading at times within `steps` control steps: predictions between instants are those of a cubic through
+        four."""
         count = 1 if (times == np.round(times)).all() else min(4, steps + 1)
         first = np.clip(np.floor(times).astype(int) - (count - 1) // 2, 0, steps + 1 - count)
         off = times - first
@@ -111,7 +112,7 @@ class _Varied(Silent):
 def noise_of(loop: ClosedLoop, reading: Reading) -> Noise | None:
     """The noise that the sensor of a reading states; None for none."""
     setup, carry = loop.setup(), loop.carry()
-    # A sensor that sees nothing there shows no noise: it is looked at in other attitudes, and on the other side.
+    # A sensor that sees nothing there shows no noise: it is tried in other attitudes, and on the other side.
     for turn, side in product(TURNS, (1.0, -1.0)):
         attitude = multiply(carry.state.attitude, turn)
         state = carry.state._replace(attitude=attitude, position=tuple(side * x for x in carry.state.position))

@@ -66,7 +66,7 @@ class ColumnsTable(Table):
 
 
 class MappingTable(Table):
-    """How a file is read. missing: words for no number, beside nothing and nan; interval: from one row to the next."""
+    """How a file is read. missing: words for no number, besides nothing and nan; interval: from one row to the next."""
 
     kind: Literal["", "csv", "parquet", "aem", "netcdf"] = ""
     separator: str = ","
@@ -103,7 +103,7 @@ def read_mapping(source: str | Path) -> MappingTable:
 
 
 def existing(source: Any) -> Any:
-    """The name of telemetry itself. InputError where there is no such file or folder, before anything else is looked at."""
+    """The name of telemetry itself. InputError where there is no such file or folder, before anything else is read."""
     if isinstance(source, str) and not Path(source).exists():
         raise InputError(str(source), "", "no file", "a file of telemetry")
     return source

@@ -4,30 +4,23 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from threading import active_count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from starhold.analysis.cost import CALLS
+from starhold.processes import can_fork
 from starhold.studies.body import study_of
 from starhold.studies.compare import costing, timed
 
 if TYPE_CHECKING:
     from starhold.scenario.reading import Scenario
     from starhold.studies.flight import Flight
-
-
-def can_fork() -> bool:
-    """Return whether this process can be copied: a copy of one with several threads may wait for locks that are never
-    released."""
-    return sys.platform.startswith("linux") and active_count() == 1
 
 
 class Stopwatch:

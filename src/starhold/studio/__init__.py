@@ -1,1 +1,1 @@
-"""The studio serves scenarios, their reports and all that can be asked of them as a page on this machine."""
+"""The studio serves a page on this machine, where scenarios are edited, flown, certified and compared."""

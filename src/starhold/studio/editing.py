@@ -1,4 +1,4 @@
-"""An editor is told where in a file an error stands, and which keys and values fit a place."""
+"""An editor shows where in a file an error is, and which keys and values fit a place."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Things that were asked of the studio, each a process with a folder of results; they go when the studio does."""
+"""The studio's jobs, each a process with a folder of results; both are removed when the studio ends."""
 
 import shutil
 import tempfile
@@ -16,7 +16,7 @@ from starhold.studio.worker import work
 
 SPAWN = get_context("spawn")
 MOST = 3
-"""Jobs that work at a time."""
+"""The most jobs that run at a time."""
 
 
 @dataclass

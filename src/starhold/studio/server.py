@@ -86,7 +86,7 @@ def _host(request: Request) -> str:
 
 
 async def _body(receive: Receive) -> bytes | None:
-    """The whole body of a request, however it comes; None where it is too long."""
+    """The whole body of a request, chunked or not; None if it is too long."""
     body = b""
     while True:
         message = await receive()
@@ -162,7 +162,7 @@ class Studio:
         return _malformed() if given is None else JSONResponse(await self._checked(given["text"]))
 
     async def _checked(self, text: str) -> dict[str, Any]:
-        """Return what a check tells of a text; or the files that it would run and the user did not yet allow."""
+        """Return the result of checking a text, or the files that it would run and that the user has not yet allowed."""
         files = [file for file in editing.files_run(text) if file not in self.run]
         return {"asks": files} if files else await run_in_threadpool(self.checker.check, text, self.where, self.folder)
 
@@ -232,7 +232,7 @@ def _malformed() -> Response:
 
 
 async def _answered(work: Callable[[], dict[str, Any]]) -> Response:
-    """Answer with what work on files comes to."""
+    """Answer with the outcome of work on files."""
     try:
         return JSONResponse(await run_in_threadpool(work))
     except RefusedError as refused:

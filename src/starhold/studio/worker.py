@@ -1,5 +1,5 @@
-"""Does one thing that the studio was asked for, in a process of its own: tells its progress and its result, and leaves its
-files in a folder."""
+"""Does one job of the studio in a process of its own: reports its progress and its result, and leaves its files in a
+folder."""
 
 import shutil
 import time
@@ -146,14 +146,14 @@ KINDS = {
     "campaign": _campaign,
     "export": _export,
 }
-"""What can be asked for."""
+"""The kinds of jobs."""
 RERUN = "rerun"
-"""And of a campaign: one of its runs again."""
+"""A further kind: one run of a campaign again."""
 
 
 def work(teller: Connection, kind: str, text: str, where: str, beside: Path, folder: Path, laws: Sequence[str]) -> None:
-    """Do it, in a process that this is all of; the last thing told is the file to look at, or what was wrong. laws: those of
-    the scenario; of a run of a campaign, whose folder `where` is, the law and the run's number."""
+    """Do a job, in a process of its own; the last report names the page to open, or the error. laws: those of the scenario;
+    of a run of a campaign, whose folder `where` is, the law and the run's number."""
     begin()
     reported = [0.0]
 

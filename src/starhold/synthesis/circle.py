@@ -188,7 +188,7 @@ class Station:
         return peak_required(self.rate, self.radius / units.length, plant, field, centre, push) * units.acceleration
 
     def deficit(self, missing: float) -> Deficit:
-        """Return what is left of the circle at the best rate when this part of its demand is missing (negative: to
+        """Return how much of the circle at the best rate is left when this part of its demand is missing (negative: to
         spare)."""
         plant, share = self.plant, 1.0 - missing
         least, radius = demand(self.rate, plant), share * self.radius

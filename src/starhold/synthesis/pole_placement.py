@@ -72,8 +72,9 @@ class Placement(NamedTuple):
     """A placement is a feedback u = -K x, K (m, n), and how it was made.
 
     spectra: Phi_k (r_k, r_k) of each level, the inputs' first, complex only where two levels share a pair of poles;
-    directions: R_k; strength: the smallest singular value of each B_k beside the size of the balanced A (of the first:
-    beside its own largest), zero if the pair is not controllable; error: of the poles that K reaches, see `displacement`."""
+    directions: R_k; strength: the smallest singular value of each B_k relative to the size of the balanced A (of the first:
+    relative to its own largest), zero if the pair is not controllable; error: of the poles that K reaches, see
+    `displacement`."""
 
     K: Array
     spectra: tuple[NDArray[Any], ...]

@@ -95,7 +95,7 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
     """Return the regulator of positive definite Q and R, right to the last digit for the numbers given.
 
     Newton's method in Kleinman's form (IEEE Transactions on Automatic Control 13, 1968): each step solves a Lyapunov
-    equation for the cost P of a stable feedback and goes on with the feedback of P, which decreases and in the end
+    equation for the cost P of a stable feedback and continues with the feedback of P, which decreases and in the end
     converges quadratically. ValueError where numbers overflow or no solution is reached."""
     from flint import ctx
 
@@ -116,7 +116,7 @@ def solve_riccati(inertia: Array, q: Array, r: Array) -> Regulator:
 
 def _stable_feedback(inertia: Array, q: Array, r: Array) -> arb_mat:
     """Return the closed form for the weights' diagonals about the principal axes. With any symmetric positive definite gains
-    the motion is that of a damped spring, hence stable, whatever the weights beside the diagonals are."""
+    the motion is that of a damped spring, hence stable, whatever the off-diagonal weights are."""
     from flint import arb_mat
 
     with np.errstate(all="ignore"):

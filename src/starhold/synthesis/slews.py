@@ -55,7 +55,7 @@ class Search:
 
     @cached_property
     def form(self) -> Any:
-        """All that the kernels of its slews depend on beside the gains."""
+        """All that the kernels of its slews depend on besides the gains."""
         return self.spec.wheel_momentum is not None, _form(self.craft)
 
     @cached_property

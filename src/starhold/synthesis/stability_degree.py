@@ -131,7 +131,7 @@ def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, po
     around it.
 
     It uses `degree` and the budget, and nothing of `optimum`, whose arguments and errors it shares. Sets of equal or larger
-    eta are convex, so the best lies beside the best point of a line and of the grid: eta is right to about 1e-9, relative.
+    eta are convex, so the best lies next to the best point of a line and of the grid: eta is right to about 1e-9, relative.
     """
     a, b = _extremes(ratios)
     alpha, omega, budget = _demands(alpha, omega, budget)

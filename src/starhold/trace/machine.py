@@ -35,16 +35,16 @@ def _machine() -> Any:
 
 LONG = 2_000_000
 """Control steps of one lane for which it pays that LLVM optimises their kernel."""
-FEW = 16
-"""Numbers carried from step to step for which 16 registers are still enough for two vectors of each."""
+FEW, MANY = 16, 48
+"""Numbers carried from step to step up to which 16 and 32 registers are still enough for two vectors of each."""
 
 
 def widest(carried: int, noted: int = 0) -> int:
     """Return the fastest number of lanes in flight at once on this processor, where each carries so many numbers and has so
-    many notes: two of the widest registers for a number where there are 32 of them and nothing is noted, or where there are
-    few numbers; else one."""
+    many notes: two of the widest registers for a number where there are few numbers, or where there are 32 of them, not
+    many numbers, and nothing is noted; else one."""
     if _is_wide():
-        return 8 if noted else 16
+        return 8 if noted or carried > MANY else 16
     return 8 if carried + noted <= FEW else 4
 
 

@@ -108,7 +108,7 @@ class Recorder:
     """A recorder keeps operations on handles as a tree of blocks, with equal operations kept once."""
 
     by_rows = False
-    """Whether `each` of `algebra.several` is recorded for several rows at once."""
+    """Whether `each` and `folded` of `algebra.several` are recorded for several rows at once."""
 
     def __init__(self) -> None:
         self.memories: list[Memory] = []
@@ -131,6 +131,10 @@ class Recorder:
         """Return memory that the program is given."""
         self.memories.append(Memory(self._names.new(name), lanes, writable, size))
         return Cells(self, self.memories[-1])
+
+    def each(self, equation: Callable[..., Any], rows: Sequence[Any], shared: Any) -> tuple[Any, ...]:
+        """Record `each` of `algebra.several`, row by row."""
+        return tuple(equation(*row, *shared) for row in rows)
 
     def lane(self) -> Any:
         """Return the number of the lane."""

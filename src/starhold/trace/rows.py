@@ -1,7 +1,9 @@
-"""Recordings for one lane, in which an equation of many rows is computed of several at once: a lane in short vectors."""
+"""Recordings in which an equation of many rows is computed of several at once: of one lane in short vectors, of many lanes
+operation by operation."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,6 +17,34 @@ ROWS = 8
 """The most rows that are computed at once: the numbers of the widest registers."""
 
 
+class LanesRecorder(Recorder):
+    """A recorder for many lanes: it records `each` of `algebra.several` operation by operation of all rows, which wait less
+    for each other than those of one row, and read the same numbers while these are in registers."""
+
+    def each(self, equation: Callable[..., Any], rows: Sequence[Any], shared: Any) -> tuple[Any, ...]:
+        """Record an equation of every row, side by side where it computes with operations alone."""
+        block, out, parts = self._open[-1], list[Any](), list[list[Any]]()
+        begin = len(block)
+        for row in rows:
+            out.append(equation(*row, *shared))
+            parts.append(block[begin + sum(map(len, parts)) :])
+        if all(isinstance(s, Op) for s in block[begin:]):
+            block[begin:] = _side_by_side(parts)
+        return tuple(out)
+
+
+def _side_by_side(parts: list[list[Op]]) -> list[Op]:
+    """Return the operations of all parts in turn, each after those that it reads."""
+    waiting = {s.ref for part in parts for s in part}
+    left, order = [deque(part) for part in parts], list[Op]()
+    while waiting:
+        for part in left:
+            if part and waiting.isdisjoint(x for x in part[0].args if isinstance(x, str)):
+                waiting.remove(part[0].ref)
+                order.append(part.popleft())
+    return order
+
+
 class RowRecorder(Recorder):
     """A recorder that records `each` of `algebra.several` as calls of several rows."""
 
@@ -23,6 +53,8 @@ class RowRecorder(Recorder):
     def each(self, equation: Callable[..., Any], rows: Sequence[Any], shared: Any) -> tuple[Any, ...]:
         """Record an equation of every row: of up to `ROWS` rows at once where it computes the same of all with operations
         alone."""
+        if not self.by_rows:
+            return super().each(equation, rows, shared)
         out: list[Any] = []
         for first in range(0, len(rows), ROWS):
             some = [(*row, *shared) for row in rows[first : first + ROWS]]

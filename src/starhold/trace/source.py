@@ -187,6 +187,10 @@ class Source(ABC):
     def put(self, line: str) -> None:
         """Add a line, broken where it is long, but not at `TIE`."""
         before = "    " * self.depth
+        if line.strip() == line and 0 < len(line) <= WIDTH - len(before):
+            # Most are short, and words take long to count.
+            self.lines.append(before + line.replace(TIE, " "))
+            return
         wide = textwrap.TextWrapper(WIDTH, before, before + "    ", break_long_words=False, break_on_hyphens=False)
         self.lines += [part.replace(TIE, " ") for part in wide.wrap(line)]
 

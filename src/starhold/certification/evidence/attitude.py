@@ -32,7 +32,7 @@ FASTER = 1.0 + 1e-2
 BISECTIONS = 6
 """Of a level, between it and four times it."""
 NEAR = 1.1
-"""Levels of other limits up to so many times the least are examined again."""
+"""Levels of other limits are examined again up to this multiple of the least."""
 LEAST_TURN = 1e-12
 """The turn (rad) that a set holds if it is to hold a smaller one: no sum of squares tells those from none."""
 GIVEN_AWAY = [Fraction(1, 10**power) for power in (6, 5, 4, 3, 2)]

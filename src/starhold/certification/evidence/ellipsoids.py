@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from starhold.certification.evidence.sparse import entries_of
 from starhold.certification.evidence.squares import interior_point
 from starhold.certification.matrices import floats
 from starhold.kernel.numbers import Rows
@@ -92,7 +93,7 @@ def fitted(corners: Array, pushes: list[Array], shares: Array, X: Array, heed: f
         rows.append(triangle(np.concatenate([basis[:, part, part], units])).T)
         right.append(np.zeros(6))
     cost = np.array([*[0.0] * len(PAIRS), heed, 1.0])
-    solution = interior_point(cost, np.vstack(rows), np.concatenate(right), 0, 0, [6] * len(corners) + [3, 3])
+    solution = interior_point(cost, entries_of(np.vstack(rows)), np.concatenate(right), 0, 0, [6] * len(corners) + [3, 3])
     if solution is None:
         return None
     fit = np.einsum("n,nij->ij", solution[: len(PAIRS)], basis) * np.outer(scale, scale)

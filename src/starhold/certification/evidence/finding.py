@@ -21,7 +21,6 @@ from starhold.kernel.reading import FORMAT, Claim, Told, read_claim
 from starhold.kernel.rules import Part
 from starhold.kernel.theorems import THEOREMS
 
-linalg: Any = import_module("scipy.linalg")
 T = TypeVar("T")
 
 
@@ -61,10 +60,7 @@ def complete(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping
 def _completed(claim: dict[str, Any], programs: Mapping[str, Any], scales: Mapping[str, float]) -> dict[str, Any]:
     try:
         wanted, known = obligations(claim, programs)
-        with warnings.catch_warnings():
-            # The kernel decides of what an ill-conditioned matrix gives.
-            warnings.simplefilter("ignore", linalg.LinAlgWarning)
-            completed = {name: evidence(name, wanted, scales) for name in wanted}
+        completed = {name: evidence(name, wanted, scales) for name in wanted}
     except RefusedError as reason:
         raise NotFoundError(str(reason)) from None
     subject, programs = (
@@ -119,9 +115,17 @@ def contracts(o: rules.Contracts) -> list[list[str]]:
     """Return Lyapunov's matrix of a motion."""
     A = floats(o.A)
     size = np.eye(len(A))
-    solve: Any = linalg.solve_continuous_lyapunov if o.flow else linalg.solve_discrete_lyapunov
-    solution = solve(A.T, -size) if o.flow else solve((A / float(o.rate)).T, size)
-    return _rounded(solution)
+    return _rounded(_lyapunov(A.T, -size, True) if o.flow else _lyapunov((A / float(o.rate)).T, size))
+
+
+def _lyapunov(A: Any, Q: Any, flow: bool = False) -> Any:
+    """Return the solution of Lyapunov's equation, of a flow or of steps."""
+    # Loaded here, because most claims need no such matrix.
+    linalg: Any = import_module("scipy.linalg")
+    with warnings.catch_warnings():
+        # The kernel decides of what an ill-conditioned matrix gives.
+        warnings.simplefilter("ignore", linalg.LinAlgWarning)
+        return linalg.solve_continuous_lyapunov(A, Q) if flow else linalg.solve_discrete_lyapunov(A, Q)
 
 
 def _rounded(P: Any) -> list[list[str]]:
@@ -137,7 +141,7 @@ def persists(o: rules.Persists) -> list[list[str]]:
     A = floats(o.A)
     for c in (1.0, 1.0 + 1e-6, 1.0 + 1e-4, 1.0 + 1e-2):
         try:
-            rows = _rounded(linalg.solve_discrete_lyapunov(A.T / c, -np.eye(len(A))))
+            rows = _rounded(_lyapunov(A.T / c, -np.eye(len(A))))
             o.check(rows)
         except (np.linalg.LinAlgError, NotFoundError, RefusedError):
             continue

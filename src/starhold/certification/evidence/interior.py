@@ -4,6 +4,7 @@ The step of Helmberg, Kojima and Monteiro with Mehrotra's corrector. Its dense s
 one for each entry of a matrix, so a matrix of 119 rows takes seconds an iteration.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -11,6 +12,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from starhold.certification.evidence.sparse import Entries
 
 sparse: Any = import_module("scipy.sparse")
 linalg: Any = import_module("scipy.linalg")
@@ -20,10 +23,10 @@ FEASIBLE, ENOUGH = 0.01, 0.25
 """The residual of the equations, and the gap, as shares of the margin, at which the search ends."""
 
 
-def most_definite(equal: Any, b: Any, signed: Sequence[bool], blocks: Sequence[Sequence[tuple[int, int]]]) -> Any | None:
+def most_definite(equal: Entries, b: Any, signed: Sequence[bool], blocks: Sequence[Sequence[tuple[int, int]]]) -> Any | None:
     """Return x with equal x = b and a large last number, which the matrices' eigenvalues, and signed numbers that say so,
     are not below; None where none is found. The columns are as for `squares.optimum`, with its `twice` 1."""
-    a, count = sparse.csc_matrix(equal), equal.shape[1] - 1
+    a, count = equal.scipy(), equal.shape[1] - 1
     scales = np.sqrt(np.asarray(a.multiply(a).sum(1)).ravel())
     rows = sparse.diags(1.0 / np.where(scales > 0.0, scales, 1.0))
     first = head = count - sum(map(len, blocks))
@@ -38,8 +41,11 @@ def most_definite(equal: Any, b: Any, signed: Sequence[bool], blocks: Sequence[S
         first += len(pairs)
     free = sparse.hstack([a[:, len(signed) : head], a[:, :count] @ sparse.csc_matrix(shared)])
     program = Program([_cone(rows @ a[:, columns], pairs) for columns, pairs in places], (rows @ free).toarray(), rows @ b)
-    if not program.ended():
-        return None
+    with warnings.catch_warnings():
+        # The kernel decides of what an ill-conditioned matrix gives.
+        warnings.simplefilter("ignore", linalg.LinAlgWarning)
+        if not program.ended():
+            return None
     x = np.empty(count + 1)
     x[len(signed) : head], x[-1] = program.f[:-1], program.f[-1]
     for (columns, pairs), cone in zip(places, program.cones, strict=True):

@@ -19,18 +19,19 @@ from starhold.certification.evidence.attitude import Loop
 from starhold.certification.evidence.ellipsoids import HEED, MORE, highest_ratio, smallest
 from starhold.certification.evidence.finding import concluded, read
 from starhold.certification.evidence.noise import find_radii
+from starhold.certification.evidence.plans import told_of
 from starhold.certification.evidence.recorded import sign_words
 from starhold.certification.evidence.responses import find_response
 from starhold.certification.evidence.squares import rounded
-from starhold.certification.evidence.starts import POINTS, begins, feedback, start_rate
-from starhold.certification.evidence.terms import valued
+from starhold.certification.evidence.starts import POINTS, asks_more, begins, feedback, start_rate
 from starhold.certification.matrices import floats
 from starhold.certification.subject import above
-from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors, pushes
+from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
-from starhold.kernel.regions import AT_REST, RATE, STATE, TURN, Radii, Tube, balls, widened
+from starhold.kernel.plans import Plan
+from starhold.kernel.regions import AT_REST, RATE, TURN, Radii, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
 from starhold.kernel.theorems.pointing import ROUNDS, image, periods
 from starhold.kernel.theorems.response import first_of, responds
@@ -41,10 +42,12 @@ Array = NDArray[np.float64]
 
 ANGLES = (175, 150, 120, 90, 75, 60, 45, 35, 30, 25, 20, 15, 10)
 """The initial rotations (deg) from which convergence is attempted."""
+NEAR = (7, 5, 3, 2, 1, 0.5)
+"""Further ones, for laws that are known near the target alone."""
 RATES = (5, 3, 2, 1, 0.5)
 """The initial rates (deg/s) beyond that of the loop's own start that are attempted at the largest rotation."""
 NEARLY = 10.0
-"""A chain of levels is taken that ends below so many times its `aim`, and no other one is looked for."""
+"""A chain of levels that ends below this multiple of its `aim` is taken, and no other one is looked for."""
 LEAST = 1e-6
 """The deflection (rad) of a spring as stiff as the law under the least external torque that is considered."""
 NEARER = 0.25
@@ -52,9 +55,9 @@ NEARER = 0.25
 LEANS = (0.1, 0.18, 0.3, 0.45)
 """How large epsilon of V = w.Jw/2 + 2k (1 - q0) + epsilon q.Jw is tried to be, in sqrt(k / the largest moment); the law's
 own V, if it is a form of q, takes the place of the first two terms."""
-FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS, STATES = 1.03, 7, 8.0, 20, 24, 2000
+FLOOR, DIGITS, DEEPEST, LEVELS, ELLIPSOIDS = 1.03, 7, 8.0, 20, 24
 """The margin of the last level above its limit, so that motions enter it in finite time; the digits of ellipsoids' numbers;
-the largest ratio of successive levels; the most levels and ellipsoids; at how many states of a set torque is examined."""
+the largest ratio of successive levels; the most levels and ellipsoids."""
 
 Lower: TypeAlias = tuple[Fraction, Fraction, Fraction]
 Beginning: TypeAlias = tuple[list[float], float, dict[str, float], list[float]]
@@ -83,6 +86,13 @@ class Chain:
         """Return whether V decreases on the whole set, down to a lower level."""
         lower = self.lower(Fraction(self.level))
         return lower is not None and lower[2] < Fraction(self.level)
+
+    def of_level(self) -> dict[str, Any]:
+        """Return the claim's numbers that follow from its level."""
+        if self.motion.plan is None:
+            return {"level": self.level}
+        off = self.motion.planned(self.motion.region(Fraction(self.level)).sizes)
+        return {"level": self.level, "plan.error": float(off) * MORE}
 
     def descend(self) -> float:
         """Find the levels, and return the last."""
@@ -193,24 +203,6 @@ class Chain:
             self.response = {"response": evidence | {"rounds": rounds}}
         return angle, fastest
 
-    def asks_more(self, limits: dict[str, float]) -> bool:
-        """Return whether the law commands more than its limit at some state of the set."""
-        most = min((x for name, x in limits.items() if name.startswith("limit")), default=inf)
-        r, G, s = np.random.default_rng(1), floats(self.motion.G), float(self.motion.s)
-        along, axes = (v / np.linalg.norm(v, axis=0) for v in r.normal(size=(2, 3, STATES)))
-        half = r.uniform(0.0, pi, STATES)
-        q = np.sin(half) * axes
-        # V is quadratic in the rate along each direction.
-        a, b = (along * (G[RATE, RATE] @ along)).sum(0), (along * (G[RATE, TURN] @ q)).sum(0)
-        c = s * (1.0 - np.cos(half)) + (q * (G[TURN, TURN] @ q)).sum(0) - self.level
-        inside = b * b >= a * c
-        far = (np.sqrt(np.where(inside, b * b - a * c, 0.0)) - b) / a
-        names: list[str] = ["q0", *STATE[TURN], *STATE[RATE]]
-        x = dict(zip(names, (np.cos(half), *q, *(far * along)), strict=True))
-        u = [valued(p, x) for p in self.motion.u]
-        size = np.linalg.norm(u, axis=0) if "limit.norm" in limits else np.abs(u).max(axis=0)
-        return bool(size[inside].max(initial=0.0) > most)
-
     def ends(self, tube: Tube, X: Rows, swayed: Radii = AT_REST) -> tuple[float, float]:
         """Return bounds of the angle (rad) and the rate (rad/s) of motions, also between samples, that at samples are within
         `swayed` of an ellipsoid."""
@@ -232,7 +224,8 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
     like: the numbers of a claim, for the same start set and limits, and with noise if it includes noise."""
     if like is None:
         rates = dict.fromkeys((start_rate(loop.loop) * MORE if begun is None else begun, 0.0))
-        angles, beyond = list(map(radians, ANGLES)), list(map(radians, RATES)) if begun is None else []
+        angles = list(map(radians, ANGLES if loop.plan is None else (*ANGLES, *NEAR)))
+        beyond = list(map(radians, RATES)) if begun is None else []
         tried = [(angles, rate, limits, beyond) for limits in (loop.limits, {}) for rate in rates]
         # If the noise is too large for a proof, without it.
         kinds = [True] * (driven_errors(loop.loop) is not None) + [False]
@@ -241,8 +234,7 @@ def find_pointed(loop: Loop, like: Mapping[str, Any] | None = None, begun: float
         tried = [([turn], rate, {name: x for name, x in loop.limits.items() if name in like}, list[float]())]
         kinds = [SHARE in like]
     for noisy in kinds:
-        bounds = pushes(loop.loop, loop.known.envelope(noisy))
-        against = bounds._replace(outside=bounds.outside + float(loop.known.disturbance))
+        against = loop.known.against(loop.known.envelope(noisy))
         try:
             if any(pushed.find_largest(*one) for pushed in ways(loop, against, noisy, tried[0]) for one in tried):
                 return True
@@ -279,10 +271,15 @@ class Pushed:
         self.even = given and law.lyapunov is not None and not any("q0" in m for m in loop.form(loop.lyapunov()).terms)
         against = against._replace(outside=max(outside, LEAST * self.stiffness))
         demand(all(map(isfinite, against)), "the wheels' friction has no bound, because their momentum has no limit")
-        self.largest, self.refused = (0.0, 0.0, ""), dict[tuple[Any, ...], str]()
+        self.plan: Plan | None = None
+        self.larger, self.refused = list[tuple[float, float, str]](), dict[tuple[Any, ...], str]()
         self.numbers: dict[str, Any] = {"period": loop.loop.period}
+        self.numbers |= {} if loop.known.tolerance is None else {"tolerance": loop.known.tolerance}
         self.numbers |= {name: x for name, x in against.numbers.items() if x or name in ("outside", "error")}
         more, self.evidence = (find_radii(loop, wired) if noisy else None) or ({}, {})
+        if loop.plan is not None:
+            planned, about = told_of(loop, loop.plan)
+            more, self.evidence = more | planned, self.evidence | about
         wide, turned, *apart = map(Fraction, self.evidence.get("swayed", ("0", "0")))
         self.swayed, self.apart = (wide, turned), (apart[0], apart[1]) if apart else AT_REST
         changes = change_of_modelled(loop.loop, loop.known.envelope(noisy)) if OUTSIDE in words else (inf,)
@@ -300,7 +297,9 @@ class Pushed:
     def sampled(self, epsilon: float) -> tuple[str, Held]:
         """Return V and the loop."""
         V = self.loop.crossed(None if self.even else self.stiffness, epsilon)
-        motion = Held(AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True))
+        wired = AttitudeLoop(read(self.claim(V, self.numbers), self.loop.by_digest), remembers=True)
+        motion = Held(wired, self.plan)
+        self.plan = motion.plan
         motion.swayed, motion.apart = self.swayed, self.apart
         return V, motion
 
@@ -309,12 +308,13 @@ class Pushed:
         return self.loop.claim(POINTS, self.words, V, **numbers) | {"evidence": self.evidence | evidence}
 
     def find_largest(self, angles: list[float], rate: float, limits: dict[str, float], beyond: list[float]) -> bool:
-        """Find the claim from the largest possible of these rotations, at the largest possible of the rates `beyond` that of
-        a start that moves; both are in decreasing order."""
+        """Find the claim from the largest possible angle, there at the largest possible rate; both are in decreasing order."""
         for angle, rates in self.starts(angles, rate, limits, beyond):
-            if any(self.kept(self.find, angle, one, limits) for one in rates):
-                self.loop.failed |= {POINTS: self.largest[-1]} if self.largest[-1] else {}
-                return True
+            for one in rates:
+                if self.kept(self.find, angle, one, limits):
+                    *_, nearest = min((start for start in self.larger if start[:2] > (angle, one)), default=("",))
+                    self.loop.failed |= {POINTS: nearest} if nearest else {}
+                    return True
         return False
 
     def starts(
@@ -343,11 +343,11 @@ class Pushed:
         return not self.refused[key]
 
     def kept(self, tried: Callable[..., Any], angle: float, rate: float, limits: dict[str, float]) -> bool:
-        """Return whether a start is taken, and keep why the largest is not."""
+        """Return whether a start is taken, and keep why it is not."""
         if tried(angle, rate, limits):
             return True
         start = f"from {degrees(angle):.3g} deg at {degrees(rate):.3g} deg/s: "
-        self.largest = max(self.largest, (angle, rate, start + self.loop.failed[POINTS]))
+        self.larger.append((angle, rate, start + self.loop.failed[POINTS]))
         return False
 
     def begun(
@@ -363,13 +363,13 @@ class Pushed:
             rest += float(np.linalg.eigvalsh(floats(motion.G)[TURN, TURN])[-1]) * sin(half) ** 2
             level = rest + J * rate * (rate / 2.0 + epsilon * sin(half))
             begun.append(Chain(motion, V, level * (1.0 + 1e-6), tried))
-        if begun[0].asks_more(limits):
+        if asks_more(begun[0].motion, begun[0].level, limits):
             loop.failed[POINTS] = "the torque exceeds its limit"
             return None
         if not any(chain.decreases() for chain in begun):
             loop.failed[POINTS] = "V does not decrease on the set from which motions start"
             return None
-        if examined and not begins(loop, self.claim(begun[0].V, numbers | {"level": begun[0].level}), self.scales):
+        if examined and not begins(loop, self.claim(begun[0].V, numbers | begun[0].of_level()), self.scales):
             return None
         return numbers, begun
 
@@ -390,7 +390,7 @@ class Pushed:
             return False
         motion, start = chain.motion, Fraction(chain.level)
         chain, (angle, fastest) = chain.nearest()
-        numbers["level"] = chain.level
+        numbers |= chain.of_level()
         numbers["highest"] = float(start + motion.h / 2 * motion.swing(motion.tube(motion.region(start)))) * MORE
         numbers |= {"end.angle": angle, "end.rate": fastest, "settling": float(motion.h * chain.samples) * MORE}
         if not isfinite(angle) or angle > NEARER * numbers.get("angle", numbers.get("start.angle", 0.0)):

@@ -19,11 +19,13 @@ from starhold.certification.evidence.finding import NotFoundError, by_digests, c
 from starhold.certification.subject import Subject, above
 from starhold.certification.unmodelled import driven_errors
 from starhold.kernel.loops import HYSTERESIS, MOVING, OUTSIDE, REMEMBERS, SHORTEST, WHEELS, AttitudeLoop
+from starhold.kernel.plans import PLANNED
 from starhold.kernel.polynomials import Poly, var
 from starhold.kernel.programs import Program, digest
 from starhold.kernel.theorems.noise import CARRIED, CORRECTED
 from starhold.laws import program
 from starhold.laws.interface import Measurement
+from starhold.laws.predictive.free import Plan
 from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.bodies import rigid_body
 from starhold.parts.craft import tensor
@@ -70,11 +72,21 @@ class RecordedLoop:
         return self.loop.craft._replace(inertia=FULL, inverse_inertia=FULL)
 
     @cached_property
+    def plan(self) -> Plan | None:
+        """Return what the law plans, or None."""
+        tell: Any = self.loop.law.hook("plan")
+        return None if tell is None else tell(self.loop.gains, self.loop.known, self.loop.period)
+
+    @cached_property
     def roles(self) -> dict[str, str]:
         """The digests of the programs that every claim is about."""
         loop, driven = self.loop, driven_errors(self.loop)
+        if self.plan is None:
+            law = program.law_program(loop.law, loop.gains, loop.known, loop.period, loop.remembers)
+        else:
+            law = program.planned_program(self.plan, loop.known)
         programs = {
-            "law": self.keep(program.law_program(loop.law, loop.gains, loop.known, loop.period, loop.remembers)),
+            "law": self.keep(law),
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=self.plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
@@ -144,6 +156,13 @@ class RecordedLoop:
             for k, (axis, p) in enumerate(zip(loop.wheels.axes, loop.rotors, strict=True)):
                 numbers |= {f"wheel.{k}.axis.{i}": float(x).hex() for i, x in enumerate(axis)}
                 numbers[f"wheel.{k}.momentum"] = float(p).hex()
+        if (plan := self.plan) is not None:
+            numbers |= {"plan.moves": str(plan.moves)}
+            numbers |= {f"plan.state.{k}": float(x).hex() for k, x in enumerate(plan.state)}
+            numbers |= {f"plan.command.{k}": float(x).hex() for k, x in enumerate(plan.command)}
+            numbers |= {f"plan.end.{i}.{k}": float(plan.end[i, k]).hex() for i in range(6) for k in range(i, 6)}
+            if isfinite(plan.limit):
+                numbers["plan.limit.norm" if plan.ball else "plan.limit"] = float(plan.limit).hex()
         return numbers
 
     @property
@@ -153,7 +172,7 @@ class RecordedLoop:
         words = [OUTSIDE] if any(known.modelled) else []
         words += [MOVING] if known.moving else []
         words += [WHEELS] if loop.wheels is not None else []
-        return words + ([REMEMBERS] if loop.remembers else [])
+        return words + ([PLANNED] if self.plan is not None else [REMEMBERS] if loop.remembers else [])
 
     def claim(self, theorem: str, taken: list[str], V: str | None, **numbers: Any) -> dict[str, Any]:
         """Return a claim without evidence."""

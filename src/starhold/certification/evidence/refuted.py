@@ -128,12 +128,12 @@ def against_far(loop: Loop, rate: float) -> bool:
     for turned, length in product((0.0 * t, t), lengths):
         values = named(turned, length * w)
         for side, p in zip(sides, slopes, strict=False):
-            slopes = valued(p, values)
+            rises = valued(p, values)
             for condition, truth in {guard for case in side for guard in case.guards}:
-                slopes[(valued(Poly(dict(condition)), values) > 0.0) != truth] = 0.0
-            place = int(np.argmax(slopes))
+                rises[(valued(Poly(dict(condition)), values) > 0.0) != truth] = 0.0
+            place = int(np.argmax(rises))
             steepest = state(turned[:, place], length * w[:, place])
-            if slopes[place] > 0.0 and loop.try_to_show(loop.claim(RISES, [], V, **steepest, **more), {}):
+            if rises[place] > 0.0 and loop.try_to_show(loop.claim(RISES, [], V, **steepest, **more), {}):
                 return True
     return False
 

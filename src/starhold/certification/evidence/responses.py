@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 LEFT = 7.0
 """Minus the logarithm of the share of a state that is left after the samples of a response."""
 FINEST, LONGEST, LEAST, MORE = 1e3, 1e9 - 1.0, 1e-4, 1.0 + 1e-7
-"""The least and the largest weight, the least share of a sample beside the mean, and the margin for rounding."""
+"""The least and the largest weight, the least share of a sample relative to the mean, and the margin for rounding."""
 
 
 def find_response(motion: Held) -> dict[str, Any] | None:

@@ -17,13 +17,12 @@ import numpy as np
 from flint import fmpq_mat
 
 from starhold.algebra.polynomial import exact
-from starhold.certification.evidence.interior import most_definite
+from starhold.certification.evidence.sparse import Entries
 from starhold.certification.matrices import fraction
 from starhold.kernel.numbers import RefusedError, times, transpose
 from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Squares
 
-sparse: Any = import_module("scipy.sparse")
 T = TypeVar("T")
 TOLERANCE = 1e-11
 LIMIT = 30.0
@@ -32,7 +31,7 @@ LARGE = 3000
 """The entries of a matrix beyond which the sparse interior point takes too long."""
 DIGITS = (12, 14, 9, 16)
 SINGULAR, SHORT = 1e-6, 8
-"""The share of the largest eigenvalue below which a matrix is taken for singular, and the denominators of what it takes to
+"""The share of the largest eigenvalue below which a matrix counts as singular, and the denominators of what it takes to
 zero."""
 DEFINITE = -1e-8
 """The least eigenvalue, in scaled units, at which it is worth trying whether the exact matrix is definite."""
@@ -169,7 +168,7 @@ def _products(z: tuple[tuple[tuple[Monomial, Fraction], ...], ...]) -> tuple[lis
     return pairs, [parts[i] * parts[k] * (1 if i == k else 2) for i, k in pairs]
 
 
-def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly] = ()) -> tuple[Any, Any, Any]:
+def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly] = ()) -> tuple[Entries, Any, Any]:
     """Return the linear equations in floats, a row for each monomial in scaled variables, and the columns' scales."""
     columns = [*problem.columns, *more]
     rows = {m: k for k, m in enumerate(sorted({m for q in (problem.p, *columns) for m in q.terms}))}
@@ -186,10 +185,8 @@ def equations(problem: Problem, scales: Mapping[str, float], more: Sequence[Poly
     head = len(problem.columns) - len(problem.pairs)
     for k, (i, j) in enumerate(problem.pairs, head):
         largest[k] = sizes[i] * sizes[j] * (1.0 if i == j else 2.0)
-    A = sparse.csc_matrix(
-        ([c / largest[k] for _, k, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])),
-        (len(rows), len(columns)),
-    )
+    places = [r for r, _, _ in entries], [k for _, k, _ in entries]
+    A = Entries(*places, [c / largest[k] for _, k, c in entries], (len(rows), len(columns)))
     b = np.zeros(len(rows))
     for m, c in problem.p.terms.items():
         b[rows[m]] = float(c) * size(m)
@@ -211,7 +208,7 @@ def once(key: Any, make: Callable[[], T]) -> T:
     return _KNOWN[key]
 
 
-def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
+def interior_point(cost: Any, A: Entries, b: Any, equal: int, signed: int, sides: Sequence[int]) -> Any | None:
     """Minimise cost.x with A x + s = b, s in the cones; None where that fails."""
     # Loaded here, because not every command certifies.
     clarabel: Any = import_module("clarabel")
@@ -219,29 +216,33 @@ def interior_point(cost: Any, A: Any, b: Any, equal: int, signed: int, sides: Se
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.time_limit = False, LIMIT
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    matrix = sparse.csc_matrix(A)
+    matrix, none = A.compressed(), Entries([], [], [], (len(cost), len(cost))).compressed()
 
     def solve() -> Any | None:
-        solution = clarabel.DefaultSolver(sparse.csc_matrix((len(cost),) * 2), cost, matrix, b, cones, settings).solve()
+        solution = clarabel.DefaultSolver(none, cost, matrix, b, cones, settings).solve()
         return np.array(solution.x) if "Solved" in str(solution.status) or "Insufficient" in str(solution.status) else None
 
-    numbers = cost.tobytes(), *_bytes(matrix), b.tobytes()
+    numbers = cost.tobytes(), matrix.key(), b.tobytes()
     return once((numbers, equal, signed, *sides), solve)
 
 
-def _bytes(matrix: Any) -> tuple[Any, ...]:
-    columns = sparse.csc_matrix(matrix)
-    return (*(x.tobytes() for x in (columns.data, columns.indices, columns.indptr)), columns.shape)
-
-
 def optimum(
-    A: Any, b: Any, signed: Sequence[bool], blocks: Sequence[Sequence[tuple[int, int]]], twice: float, margin: bool = True
+    A: Entries,
+    b: Any,
+    signed: Sequence[bool],
+    blocks: Sequence[Sequence[tuple[int, int]]],
+    twice: float,
+    margin: bool = True,
 ) -> Any | None:
     """Return x with Ax = b and the largest last number; None without one. The first numbers are not negative, and before the
     last stand the upper triangles of matrices that are nowhere negative, `twice` what is beside the diagonal. margin: the
     last is no more than 1, the signed ones that say so, and the eigenvalues of the matrices."""
     if margin and twice == 1.0 and max(map(len, blocks), default=0) > LARGE:
-        return once((*_bytes(A), b.tobytes(), *signed, *map(tuple, blocks)), lambda: most_definite(A, b, signed, blocks))
+        # Loaded here, because few matrices are so large.
+        from starhold.certification.evidence.interior import most_definite
+
+        key = A.compressed().key(), b.tobytes(), *signed, *map(tuple, blocks)
+        return once(key, lambda: most_definite(A, b, signed, blocks))
     count, entries = A.shape[1] - 1, [(k, k, -1.0) for k in range(len(signed))]
     right = [b, np.zeros(len(signed))]
     if margin:
@@ -255,7 +256,7 @@ def optimum(
             height, at = height + 1, at + 1
         right.append(np.zeros(len(pairs)))
     rows, columns, values = zip(*entries, strict=True)
-    whole = sparse.vstack([A, sparse.csc_matrix((values, (rows, columns)), (height, count + 1))])
+    whole = A.above(Entries(rows, columns, values, (height, count + 1)))
     sides = [max((k for _, k in pairs), default=-1) + 1 for pairs in blocks]
     cost = np.r_[np.zeros(count), -1.0]
     return interior_point(cost, whole, np.concatenate(right), A.shape[0], len(signed) + margin, sides)
@@ -265,7 +266,7 @@ def solved(problem: Problem, scales: Mapping[str, float]) -> Any | None:
     """Return the factors in floats that make the Gram matrix most definite; None where it is not."""
     A, b, largest = equations(problem, scales)
     unit = float(np.abs(b).max()) or 1.0
-    whole = sparse.hstack([A, sparse.csc_matrix((A.shape[0], 1))])
+    whole = A._replace(shape=(A.shape[0], A.shape[1] + 1))
     x = optimum(whole, b / unit, [k < problem.strict for k in range(problem.signed)], [problem.pairs], 2.0)
     if x is None or x[-1] < DEFINITE:
         return None
@@ -321,11 +322,10 @@ def matrix_of(polys: Sequence[Poly]) -> Any:
     return matrix
 
 
-def sparse_of(polys: Sequence[Poly]) -> Any:
+def sparse_of(polys: Sequence[Poly]) -> Entries:
     """Return the matrix of coefficients in floats."""
     size, entries = coefficients(polys)
-    values, places = [float(c) for _, _, c in entries], ([r for r, _, _ in entries], [k for _, k, _ in entries])
-    return sparse.csc_matrix((values, places), size)
+    return Entries([r for r, _, _ in entries], [k for _, k, _ in entries], [float(c) for _, _, c in entries], size)
 
 
 def on_a_face(problem: Problem, guess: Any, digits: int) -> list[Fraction] | None:

@@ -46,7 +46,7 @@ SHARE, FAR = Fraction(0.999), Fraction(1000)
 BEYOND = Fraction(1, 10**15)
 """By this share the boundary that is claimed is beyond that bound."""
 ROUNDING = Fraction(1, 10**12)
-"""By this share a control may exceed its limit and be taken for one that meets it."""
+"""The share by which a control may exceed its limit and still count as meeting it."""
 
 
 def full_problem(loop: ClosedLoop) -> bool:

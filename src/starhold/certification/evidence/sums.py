@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from starhold.certification.evidence.sparse import Entries
 from starhold.certification.evidence.squares import degree, optimum, sparse_of, text
 from starhold.certification.evidence.terms import (
     identity,
@@ -32,8 +33,6 @@ from starhold.kernel.numbers import Account, RefusedError
 from starhold.kernel.polynomials import Monomial, Poly, apply, dot, read_poly, total
 from starhold.kernel.rules import Sum
 
-sparse: Any = import_module("scipy.sparse")
-pivoted: Any = import_module("scipy.linalg").qr
 MARGIN = 1e-7
 """The least eigenvalue, in scaled units, with which exact numbers are tried."""
 MOST = 60_000
@@ -159,16 +158,19 @@ class Guess:
         every = [*single, *grams]
         if len(grams) > MOST:
             return None
-        whole = sparse_of([*every, Poly({}), self.p])
+        whole = sparse_of([*every, Poly({}), self.p]).scipy()
         equal, b = whole[:, :-1], whole[:, -1].toarray().ravel()
         if self.basis is not None:
             # Equations that follow from others would stop the interior point.
+            pivoted: Any = import_module("scipy.linalg").qr
             _, triangle, order = pivoted(equal.toarray().T, mode="economic", pivoting=True)
             sizes = np.abs(np.diag(triangle))
             kept = np.sort(order[: int((sizes > 1e-10 * sizes[0]).sum())])
             equal, b = equal[kept], b[kept]
+        stored = equal.tocoo()
+        entries = Entries(stored.row, stored.col, stored.data, stored.shape)
         try:
-            x = optimum(equal, b, [True] * len(self.strict), [block.pairs for block in self.blocks], 1.0)
+            x = optimum(entries, b, [True] * len(self.strict), [block.pairs for block in self.blocks], 1.0)
         except BaseException as fault:  # a panic of the solver is one
             if isinstance(fault, (KeyboardInterrupt, SystemExit)):
                 raise

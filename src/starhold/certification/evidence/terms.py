@@ -19,7 +19,7 @@ from starhold.kernel.polynomials import Monomial, Poly, dot, poly
 from starhold.kernel.rules import Sum
 
 PAIRED = 10
-"""Products of two known things are tried, of so many of them at most."""
+"""The most known quantities of which products in pairs are tried."""
 
 
 def times(a: Poly, b: Poly, c: int = 1) -> Poly:
@@ -109,7 +109,7 @@ def needed(p: Poly, free: list[Poly], made: dict[tuple[int, ...], Poly]) -> list
     """Return the places of products that p is made of with positive factors, and of free polynomials, in floats."""
     if not p.terms:
         return []
-    whole = sparse_of([*free, *made.values(), p]).toarray()
+    whole = sparse_of([*free, *made.values(), p]).dense()
     A, b = whole[:, :-1], whole[:, -1]
     cost = np.r_[np.zeros(len(free)), np.ones(len(made))]
     linprog: Any = import_module("scipy.optimize").linprog

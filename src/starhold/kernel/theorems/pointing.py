@@ -10,7 +10,7 @@ from ..held import Held
 from ..loops import AttitudeLoop
 from ..numbers import Rows, demand, matrix, norm, plus, rational, read_list, read_table, root, scalar, times, transpose, up
 from ..reading import Claim
-from ..regions import ANGLE, AT_REST, RATE, TURN, balls, widened
+from ..regions import ANGLE, AT_REST, RATE, TURN, as_told, balls, widened
 from ..rules import Definite, Exceeds, Proof
 from ..sentences import Statement, above, below, enumerated
 from .attitude import contents
@@ -35,7 +35,8 @@ def points(claim: Claim) -> Proof:
     changes no faster than that and told.change.per.rate times the body's rate.
     With a `share` all holds at so many `samples` on end but with this probability: errors that noise drives are no more than
     noise.attitude and noise.rate beside. The law may keep a memory that adds a torque of no more than `memory` about each
-    axis, whatever is in it."""
+    axis, whatever is in it. With a `tolerance` the inertia is one near the given one. The law may ask for
+    the first move of a plan, see `plans`."""
     loop = AttitudeLoop(claim, remembers=True)
     yield from loop.sound()
     motion, numbers, samples = Held(loop), claim.numbers, 0
@@ -44,7 +45,12 @@ def points(claim: Claim) -> Proof:
     demand(not motion.even or max(starts) <= HALF_TURN, "V is the same at the other quaternion")
     start = yield from contents(loop, loop.lyapunov)
     region = motion.region(c)
-    limited = yield from within_limits(loop, motion.misread(region)[0] + norm([loop.added or Fraction(0)] * 3))
+    planned, torques = "", None
+    if motion.plan is not None:
+        wrong = motion.wrong
+        planned, torques = yield from motion.plan.keeps(region, (wrong["w"], wrong["q"]), as_told(region.sizes, wrong))
+    off = motion.misread(region)[0] + motion.planned(region.sizes)
+    limited = yield from within_limits(loop, off + norm([loop.added or Fraction(0)] * 3), torques)
     if loop.signs:
         yield "the sign never changes", Exceeds(region.least, motion.turned / 2)
     tube = motion.tube(region)
@@ -118,8 +124,18 @@ def points(claim: Claim) -> Proof:
         f" {most('outside')} and {enumerated(errors)}"
     )
     text += "" if loop.added is None else f", a memory that adds up to {below(loop.added)} N m about each axis"
+    text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
+    text += f", {planned}" * bool(planned)
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
-    assumed = ["rigid-body", "inertia-as-given", "bounded-push", "held-torque", *noise.assumptions, *limited.assumptions]
+    assumed = [
+        "rigid-body",
+        "inertia-near" if motion.off else "inertia-as-given",
+        "bounded-push",
+        "held-torque",
+        *noise.assumptions,
+        *limited.assumptions,
+    ]
+    assumed += ["best-plan"] * bool(planned)
     assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]

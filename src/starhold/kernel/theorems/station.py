@@ -113,8 +113,6 @@ def falls(loop: PointLoop, circle: Circle) -> Shown:
             demand(apart, "the law may have no bound on a side")
             slope, z, known = circle.met(slope), [poly(1)], [circle.met(p) for p in side.known]
         yield f"V does not increase {k}", Squares(slope, z, len(z), known)
-    stays = [loop.slopes_along(p, loop.acceleration(near[0])).at(circle.running) for p in wrong]
-    yield from vanish("only the circle", [circle.errors[0] * p for p in loop.x[1:]], stays, first=1)
     yield "x returns", Contracts([[Fraction(0), Fraction(1)], [a, b]], flow=True)
 
 

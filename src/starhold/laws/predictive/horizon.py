@@ -202,7 +202,7 @@ def unroll(problem: Problem) -> None:
 
 
 class Trial(NamedTuple):
-    """A trial plan has a flag, whether a limit cut a move, and the change of half the cost towards it, slope +
+    """A trial plan, with a flag for whether a limit cut a move, and the change of half the cost towards it, slope +
     curvature / 2, which is free of the cancellation that a difference of two costs suffers."""
 
     cut: Truth

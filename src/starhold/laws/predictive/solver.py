@@ -203,8 +203,8 @@ def _gradient_step(problem: Problem) -> Scalar:
 
 @function
 def shorten(problem: Problem, halvings: Scalar) -> Scalar:
-    """Search along the projection arc of the step (Armijo), halved so many times at most, until the cost decreases enough.
-    Gives the change of half the cost, zero if it never does."""
+    """Search along the projection arc of the step (Armijo), halved `halvings` times at most, until the cost decreases
+    enough. Gives the change of half the cost, zero if it never does."""
     store = carve(problem)
 
     def over(_length: Scalar, change: Scalar, left: Scalar) -> Truth:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from functools import reduce
+from typing import Annotated, Any, NamedTuple, cast
 
 from starhold.algebra.quantity import Quantity
 from starhold.algebra.quaternion import to_body
-from starhold.algebra.scalar import Scalar, absolute, clip, divide, less, maximum, where
+from starhold.algebra.scalar import Scalar, Truth, absolute, clip, divide, either, less, maximum, where
 from starhold.algebra.several import each
+from starhold.algebra.structured import when
 from starhold.algebra.vector import ZERO, Vector, cross, dot, scale
 from starhold.parts import as_built, magnetic_field
 from starhold.parts.contract import Card, Parameter
@@ -94,11 +96,21 @@ def dipole_for(torque: Vector, field: Vector) -> Vector:
 
 def within(dipole: Vector, limit: Vector, limited: int) -> Vector:
     """A dipole (A m2) within the limit of each axis, reduced together or each on its own."""
-    if not limited:
+
+    def reduced(*dipole: Scalar) -> Vector:
         x, y, z = each(_filled, (dipole, limit))
-        dipole = scale(1.0 / maximum(maximum(maximum(x, y), z), 1.0), dipole)
+        return scale(1.0 / maximum(maximum(maximum(x, y), z), 1.0), cast(Vector, dipole))
+
+    if not limited:
+        # Most dipoles are within their limits, and stay as they are.
+        exceeds = reduce(either, each(_exceeds, (dipole, limit)))
+        dipole = cast(Vector, when(exceeds, reduced, *dipole))
     cut: Any = each(clip, (dipole, limit))
     return cut
+
+
+def _exceeds(dipole: Scalar, limit: Scalar) -> Truth:
+    return less(limit, absolute(dipole))
 
 
 def _filled(dipole: Scalar, limit: Scalar) -> Scalar:

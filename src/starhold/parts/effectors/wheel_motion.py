@@ -38,7 +38,7 @@ def with_more(
     dynamic_imbalance: Sequence[float],
     position: Sequence[Vector],
 ) -> Wheels:
-    """The wheels with static friction (N m), 0 for none beside Coulomb's, its speed (rad/s), power limits (W), and rotors
+    """The wheels with static friction (N m), 0 for none besides Coulomb's, its speed (rad/s), power limits (W), and rotors
     with mass moments (kg m) and products of inertia (kg m2) at places from the centre of mass (m, body axes).
 
     ValueError where static friction is less than Coulomb's or has no speed, and where a top speed is needed and absent."""
@@ -76,7 +76,7 @@ def mounted(wheels: Wheels, errors: Sequence[Vector]) -> Wheels:
 
 
 def as_known(wheels: Wheels) -> Wheels:
-    """The wheels with the axes for which laws and allocation take them."""
+    """The wheels, with the axes that laws and allocation assume."""
     return wheels._replace(axes=wheels.known_axes, known_axes=()) if wheels.known_axes else wheels
 
 
@@ -134,7 +134,7 @@ def top_speeds(wheels: Wheels) -> Numbers:
 
 
 def sticking(momentum: Numbers, rate: Vector, wheels: Wheels) -> Numbers:
-    """Stribeck's friction on the rotors (N m), beside the other kinds."""
+    """Stribeck's friction on the rotors (N m), in addition to the other kinds."""
     return each(_stuck, (speeds(momentum, rate, wheels), wheels.sticking, wheels.stribeck_speed))
 
 

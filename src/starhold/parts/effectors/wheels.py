@@ -251,7 +251,7 @@ def motor(command: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels, rub
 
 
 def _rubs(wheels: Wheels) -> Truth:
-    """Whether there is friction that `motor` may not leave out: many bearings are taken for ideal."""
+    """Whether there is friction that `motor` must include; most bearings are modelled as ideal."""
     return less(0.0, reduce(plus, (*wheels.viscous, *wheels.coulomb)))
 
 

@@ -29,7 +29,7 @@ class Params(NamedTuple):
 
 
 def acceleration(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
-    """Acceleration of the centre of mass beside that by a point mass (inertial, m/s2)."""
+    """Acceleration of the centre of mass in addition to that by a point mass (inertial, m/s2)."""
     n2, inverse_square = attraction(state.position, craft)
     size: Scalar = 1.5 * params.j2 * params.radius * params.radius * (n2 * inverse_square)
     x, y, z = scale(size, state.position)

@@ -42,5 +42,5 @@ def torque(state: Any, params: Params, craft: Any, memory: Vector) -> Vector:
 
 
 def examples() -> list[Params]:
-    """A torque as the published noise study has it, and none."""
+    """The torque of the published noise study, and none."""
     return [Params(1e-4), Params(0.0)]

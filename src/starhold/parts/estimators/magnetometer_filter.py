@@ -1,5 +1,5 @@
-"""Attitude, and rate or a gyro's bias, from the magnetic field alone, by an extended Kalman filter that begins anew where
-the fields measured contradict it: for a body that tumbles, and of which nothing is known."""
+"""Attitude, and rate or a gyro's bias, from the magnetic field alone, by an extended Kalman filter that restarts where the
+fields measured contradict it: for a body that tumbles, and of which nothing is known."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ HOUR = 3600.0
 MEAN = 100.0
 """Measurements over which squares of what they are off are averaged."""
 DOUBT, TRUST = 2.0, 1.25
-"""The filter begins anew where that mean, 1 of a good filter, is above the first, and is not valid above the second."""
+"""The filter restarts where that mean, 1 for a consistent filter, is above the first, and is not valid above the second."""
 SPREAD = 0.5
 """The sine of the angle by which the field must have turned, in inertial axes, since the filter began."""
 TINY = 1e-12
@@ -285,7 +285,7 @@ def corrected(now: Memory, shown: Vector, true: Vector, params: Numbers) -> Memo
     """The estimate corrected by a field, which an error of the attitude turns: off = B x error."""
     foretold = to_body(now.attitude, true)
     off, row = subtract(shown, foretold), skew(foretold)
-    # Of the field as it is foretold with the errors of attitude and of bias or rate.
+    # Of the predicted field with the errors of attitude and of bias or rate.
     of_turn, of_slow = product(row, now.turn), product(row, now.mixed)
     sure = inverse(symmetric(along_diagonal(product(of_turn, transpose(row)), params.seen)))
     turning, slowing = product(transpose(of_turn), sure), product(transpose(of_slow), sure)
@@ -302,6 +302,6 @@ def corrected(now: Memory, shown: Vector, true: Vector, params: Numbers) -> Memo
 
 
 def examples() -> list[Params]:
-    """A magnetometer beside a MEMS gyro, and an attitude that is known at the start."""
+    """A magnetometer with a MEMS gyro, and an attitude that is known at the start."""
     small = Params(2e-7, math.radians(0.3) / 60.0, math.radians(5.0) / HOUR)
     return [small, small._replace(rate=0.02, start=(0.6, 0.0, 0.8, 0.0), start_deviation=0.02)]

@@ -1,5 +1,5 @@
 """Attitude and gyro bias by the multiplicative extended Kalman filter: the gyro carries the attitude on; new attitudes of
-star trackers, and directions where they are asked for, correct both, by gains that follow from their covariances."""
+star trackers, and directions if they are selected, correct both, by gains that follow from their covariances."""
 
 from __future__ import annotations
 

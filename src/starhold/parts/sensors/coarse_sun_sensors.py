@@ -59,7 +59,7 @@ CUBE: tuple[Row, ...] = (
 MOST = RANGE - 1
 """Diodes at most, whose random numbers leave one for the jitter."""
 FAINT = 1e-6
-"""Weight of what the currents leave open, which is taken for zero."""
+"""The weight with which components that the currents do not determine are drawn to zero."""
 
 
 class Params(NamedTuple):

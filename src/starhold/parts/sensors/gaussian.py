@@ -38,9 +38,9 @@ class Reading(NamedTuple):
 def measure(state: Any, memory: NoMemory, params: Params, dice: Dice, step: int) -> tuple[Reading, NoMemory]:
     """Attitude turned by Gaussian angles about the body axes, rate with a Gaussian error."""
     # The vector part of a small rotation's quaternion is half the angle.
-    d = dice.vector(0, 0.5 * params.attitude)
+    d, turning = dice.vectors(0, 0.5 * params.attitude, params.rate)
     attitude = normalise(multiply(state.attitude, (1.0, d[0], d[1], d[2])))
-    return Reading(attitude, add(state.rate, dice.vector(3, params.rate))), memory
+    return Reading(attitude, add(state.rate, turning)), memory
 
 
 def error(params: Params) -> Errors:

@@ -59,8 +59,9 @@ def remember(params: Numbers, state: Any) -> Any:
 def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> tuple[Reading, Any]:
     """Position and velocity at this control step, with noise."""
     state, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 6)
-    position = add(state.position, dice.vector(0, params.position))
-    return Reading(position, add(state.velocity, dice.vector(3, params.velocity))), as_built.kept(memory, waiting)
+    away, faster = dice.vectors(0, params.position, params.velocity)
+    reading = Reading(add(state.position, away), add(state.velocity, faster))
+    return reading, as_built.kept(memory, waiting)
 
 
 def examples() -> list[Params]:

@@ -128,13 +128,13 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
     state, memory, waiting = as_built.arrived(state, memory, params.late, SEEN, dice, 9)
     bias = add(memory.bias, memory.wander) if params.wander else memory
     seen = as_built.along(params.axes, state.rate)
-    shown = add(add(scale(params.factor, seen), bias), dice.vector(0, params.deviation))
+    noise, walk, *added = dice.vectors(0, params.deviation, params.walk, *params.wander[1:])
+    shown = add(add(scale(params.factor, seen), bias), noise)
     reading = Reading(as_built.shown(shown, params.step, params.limit))
     if not params.wander:
-        return reading, as_built.kept(add(memory, dice.vector(3, params.walk)), waiting)
-    stays, added = params.wander
-    wander = add(scale(stays, memory.wander), dice.vector(6, added))
-    return reading, as_built.kept(Wandering(add(memory.bias, dice.vector(3, params.walk)), wander), waiting)
+        return reading, as_built.kept(add(memory, walk), waiting)
+    wander = add(scale(params.wander[0], memory.wander), added[0])
+    return reading, as_built.kept(Wandering(add(memory.bias, walk), wander), waiting)
 
 
 def error(params: Params) -> Errors:
@@ -154,7 +154,7 @@ def noise(params: Params, period: float) -> Noise:
 
 
 def examples() -> list[Params]:
-    """A MEMS gyro, one that has a bias alone, one that is exact, and one as it is built, late and at uneven instants."""
+    """A MEMS gyro, one that has a bias alone, one that is exact, and one with errors of manufacture, a delay and jitter."""
     mems = Params(noise=math.radians(0.15) / 60.0, bias=(1e-4, -2e-4, 5e-5), bias_walk=math.radians(3.0) / HOUR)
     skewed = ((1e-3, 0.0, 5e-4), (0.0, -2e-3, 0.0), (0.0, 3e-4, 0.0))
     built = mems._replace(

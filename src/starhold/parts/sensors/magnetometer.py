@@ -113,7 +113,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """The largest error beside noise of a reading that is always new, wherever there is no ground."""
+    """The largest error besides noise of a reading that is always new, wherever there is no ground."""
     late = as_built.is_given(params.interval, params.jitter, params.delay)
     if params.outage != NEVER or params.limit < math.inf or late:
         return UNBOUNDED
@@ -134,7 +134,8 @@ def _deviation(params: Params, period: float) -> Scalar:
 
 
 def examples() -> list[Params]:
-    """Return the magnetometer of a CubeSat, an exact one with an outage and another epoch, and one as it is built."""
+    """Return the magnetometer of a CubeSat, an exact one with an outage and another epoch, and one with errors of
+    manufacture."""
     small = Params(noise=5e-8, bias=(2e-7, -1e-7, 3e-7), scale_error=0.002)
     built = small._replace(mounting_error=(0.0, 0.01, -0.02), axis_errors=(1e-3, -2e-3, 5e-4), resolution=1.5e-8, limit=1e-4)
     return [small, Params(epoch=(2027.0, 6.0, 21.0, 12.0, 30.0, 15.0), outage=(0.5, 1.5)), built]

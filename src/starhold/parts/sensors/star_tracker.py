@@ -150,7 +150,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """That of the mounting where an attitude is there as it is; what the craft turns until it comes has no bound."""
+    """The mounting error, if attitudes are not delayed; the rotation of the craft during a delay has no bound."""
     silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
     if params.delay or as_built.is_given(params.jitter) or silent or params.rate_limit < math.inf:
         return UNBOUNDED

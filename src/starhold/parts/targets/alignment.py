@@ -97,7 +97,7 @@ STRIDE = 600.0
 
 
 def towards_sun(time: Scalar, params: sun.Numbers) -> Moving:
-    """The direction of the Sun so many seconds after the start."""
+    """The direction of the Sun at a time (s) after the start."""
     before, now, after = (sun.sun(time + stride, params).direction for stride in (-STRIDE, 0.0, STRIDE))
     first = scale(0.5 / STRIDE, subtract(after, before))
     second = scale(1.0 / STRIDE**2, subtract(add(after, before), scale(2.0, now)))

@@ -100,7 +100,7 @@ def _loads(axis: Vector, inertia: Any) -> tuple[Vector, Vector]:
 
 
 def turned(start: Quaternion, legs: tuple[Leg, ...], time: Scalar) -> Goal:
-    """The attitude on a path so many seconds after it began, with its rate and acceleration in its own axes."""
+    """The attitude on a path at a time (s) after it began, with its rate and acceleration in its own axes."""
     attitude, rate, slope = start, ZERO, ZERO
     for leg in legs:
         up, flat, a = leg.speeding, leg.coasting, leg.acceleration

@@ -82,7 +82,7 @@ def goal(params: Numbers, state: Any, step: int, before: Quaternion) -> Goal:
 
 
 def _sine(params: Numbers, swings: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """The angle (rad), its rate and its acceleration of a sine after so many swings."""
+    """The angle (rad), its rate and its acceleration of a sine after `swings` swings."""
     cosine, sine = cosine_sine(swings)
     often = math.tau * params.often
     return params.amplitude * sine, often * params.amplitude * cosine, -often * often * params.amplitude * sine

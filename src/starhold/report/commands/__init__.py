@@ -157,7 +157,7 @@ class Command(NamedTuple):
     without FILE, if that is allowed. read: returns the subject in place of a scenario and a law, from FILE and options.
     proofs: whether a certificate is written, and so whether there is --rocq. kinds: suffixes of the files NAME.*. prove: the
     study together with a proof of the pointing, where there is --proof. check: takes the arguments of study, and refuses
-    files that they name before a folder for results is looked at.
+    files that they name before a folder for results is opened.
     """
 
     summary: str

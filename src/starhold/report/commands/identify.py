@@ -40,11 +40,11 @@ def _table(result: Identified) -> Table:
 
     posterior, barely = result.posterior, result.posterior.barely(result.free)
     columns = [Column("number"), Column("unit"), Column("file", "", ".6g"), Column("estimate", "", ".6g")]
-    columns += [Column("± 95 %", "", ".2g"), Column("told")]
+    columns += [Column("± 95 %", "", ".2g"), Column("determined")]
     rows: list[list[Any]] = []
     numbers = zip(result.free.names, result.free.units, result.free.values, result.values, strict=True)
     for k, (name, unit, before, value) in enumerate(numbers):
-        width = WIDTH * posterior.deviations[k] if posterior.is_told[k] else None
+        width = WIDTH * posterior.deviations[k] if posterior.is_determined[k] else None
         words = "[red]no[/red]" if width is None else "barely" if barely[k] else "yes"
         rows.append([name, unit, before, value, width, words])
     return Table(columns, rows)
@@ -71,7 +71,7 @@ def _words(result: Identified) -> list[str]:
 
 
 def _numbers(result: Identified) -> Table:
-    """Estimates with their covariance, NaN where they are not told."""
+    """Estimates with their covariance, NaN where they are undetermined."""
     posterior = result.posterior
     heads = ["number", "unit", "file", "estimate", "deviation", *(f"covariance {name}" for name in result.free.names)]
     values = zip(result.free.names, result.free.units, result.free.values, result.values, strict=True)

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from starhold.studies.phasing_verdict import Phasing, Seen
 
 MANUAL = (
-    "The craft stands on target and at rest, without torque from outside, its rotors at rest. Each stimulus is given by "
+    "The craft is at rest on target, without external torque and with its rotors at rest. Each stimulus is given by "
     "hand, by coil or by telecommand, and all stages of its rows are read. Signs count, and which number of a vector is "
-    "large; sizes need not be exact. An attitude is told as the turn since the craft stood on target.",
+    "large; sizes need not be exact. An attitude is given as the rotation from the attitude on target.",
     "Numbers, or +, - and 0, go into the column seen of phasing.csv, which has a row for each number of this sheet; "
     "starhold phasing FILE --check phasing.csv -o DIR judges them.",
 )

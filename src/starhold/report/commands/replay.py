@@ -54,7 +54,7 @@ def _row(one: Comparison) -> list[Any]:
 
 
 def _numbers(result: Replay) -> Table:
-    """All that was computed, at each control step, and what was recorded beside it."""
+    """All that was computed, at each control step, with what was recorded then."""
     import numpy as np
 
     from starhold.studies.telemetry_files import heads_of

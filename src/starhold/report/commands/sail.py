@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 DAY = 86400.0
 RATES = (0.8, 1.0, 1.2, 1.6, 1.8, 2.0)
-"""Omega; the best rate comes beside them."""
+"""Omega; the best rate is added to them."""
 REFLECTIVITIES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 DEFICITS = (0.0, 0.05, 0.1)
 UNITS = {"radius": "m", "mass": "kg", "area": "m^2", "pressure": "N/m^2"}

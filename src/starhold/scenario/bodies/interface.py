@@ -52,7 +52,7 @@ class Body(Protocol):
     tables: type[ScenarioTable]
     """All tables of a file except those of its laws."""
     law_table: type[LawTable]
-    """The keys of tables of laws beside their gains."""
+    """The keys of tables of laws besides their gains."""
     example: str
     """A small scenario in TOML, to which a law's table can be appended."""
     modes: bool = False
@@ -100,7 +100,7 @@ class Body(Protocol):
         raise InputError(scenario.where, key, "a target", "none, because this body has no attitude")
 
     def options(self, scenario: Scenario, law_table: Any, gains: Any, key: str) -> Any:
-        """Return the options of a law beside its gains, from its validated table (named `key` in errors) or else from the
+        """Return the options of a law besides its gains, from its validated table (named `key` in errors) or else from the
         scenario. InputError if they do not fit the gains."""
         return None
 

@@ -192,7 +192,7 @@ def regions(desk: Desk) -> Figure:
 
 
 def _share(largest: float) -> float:
-    """K_a / K_w^2 of (25), as printed, where the last moment is so many times the first."""
+    """K_a / K_w^2 of (25), as printed, where the last moment is `largest` times the first."""
     return (2.0 * largest - 1.0) / (8.0 * largest**2)
 
 

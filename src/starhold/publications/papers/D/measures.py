@@ -244,7 +244,8 @@ def scalar_root(desk: Desk, share: float) -> Finding:
 
 
 def periods(desk: Desk, seconds: Sequence[float]) -> Finding:
-    """Return whether the printed turn keeps the limits without tolerance when its torque is held for so many seconds."""
+    """Return whether the printed turn keeps the limits without tolerance when its torque is held for each of these times
+    (s)."""
     flown = {h: _held(desk, h) for h in seconds}
     note = ", ".join(
         f"{h:g} s: {seen['transient_time']:.1f} s, {seen['peak_rate'] * DEGREES:.1f} °/s"

@@ -295,7 +295,7 @@ def lag_hours(desk: Desk, lag: float) -> Finding:
 
 
 def settles(desk: Desk, lag_h: float, days: float, left: float) -> Finding:
-    """Return whether a first-order lag leaves less than a share of a step after so many days."""
+    """Return whether a first-order lag leaves less than the share `left` of a step after `days` days."""
     remains = math.exp(-days * 24.0 / lag_h)
     return Finding(remains < left, f"after {days:g} days {100.0 * remains:.0f} % of a turn remains")
 

@@ -155,7 +155,7 @@ class Near(Table):
 
 
 class PointLawTable(LawTable, Resources):
-    """The keys of every law table beside the law's own gains."""
+    """The keys of every law table besides the law's own gains."""
 
 
 class LibrationPointTable(ScenarioTable):

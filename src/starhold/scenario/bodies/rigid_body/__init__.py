@@ -36,7 +36,7 @@ velocity = [0.0, 4e3, 6.4e3]
 
 
 class Options(NamedTuple):
-    """The keys that a law's table may hold beside its gains."""
+    """The keys that a law's table may hold besides its gains."""
 
     quaternion_sign: Any
     hysteresis_width: float

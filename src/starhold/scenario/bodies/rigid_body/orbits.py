@@ -57,8 +57,8 @@ def _plain(value: Any) -> Any:
 
 
 def impossible_orbits(scenario: Scenario, columns: Mapping[str, Array]) -> NDArray[np.bool_] | None:
-    """Return which lanes have an orbit that a file may not have, (lanes,); None where no orbit is drawn, or only a file can
-    tell."""
+    """Return which lanes have an orbit that a file would be refused for, (lanes,); None where no orbit is drawn, or only
+    reading the file can tell."""
     try:
         orbits = orbits_over(scenario, columns)
     except ValueError:

@@ -327,7 +327,7 @@ class CertifyTable(Table):
 
 
 class AttitudeLawTable(LawTable):
-    """The keys of every law table beside the law's own gains."""
+    """The keys of every law table besides the law's own gains."""
 
     quaternion_sign: Annotated[
         Literal["as_published", "shortest", "hysteresis"], Field(description="which of q and -q is fed back")

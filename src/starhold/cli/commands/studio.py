@@ -48,3 +48,6 @@ def studio(
         console.print("Nothing leaves this machine. Ctrl-C ends it.")
 
     serve(path, name, text, port, announce, browser)
+
+
+COMMANDS = {"studio": studio}

@@ -151,3 +151,6 @@ def print_exported(exported: Exported, folder: Path) -> None:
         f"Test it: cmake -S {folder} -B {folder}/build && cmake --build {folder}/build && ctest --test-dir {folder}/build",
         soft_wrap=True,
     )
+
+
+COMMANDS = {"export": app}

@@ -145,3 +145,6 @@ def rerun(
         painter.finish()
     if flight.lost is not None:
         raise typer.Exit(DIVERGED)
+
+
+COMMANDS = {"campaign": campaign, "query": query, "rerun": rerun}

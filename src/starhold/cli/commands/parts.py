@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from starhold.parts.contract import Field
     from starhold.parts.part import Part
 
+Checked = Annotated[str, typer.Argument(metavar="FILE", help="a Python file that holds a part or a law, or the name of one")]
 NEW_MODES = "starhold new my.toml --from cubesat-mission shows one."
 
 
@@ -80,11 +81,7 @@ def wheels() -> None:
     print_blocks([Table([Column("unit"), Column("maker"), *numbers, Column("source")], rows)])
 
 
-def check_part(
-    part: Annotated[
-        str, typer.Argument(metavar="FILE", help="a Python file that holds a part or a law, or the name of one")
-    ],
-) -> None:
+def check_part(part: Checked) -> None:
     """Run the conformance suite over a part or a law of your own."""
     from rich.markup import escape
 
@@ -185,3 +182,11 @@ def _bounds(gain: Any) -> str:
     parts = [(gain.above, "> "), (gain.at_least, ">= "), (gain.at_most, "<= ")]
     bounds = ", ".join(f"{sign}{bound:g}" for bound, sign in parts if bound is not None)
     return gain.describe() + (f", {bounds}" if bounds else "")
+
+
+def check_law(part: Checked) -> None:
+    """The old name of check-part."""
+    check_part(part)
+
+
+COMMANDS = {"parts": parts, "check-part": check_part, "check-law": check_law, "laws": laws, "wheels": wheels}

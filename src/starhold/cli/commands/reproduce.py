@@ -119,3 +119,6 @@ def _print(made: list[Reproduction]) -> None:
         for judged in one.changed:
             text = f"{one.paper.letter}/{judged.row.name}: recorded {judged.row.verdict}, now {judged.verdict}"
             console.print(text, style="red", markup=False, soft_wrap=True)
+
+
+COMMANDS = {"reproduce": reproduce}

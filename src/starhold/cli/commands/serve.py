@@ -82,3 +82,6 @@ def serve(
     codes[Ending.INTERRUPTED] = 128 + served.signal
     if code := codes.get(served.ending, 0):
         raise typer.Exit(code)
+
+
+COMMANDS = {"serve": serve}

@@ -98,3 +98,6 @@ def check(
     console.print(f"kernel.pyz of this version: sha256 {hashlib.sha256(kernel_bundle()).hexdigest()}", soft_wrap=True)
     if others or not whole:
         raise typer.Exit(FAILED_CHECK)
+
+
+COMMANDS = {"certify": certify, "check": check}

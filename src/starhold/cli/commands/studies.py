@@ -1,8 +1,6 @@
 """Makes a command of each file in `starhold.report.commands`."""
 
 import inspect
-import os
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,52 +10,7 @@ import typer
 
 from starhold.cli.arguments import REFUTED, UNDECIDED, Drawn, Force, Pictures, Proof, Rocq, Unstable, results_in
 from starhold.errors import InputError
-from starhold.report.commands import Command, command
-
-
-class Outlet:
-    """A stream in place of `sys.stdout` or `sys.stderr`. The first write error is kept in `failure` and all later output is
-    dropped, so that a command finishes its work and writes its files."""
-
-    def __init__(self, stream: Any) -> None:
-        self._stream = stream
-        self.failure: OSError | None = None
-        # Characters that the encoding lacks are shown as question marks.
-        stream.reconfigure(errors="replace")
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        """Write the text as far as the stream accepts it."""
-        try:
-            return self._stream.write(text)
-        except OSError as error:
-            self._give_up(error)
-            return len(text)
-
-    def flush(self) -> None:
-        """Flush as much as the stream accepts."""
-        try:
-            self._stream.flush()
-        except OSError as error:
-            self._give_up(error)
-
-    def _give_up(self, error: OSError) -> None:
-        self.failure = self.failure or error
-        # The stream keeps what it could not send, and would fail again when Python exits.
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, self._stream.fileno())
-        os.close(nowhere)
-
-
-def open_outlets() -> None:
-    """Put outlets in place of the standard streams of this process; output to a closed stream is dropped."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
-        setattr(sys, name, Outlet(getattr(sys, name)))
-
+from starhold.report.commands import Command, command, names
 
 CODES = {"missed": REFUTED, "undecided": UNDECIDED}
 
@@ -172,3 +125,6 @@ def _progress(declared: Command) -> Iterator[Callable[[int, int, str], None]]:
     with bars_with() as bars:
         task = bars.add_task("compiling", total=None)
         yield lambda done, total, what: bars.update(task, completed=done, total=total, description=what)
+
+
+COMMANDS = {name: command_of(name) for name in names()}

@@ -1,0 +1,15 @@
+"""The command line's commands: each file of this folder has some in its `COMMANDS`, functions or groups of them by name."""
+
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+FIRST = ("flying", "campaign", "proofs", "studies", "reproduce", "export", "serve", "studio", "parts", "files")
+"""The order in which the files' commands are listed; those of other files follow."""
+
+
+def every() -> dict[str, Any]:
+    """Return all commands by name."""
+    others = {item.name for item in iter_modules(__path__)}.difference(FIRST)
+    modules = [import_module(f"{__name__}.{name}") for name in (*FIRST, *sorted(others))]
+    return {name: command for module in modules for name, command in module.COMMANDS.items()}
