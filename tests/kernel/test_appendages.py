@@ -68,6 +68,11 @@ def content_of(name):
     return found(loop_of(name))
 
 
+@cache
+def issued_of(name):
+    return certify(loop_of(name), "", Wanted(pointing=True))
+
+
 def proved(content):
     return check(json.dumps(content))[0]
 
@@ -91,7 +96,7 @@ def shares(content, seconds=20.0, seed=1, lanes=32):
     return {name: x for name, x in flown.items() if name != "flown"}
 
 
-@pytest.mark.parametrize("name", ["bent", pytest.param("panels", marks=pytest.mark.slow), "biased"])
+@pytest.mark.parametrize("name", ["bent", *(pytest.param(name, marks=pytest.mark.slow) for name in ("panels", "biased"))])
 def test_no_flight_exceeds_a_bound(name):
     content = content_of(name)
     statement = proved(content).statement
@@ -105,7 +110,7 @@ def test_no_flight_exceeds_a_bound(name):
 
 
 def test_the_claim_has_all_parts_of_the_loop_in_it():
-    issued = certify(loop_of("bent"), "", Wanted(pointing=True))
+    issued = issued_of("bent")
     claim = issued.claim("appendages")
     assert claim.outcome == "proved"
     assert not claim.left_out
@@ -178,6 +183,7 @@ def test_a_stronger_claim_is_refused(name):
     assert not accepted(changed(content_of("bent"), stronger))
 
 
+@pytest.mark.slow
 def test_each_piece_of_evidence_counts():
     content, refused, tried = content_of("bent"), 0, 0
     random = np.random.default_rng(2)
@@ -266,7 +272,7 @@ DROPPED = {
 """Ways to leave a term out, each with the errors that there are beside."""
 
 
-@pytest.mark.parametrize("name", ["", *DROPPED])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ["", *DROPPED]])
 def test_a_period_exceeds_its_bounds_without_a_term(name, monkeypatch):
     """Flights of one period from states of one mode each, in which the linear motion moves no other."""
     drop, errors = DROPPED.get(name, (None, EACH))
@@ -376,7 +382,7 @@ def test_models_hold_what_programs_do():
 
 def test_a_flight_with_appendages_that_move_more_is_not_covered():
     loop = loop_of("bent")
-    issued = certify(loop, "", Wanted(pointing=True))
+    issued = issued_of("bent")
     begun = issued.claim("appendages").numbers["begun"]
     assert start_inside(issued, loop)["appendages"]
     for share, covered in ((0.9, True), (1.1, False)):
