@@ -8,7 +8,7 @@ from math import factorial, tau
 from starhold.algebra.dual import Dual
 from starhold.algebra.scalar import Scalar, absolute, less, side, where
 
-_SHIFT = 1.5 * 2.0**52
+SHIFT = 1.5 * 2.0**52
 """Adding this to a number rounds it: doubles of this size are whole."""
 COSINE = tuple(float(Fraction((-1) ** n, factorial(2 * n))) for n in range(9))
 _SINE = tuple(float(Fraction((-1) ** n, factorial(2 * n + 1))) for n in range(8))
@@ -19,7 +19,7 @@ def nearest(x: Scalar) -> Scalar:
     """Return the whole number nearest to x, the even one of two; |x| is below 2^51."""
     # Rounding has no slope, though the sum that does it has one.
     x = x.value if isinstance(x, Dual) else x
-    return (x + _SHIFT) - _SHIFT
+    return (x + SHIFT) - SHIFT
 
 
 def cosine_sine(turns: Scalar) -> tuple[Scalar, Scalar]:

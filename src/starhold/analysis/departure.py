@@ -14,6 +14,7 @@ from starhold.algebra.scalar import side
 from starhold.algebra.vector import ZERO, add, apply, subtract
 from starhold.analysis.meter import ALMOST, on_limit
 from starhold.analysis.rigid_body import error_angle
+from starhold.certification.appendages import recorded_states, start_of
 from starhold.certification.assumptions import LINEAR, assumption
 from starhold.certification.certificate import Certificate, Claim
 from starhold.laws.interface import Measurement
@@ -148,7 +149,7 @@ def _left(certificate: Certificate) -> list[Claim]:
 
 def _set(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
     """Return whether a flight starts outside the claim's set, and when it leaves the set."""
-    left = [*_away(claim, span), *_misled(claim, span), *_unplanned(claim, programs, span)]
+    left = [*_away(claim, span), *_misled(claim, span), *_swinging(claim, span), *_unplanned(claim, programs, span)]
     momentum = claim.numbers.get("momentum")
     if momentum is not None:
         total = momentum_of(span.loop, span.shown)
@@ -176,6 +177,17 @@ def _away(claim: Claim, span: Span) -> list[Departure]:
     sine = np.linalg.norm(span["attitude_error"][:, 1:], axis=1)
     far = sine > math.sin(min(claim.numbers["angle"], math.pi) / 2.0) * (1.0 + 1e-6)
     return span.first(far & (span["time"] - span.begun > settling), "it is outside the ultimate bound")
+
+
+def _swinging(claim: Claim, span: Span) -> list[Departure]:
+    """Return whether a flight starts with appendages that move more than the claim is about."""
+    if "begun" not in claim.numbers:
+        return []
+    states = recorded_states(span.loop, span.arrays)
+    if states is None:
+        return span.first(True, "how far its appendages move is not recorded")
+    far = bool((np.abs(states[0]) > claim.numbers["begun"]).any())
+    return span.first(far, "its appendages move more than the claim is about")
 
 
 def _unplanned(claim: Claim, programs: Mapping[str, Any], span: Span) -> list[Departure]:
@@ -241,6 +253,8 @@ def start_inside(certificate: Certificate, loop: ClosedLoop) -> dict[str, bool]:
         if value is not None and "start" in claim.numbers:
             level = claim.numbers["start"]
             within = momentum <= claim.numbers.get("momentum", np.inf) and (level is None or value <= level)
+            if "begun" in claim.numbers:
+                within = within and bool((np.abs(start_of(loop)) <= claim.numbers["begun"]).all())
             inside[claim.kind] = bool(within)
     return inside
 

@@ -195,6 +195,7 @@ ASSUMPTIONS = {
 } | {
     name: Assumption(SENTENCES[name])
     for name in (
+        "appendages-as-given",
         "bounded-push",
         "held-torque",
         # The distribution of noise cannot be told from one flight.

@@ -129,6 +129,7 @@ def _claims(subject: Subject, wanted: Wanted) -> tuple[list[Claim], str]:
             unflown += f", with a total momentum of up to {above(subject.total_momentum):.4g} N m s ({whose})"
         if "pointing" in proved or wanted.disturbance:
             claims.append(proved.get("pointing") or undecided("pointing", {"torque": wanted.disturbance}, subject, unflown))
+        claims += [proved["appendages"]] if "appendages" in proved else []
     return claims, unflown
 
 

@@ -7,6 +7,7 @@ from math import inf, isfinite
 from typing import Any
 
 from starhold.algebra.polynomial import exact
+from starhold.certification.evidence.appendages import APPENDED
 from starhold.certification.evidence.attitude import ANY_ANGLE, CONVERGES, SAMPLED, SLIDING, STRICTLY, Loop
 from starhold.certification.evidence.detumbling import DETUMBLES, bounds_of
 from starhold.certification.evidence.finding import NotFoundError
@@ -79,6 +80,8 @@ def _programs(claim: Mapping[str, Any], programs: Mapping[str, str], subject: Ma
     for role, digest in programs.items():
         if claim["programs"].get(role, digest) != digest:
             yield f"the program of the {role} differs"
+    if "motion" in claim["programs"] and "motion" not in programs:
+        yield "there are no appendages"
     for name, x in claim["subject"].items():
         if name not in subject or rational(subject[name]) != rational(x):
             yield f"{name} is another number"
@@ -94,7 +97,7 @@ def _numbers(claim: Mapping[str, Any], recorded: Loop) -> Iterator[str]:
     least |= {"target.rate": known.target_rate, "target.acceleration": known.target_acceleration}
     if "share" in numbers and (driven := driven_errors(loop)) is not None:
         exactly |= {"samples": samples_of(loop), "every": driven.recursion.every, BESIDE: DEVIATIONS}
-    if claim["theorem"] == POINTS:
+    if claim["theorem"] in (POINTS, APPENDED):
         known = replace(known, tolerance=above(numbers["tolerance"]) if "tolerance" in numbers else None)
         envelope = known.envelope(BESIDE in numbers)._replace(momentum=above(numbers.get("momentum", Fraction(0))))
         pushed = known.against(envelope).numbers
@@ -178,7 +181,7 @@ def _words(claim: Mapping[str, Any], loop: Loop) -> Iterator[str]:
     taken, theorem = set(claim["taken"]), claim["theorem"]
     if theorem in REFUTING:
         return
-    signed = theorem in (SLIDING, STRICTLY, POINTS) or (theorem.startswith(CONVERGES) and "both" not in theorem)
+    signed = theorem in (SLIDING, STRICTLY, POINTS, APPENDED) or (theorem.startswith(CONVERGES) and "both" not in theorem)
     if taken & {SHORTEST, HYSTERESIS} != set(sign_words(loop.loop) if signed else []):
         yield "the sign of the quaternion is chosen in another way"
     if theorem != SAMPLED and (WHEELS in taken) != (loop.loop.wheels is not None):

@@ -9,6 +9,7 @@ from typing import Any
 
 from starhold.certification.assumptions import FRICTIONLESS, UNLIMITED, WHEELS
 from starhold.certification.certificate import EXACT, EXACT_SIGN, LYAPUNOV, SQUARES, Claim, Obligation, Proof
+from starhold.certification.evidence.appendages import find_appended
 from starhold.certification.evidence.attitude import ANY_ANGLE, Loop
 from starhold.certification.evidence.claims import find_claims, find_taken_over
 from starhold.certification.evidence.detumbling import DETUMBLES, find_detumbling
@@ -65,6 +66,7 @@ def proved_claims(
     loop = find_claims(subject, turn, tolerance)
     if pointing and not subject.loop.remembers:
         _find_pointed(loop, None, begun, tolerance)
+        find_appended(loop)
     find_refuted(loop, turn, rate)
     claims = met(checked(loop))
     # The refuted claim is the requested one; a weaker one may be proved.
@@ -283,6 +285,11 @@ def _pointed(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, A
     }
 
 
+def _appended(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
+    begun = [below(numbers[f"begun.{k}"]) for k in range(len(numbers)) if f"begun.{k}" in numbers]
+    return _pointed(numbers, loop) | {"begun": begun}
+
+
 def _detumbled(numbers: Mapping[str, Fraction], loop: RecordedLoop) -> dict[str, Any]:
     def each(name: str, side: Callable[[Any], float]) -> list[float]:
         return [side(x) for k in range(len(numbers)) if (x := numbers.get(f"{name}.{k}")) is not None]
@@ -322,6 +329,7 @@ _NUMBERS = {
     "sampling": _sampled,
     "sliding": _slid,
     "pointing": _pointed,
+    "appendages": _appended,
     "detumbling": _detumbled,
 }
 

@@ -12,6 +12,7 @@ import numpy as np
 from starhold.algebra.quaternion import NO_TURN
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import Vector, apply, norm, scale
+from starhold.certification.appendages import appendages
 from starhold.certification.certificate import ORBIT, STEADY, UNTIL, WITHOUT, Claim
 from starhold.certification.orbit_band import band_of, extremes, movers
 from starhold.certification.target_motion import motion_of
@@ -29,7 +30,7 @@ READ = {
 }
 """The parts that theorems model, by role, beside targets that bound their motion; a claim's other assumptions describe their
 torques and motions."""
-BOUNDED = ("pointing",)
+BOUNDED = ("pointing", "appendages")
 """Kinds of claims that include external torques and errors by their bounds."""
 DETUMBLING = "detumbling"
 """The kind of claims about a law that opposes the change of the magnetic field."""
@@ -203,8 +204,10 @@ def named(claims: list[Claim], loop: ClosedLoop, momentum: float = inf) -> tuple
             return tuple(f"{WITHOUT}{name}" for name in away)
         noisy = driven.parts if driven is not None and claim.numbers["share"] else ()
         envelope = envelope_of(loop, momentum, bool(noisy))
+        moved = appendages(loop) if claim.kind == "appendages" else ()
+        there = (*noisy, *moved)
         absent = [
-            f for f in _acting(loop) if not (is_read(loop, f) or f in noisy or _says(loop, f, envelope, f in estimated))
+            f for f in _acting(loop) if not (is_read(loop, f) or f in there or _says(loop, f, envelope, f in estimated))
         ]
         share = band_of(loop).share
         return (*(f"{WITHOUT}{_called(f)}" for f in absent), *([f"{ORBIT}{share:.3g}"] if share else []))

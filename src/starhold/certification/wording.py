@@ -20,6 +20,7 @@ HEADINGS = {
     "inertia": "uncertain inertia",
     "wheels": "within the wheels' limits",
     "pointing": "pointing as it flies",
+    "appendages": "pointing with appendages",
     "sampling": "torque held between samples",
     "sliding": "reaches its surface",
     "detumbling": "loses energy",
@@ -146,8 +147,7 @@ def unclaimed(subject: Mapping[str, Any]) -> str:
 
 def _even(subject: Mapping[str, Any]) -> bool:
     """Return whether the law treats both quaternions of an attitude alike."""
-    law = known_law(subject.get("law", ""))
-    return law is not None and law.card.quaternion_sign == "even"
+    return (law := known_law(subject.get("law", ""))) is not None and law.card.quaternion_sign == "even"
 
 
 def _cover(numbers: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -186,9 +186,8 @@ def _hand_over(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
 
 
 def _region(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
-    where = place(n, subject) or "from a level set of V"
     either = ", from either quaternion of an attitude" if subject["quaternion_sign"] == "hysteresis" else ""
-    return f"{where} the body comes to rest on target without leaving the set{either}"
+    return f"{place(n, subject) or 'from a level set of V'} the body comes to rest on target without leaving the set{either}"
 
 
 def _torque_limit(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
@@ -224,6 +223,7 @@ def _pointing(n: Mapping[str, Any], subject: Mapping[str, Any]) -> str:
         return f"a torque from outside of up to {shown(n['torque'], ' N m')} leaves the body near the target"
     turned = angle(n["slew_angle"])
     start = f"up to {turned} at up to {speed(n['rate_start'])}" if n["rate_start"] else f"rest at up to {turned}"
+    start += f" with states of the appendages of up to {', '.join(map(shown, n['begun']))}" if "begun" in n else ""
     kinds = (("attitude_error", angle, "errors of the attitude"), ("rate_error", speed, "errors of the rate"))
 
     def pushed(name: str) -> str:
@@ -328,7 +328,7 @@ _SENTENCES = {
     "torque-limit": _torque_limit,
     "wheels": _wheels,
     "inertia": _inertia,
-    "pointing": _pointing,
+    **dict.fromkeys(("pointing", "appendages"), _pointing),
     "sampling": _sampling,
     "sliding": _sliding,
     "detumbling": _detumbling,

@@ -21,7 +21,7 @@ FORMER = tuple(f"starhold {kind}certificate {version}" for kind in ("", "invaria
 """Formats of earlier versions, whose keys had other names."""
 ENDS = (
     "convergence", "region", "torque-limit", "wheels", "inertia", "pointing", "sliding", "circle", "equilibrium",
-    "hand-over",
+    "hand-over", "appendages",
 )  # fmt: skip
 """Kinds of claims with an ultimate bound, one of which a certificate must contain to count as proved."""
 BY_THE_KERNEL = "proved by the kernel"

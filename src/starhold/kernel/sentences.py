@@ -11,6 +11,7 @@ from fractions import Fraction
 ASSUMPTIONS = {
     "rigid-body": "the body is rigid",
     "inertia-as-given": "its inertia is exactly as given",
+    "appendages-as-given": "the hub is rigid, and its inertia and its appendages are exactly as given",
     "inertia-near": "its inertia is near the one given",
     "exact-measurement": "measurements are exact",
     "ideal-actuators": "actuators give at once what the law asks",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from starhold.algebra.circular import SHIFT
 from starhold.algebra.operations import WORD, Operation
 from starhold.algebra.polynomial import unreadable
 from starhold.algebra.structure import leaves
@@ -55,7 +56,7 @@ def straight_line(equation: Callable[..., Any], **given: Any) -> dict[str, Any]:
     body = recorder.program("program").main.body
     used = sorted({s.index for s in body if isinstance(s, Load)})
     steps, outputs = list[list[Any]](), list[int]()
-    places, constants = dict[str, int](), dict[str, int]()
+    places, constants, shifted = dict[str, int](), dict[str, int](), dict[str, Any]()
 
     def at(value: Any) -> int:
         if isinstance(value, str):
@@ -70,11 +71,22 @@ def straight_line(equation: Callable[..., Any], **given: Any) -> dict[str, Any]:
         steps.append([*parts])
         return len(used) + len(steps) - 1
 
+    def rounded(value: Any) -> int:
+        # Over exact numbers (x + shift) - shift is x: 0 where |x| < 1/2, and a quotient by zero elsewhere.
+        near = step("both", step("less", at(value), at(0.5)), step("less", at(-0.5), at(value)))
+        return step("divide", at(0.0), step("select", near, at(1.0), at(0.0)))
+
     for s in body:
         if isinstance(s, Load):
             places[s.ref] = used.index(s.index)
         elif isinstance(s, Op):
-            places[s.ref] = step(s.operation.name, *[at(value) for value in s.args])
+            name, args = s.operation.name, s.args
+            if name == "plus" and args[1] == SHIFT:
+                shifted[s.ref] = args[0]
+            if name == "minus" and args[0] in shifted and args[1] == SHIFT:
+                places[s.ref] = rounded(shifted[args[0]])
+            else:
+                places[s.ref] = step(name, *[at(value) for value in args])
         elif isinstance(s, Store):
             outputs.append(at(s.value))
         else:

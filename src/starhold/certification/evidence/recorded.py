@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from starhold.algebra.quaternion import derivative, vector_part
 from starhold.algebra.vector import apply, dot
+from starhold.certification.appendages import appendages, appended_motion
 from starhold.certification.evidence.finding import NotFoundError, by_digests, complete, read, unproved
 from starhold.certification.matrices import above
 from starhold.certification.subject import Subject
@@ -90,6 +91,8 @@ class RecordedLoop:
             "body": self.add(rigid_body.angular_acceleration, rate=V3, torque=V3, craft=self.plant),
             "turning": self.add(derivative, q=Q4, rate=V3),
         }
+        if appendages(loop):
+            programs["motion"] = self.keep(appended_motion(loop))
         if driven is not None:
             errors, noise = (V3,) * driven.recursion.size, (V3,) * driven.recursion.noises
             programs[CARRIED] = self.add(driven.recursion.carried, errors=errors, noise=noise)

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from ..reading import Claim
 from ..rules import Proof
-from . import attitude, detumbling, invariant, pointing, refuted, sampling, sliding, station
+from . import appendages, attitude, detumbling, invariant, pointing, refuted, sampling, sliding, station
 
 Theorem: TypeAlias = Callable[[Claim], Proof]
 
@@ -23,6 +23,7 @@ THEOREMS: dict[str, Theorem] = {
     "stays stable between samples": sampling.sampled,
     "reaches its surface": sliding.reaches_surface,
     "points": pointing.points,
+    "points with appendages": appendages.points_with_appendages,
     "detumbles": detumbling.detumbles,
     "V rises": refuted.rises,
     "V rises near the target": refuted.rises_near_target,

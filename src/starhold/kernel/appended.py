@@ -1,0 +1,262 @@
+"""A loop with its torque held between samples, and a body with appendages whose motion is a recorded program.
+
+The state z = (w, q, v) has that of the appendages, v. Near rest z' = Az + B(u + d) and what is left, of which models of the
+program bound how large it is, and u = -K(w, q) and what is left likewise. Samples are in modal coordinates, y = Wz, in
+blocks of one or two: each |y_k| <= r_k. All bounds of what a period makes of that are linear in r, and a constant.
+Docs/kernel.md, 12.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import cached_property
+from itertools import accumulate
+from typing import NamedTuple
+
+from .loops import AXES, IS_VALID, AttitudeLoop
+from .numbers import Rows, added, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
+from .taylor import Model, add, beyond, multiply, negative, number, run, slope, within
+from .taylor import root as root_of
+
+MOST, LONGEST, FINE, TINY, LITTLE = 40, 16, 2**64, Fraction(1, 2**20), Fraction(1, 2**200)
+"""How many states appendages may have; how far the motion of a period may be; the share of it at which a series ends; the
+size of inputs of which slopes at zero are read; the least number of a matrix of bounds that is not zero."""
+HALF, ZERO = Fraction(1, 2), Fraction(0)
+Column = list[Fraction]
+
+
+class Box(NamedTuple):
+    """What states are between samples, the torque, and the state at samples that the law is told, at most."""
+
+    state: Column
+    torque: Column
+    told: Column
+
+
+class Left(NamedTuple):
+    """What is left of rates, and of the law's torque, beside the linear ones: D|z| + T|u + d| + c, and D|z| + c."""
+
+    state: Rows
+    torque: Rows
+    rest: Column
+    law: Rows
+    law_rest: Column
+
+
+class Period(NamedTuple):
+    """What follows from samples with |y_k| <= r_k: the next ones have |y| <= grown r + more, the states until then are at
+    most between r + far, torques with all errors torque r + pushed, and what the law asks for torque r + asked."""
+
+    grown: Rows
+    more: Column
+    between: Rows
+    far: Column
+    torque: Rows
+    pushed: Column
+    asked: Column
+
+
+class Appended:
+    """The loop, its programs read near rest, and the bounds of a period."""
+
+    def __init__(self, loop: AttitudeLoop) -> None:
+        claim = loop.claim
+        self.loop, self.numbers, self.h = loop, claim.numbers, claim.numbers["period"]
+        demand(not (loop.outside or loop.moving or loop.wheels), "appendages are not taken with this")
+        self.motion, self.count = claim.programs["motion"], len(claim.programs["motion"].outputs) - 3
+        demand(0 < self.count <= MOST and self.h > 0, "appendages have no state, or too many")
+        self.n = 6 + self.count
+        self.names = {f"rate.{k}": k for k in AXES} | {f"state.{k}": 6 + k for k in range(self.count)}
+        small = [TINY] * self.n
+        slopes = [[slope(x, TINY, k) for k in range(self.n + 3)] for x in self.rates(small, [TINY] * 3)]
+        A = [row[: self.n] for row in slopes]
+        turning = [[HALF * (i == k) for k in range(self.n)] for i in AXES]
+        B, none = [row[self.n :] for row in slopes], [[ZERO] * 3] * 3
+        self.A, self.B = [*A[:3], *turning, *A[3:]], [*B[:3], *none, *B[3:]]
+        # The law's torque is -Kz near rest.
+        self.K = [[-slope(x, TINY, k) for k in range(self.n)] for x in self.command(small)]
+
+    def rates(self, state: Column, torque: Column) -> list[Model]:
+        """Return models of w' and v' where states and torques are no larger than told."""
+        given = {name: within(state[k], k) for name, k in self.names.items()}
+        given |= {f"torque.{k}": within(torque[k], self.n + k) for k in AXES}
+        return run(self.motion, given, 3 + self.count)
+
+    def command(self, state: Column) -> list[Model]:
+        """Return models of the law's torque where it is told no larger a state, near a target at rest, and no torque."""
+        w, q = ([within(state[k], k) for k in range(first, first + 3)] for first in (0, 3))
+        scalar_part = number(Fraction(1))
+        for x in q:
+            scalar_part = add(scalar_part, negative(multiply(x, x)))
+        q, none, program = [root_of(scalar_part), *q], [number(ZERO)] * 3, self.loop.claim.programs["law"]
+        fields = {"attitude": q, "rate": w, "body_rate": w, "target_rate": none, "target_acceleration": none}
+        fields |= {"external_torque": none, "wheel_momentum": none}
+        given = {f"measurement.{name}.{k}": x for name, parts in fields.items() for k, x in enumerate(parts)}
+        given[IS_VALID] = number(Fraction(1))
+        for name in program.inputs:
+            if name.startswith(("gains.", "craft.", "plant.")) or name == "measurement.period":
+                given[name] = number(self.loop.claim.subject[name])
+        return run(program, given, 3)
+
+    def left(self, box: Box) -> Left:
+        """Return what is left on a box. Of a turn that is q0 w - w + q x w, half of it."""
+        sizes = [*box.state, *box.torque]
+        linear = [[*a, *b] for a, b in zip(self.A, self.B, strict=True)]
+        rows = [beyond(x, sizes, row) for x, row in zip(self.rates(*box[:2]), [*linear[:3], *linear[6:]], strict=True)]
+        x, y, z = q = box.state[3:6]
+        v = sum((s * s for s in q), ZERO)
+        turned = [[HALF * s for s in row] + [ZERO] * (self.n - 3) for row in ((v, z, y), (z, v, x), (y, x, v))]
+        state, torque = ([row[part] for row, _ in rows] for part in (slice(self.n), slice(self.n, None)))
+        rest = [c for _, c in rows]
+        law = [beyond(x, box.told, [-k for k in row]) for x, row in zip(self.command(box.told), self.K, strict=True)]
+        return Left(
+            [*state[:3], *turned, *state[3:]],
+            [*torque[:3], *[[ZERO] * 3] * 3, *torque[3:]],
+            [*rest[:3], *[ZERO] * 3, *rest[3:]],
+            [row for row, _ in law],
+            [c for _, c in law],
+        )  # fmt: skip
+
+    @cached_property
+    def misread(self) -> Column:
+        """Return how far the state that the law is told is from the true one."""
+        turned, rate = (self.numbers.get(f"error.{name}") or ZERO for name in ("attitude", "rate"))
+        demand(turned <= HALF, "an attitude is told too wrongly")
+        return [*[rate] * 3, *[turned / 2] * 3, *[ZERO] * self.count]
+
+    def push(self, name: str, state: Column) -> Fraction:
+        """Return a bound of the torque from outside, or of the error of the command."""
+        return self.numbers[name] + (self.numbers.get(f"{name}.per.rate") or ZERO) * norm(state[:3])
+
+    def take(self, W: Rows, blocks: Sequence[int]) -> None:
+        """Take modal coordinates, in blocks of so many, and compute the linear motion in them."""
+        self.W, self.blocks = W, blocks
+        demand(set(blocks) <= {1, 2} and sum(blocks) == self.n, "blocks of coordinates are not of one or two")
+        h, A, alone, axes = self.h, self.A, [1] * self.n, [1] * 3
+        V = times(inverse(times(transpose(W), W)), transpose(W))
+        KV = times(self.K, V)
+        # Components of (Ah)^m x are no larger than a^m where those of x are no larger than 1.
+        a = h * max(map(total, A))
+        demand(a <= LONGEST, "the period is too long for the appendages")
+        terms, last, top = 0, a / 2, 3 ** -(-a.numerator // a.denominator)
+        while last * top * FINE > 1:
+            terms, last = terms + 1, last * a / (terms + 3)
+        self.tail = up(h * last * top)
+        forward, power, share = plus(times(A, V), times(self.B, KV), -1), scalar(1, self.n), h
+        end, held, spans = V, [[ZERO] * 3 for _ in A], sized(V, alone, blocks)
+        given, carry, filtered = held, [[ZERO] * self.n for _ in A], [[ZERO] * self.n for _ in blocks]
+        self.start = short(spans)
+        for m in range(terms + 1):
+            moved, pushed = times(power, forward), times(power, self.B)
+            end, held = plus(end, moved, share), plus(held, pushed, share)
+            spans, given = plus(spans, sized(moved, alone, blocks), share), plus(given, sizes_of(pushed), share)
+            carry = plus(carry, sizes_of(power), share)
+            filtered = plus(filtered, sized(times(W, power), blocks, alone), share)
+            power, share = times(A, power), share * h / (m + 2)
+        # A block of two is no longer than 3/2 times the larger one of its components.
+        largest = [max(map(total, rows)) for rows in parted(W, blocks)]
+        self.widths = [up(x * (size + 1) / 2) for x, size in zip(largest, blocks, strict=True)]
+        self.filter = short([[x + self.tail * width for x in row] for row, width in zip(filtered, self.widths, strict=True)])
+        self.carry = short([[x + self.tail for x in row] for row in carry])
+        self.linear, self.held = short(sized(times(W, end), blocks, blocks)), short(sized(times(W, held), blocks, axes))
+        self.spans, self.given, self.feedback = short(spans), short(given), short(sized(KV, axes, blocks))
+
+    def begun(self, X: Rows, appendages: Column) -> Column:
+        """Return bounds of the blocks where (w, q) is in the ellipsoid of X, and appendages are no further than told."""
+        blocks = list[Fraction]()
+        for rows in parted(self.W, self.blocks):
+            first = [row[:6] for row in rows]
+            square = times(times(first, X), transpose(first))
+            more = [added([abs(x) * y for x, y in zip(row[6:], appendages, strict=True)]) for row in rows]
+            blocks.append(root(max(map(total, square))) + norm(more))
+        return blocks
+
+    def period(self, box: Box) -> Period:
+        """Return what a period makes of samples, as long as states and torques are within a box."""
+        # So the scalar part of what is told is positive, too.
+        demand(norm(box.told[3:6]) <= HALF, "motions are not near the target")
+        left = self.left(box)
+        error, outside = (self.push(name, box.state) for name in ("error", "outside"))
+        # The law's torque is -Kz, and beside no more than law r + rest, as it is told a state that is off.
+        law = times(left.law, self.start)
+        off = plus(sizes_of(self.K), left.law)
+        asked = combined(left.law_rest, image(off, self.misread))
+        rest = combined(asked, [error] * 3)
+        torque, pushed = short(plus(self.feedback, law)), combined(rest, [outside] * 3)
+        # What moves the state beside the linear motion from the sample on: what is left, and torques from outside.
+        steady = combined(left.rest, image(sizes_of(self.B), [outside] * 3))
+        over = combined(steady, image(left.state, box.state), image(left.torque, box.torque))
+        tail = self.tail * max(combined(image(sizes_of(self.A), box.state), image(sizes_of(self.B), box.torque)))
+        between = short(plus(self.spans, times(self.given, law)))
+        far = combined(image(self.given, rest), image(self.carry, over), [tail] * self.n)
+        inner = plus(times(left.state, between), times(left.torque, torque))
+        beside = combined(steady, image(left.state, far), image(left.torque, pushed))
+        grown = short(plus(plus(self.linear, times(self.held, law)), times(self.filter, inner)))
+        more = combined(image(self.held, rest), image(self.filter, beside), [tail * width for width in self.widths])
+        return Period(grown, more, between, far, torque, pushed, asked)
+
+
+def image(rows: Rows, v: Column) -> Column:
+    """Return a matrix of what is not negative times a column of that."""
+    return [up(x) for x in reach(rows, v)]
+
+
+def combined(*columns: Column) -> Column:
+    """Return a sum of columns."""
+    return [added(entries) for entries in zip(*columns, strict=True)]
+
+
+def total(row: Sequence[Fraction]) -> Fraction:
+    """Return the sum of sizes."""
+    return added([abs(x) for x in row])
+
+
+def short(rows: Rows) -> Rows:
+    """Return numbers that are short and not tiny, and hardly larger."""
+    return [[up(max(x, LITTLE)) if x else x for x in row] for row in rows]
+
+
+def sizes_of(rows: Rows) -> Rows:
+    """Return the sizes of a matrix's entries."""
+    return [[abs(x) for x in row] for row in rows]
+
+
+def parted(rows: Rows, blocks: Sequence[int]) -> list[Rows]:
+    """Return the rows of each block."""
+    ends = list(accumulate(blocks))
+    return [rows[end - size : end] for size, end in zip(blocks, ends, strict=True)]
+
+
+def sized(rows: Rows, down: Sequence[int], across: Sequence[int]) -> Rows:
+    """Return how much longer each block of a matrix makes a vector at most."""
+    columns = [parted(transpose(part), across) for part in parted(rows, down)]
+    return [[longer(block) for block in row] for row in columns]
+
+
+def longer(block: Rows) -> Fraction:
+    """Return a bound of how much longer a matrix of no more than two rows and columns makes a vector: of two by two half the
+    sum of |(a + d, b - c)| and |(a - d, b + c)|."""
+    if len(block) < 2 or len(block[0]) < 2:
+        return norm([x for row in block for x in row])
+    (a, b), (c, d) = block
+    return (norm([a + d, b - c]) + norm([a - d, b + c])) / 2
+
+
+def follow(period: Period, begun: Column, periods: int) -> tuple[Column, Column]:
+    """Return bounds of samples at the start of each of so many periods, the first of which is told, and after them."""
+    largest = begun
+    for k in range(periods):
+        largest = list(map(max, largest, begun)) if k else largest
+        begun = combined(image(period.grown, begun), period.more)
+    return largest, begun
+
+
+def after(period: Period, begun: Column, periods: int) -> Column:
+    """Return bounds of samples after so many periods, as (r+ <= grown r + more) is taken twice, and twice again."""
+    grown, more = period.grown, period.more
+    while periods:
+        if periods & 1:
+            begun = combined(image(grown, begun), more)
+        grown, more, periods = short(times(grown, grown)), combined(image(grown, more), more), periods >> 1
+    return begun

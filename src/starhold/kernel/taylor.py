@@ -1,0 +1,223 @@
+"""Programs read over Taylor models: polynomials of low degree in the inputs, each on a box, and how far programs are from
+them there at most.
+
+An input is its size times a number of no more than 1 in size, in which polynomials are: none is larger than the sum of its
+coefficients' sizes. Those are whole multiples of 2^-PLACES, and what is rounded or left out goes to the radius. A condition
+has to be decided on the whole box, so that a program is one smooth function there. Docs/kernel.md, 12.
+"""
+
+from __future__ import annotations
+
+import operator as op
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import partial
+from math import isqrt
+from typing import Any, NamedTuple, TypeAlias
+
+from .numbers import Account, demand, up
+from .programs import Program
+
+PLACES, DEGREE, BITS = 100, 3, 4
+ONE = 1 << PLACES
+Terms: TypeAlias = dict[int, int]
+"""Coefficients by monomials of one degree: the exponent of each input takes BITS of a whole number."""
+
+
+class Model(NamedTuple):
+    """A polynomial, by degrees, and a radius: what it is a model of is no further from it on the box."""
+
+    parts: tuple[Terms, ...]
+    radius: int
+
+    @property
+    def sizes(self) -> list[int]:
+        """Return the sizes of the polynomial's parts."""
+        return [sum(map(abs, part.values())) for part in self.parts]
+
+    @property
+    def constant(self) -> int:
+        """Return the polynomial's value at zero."""
+        return self.parts[0].get(0, 0)
+
+    @property
+    def spread(self) -> int:
+        """Return how far values on the box are from that at most."""
+        return sum(self.sizes[1:]) + self.radius
+
+
+Value: TypeAlias = Model | bool
+
+
+def number(x: Fraction) -> Model:
+    """Return a number that depends on no input."""
+    whole, rest = divmod(x.numerator << PLACES, x.denominator)
+    return Model(({0: whole} if whole else {}, *[{}] * DEGREE), int(rest > 0))
+
+
+def multiple(size: Fraction) -> int:
+    """Return the least multiple that is not below a size."""
+    return -((-size.numerator << PLACES) // size.denominator)
+
+
+def within(size: Fraction, place: int) -> Model:
+    """Return the input of a place, which is no larger than told."""
+    return Model(({}, {1 << BITS * place: multiple(size)}, *[{}] * (DEGREE - 1)), 0)
+
+
+def add(x: Model, y: Model) -> Model:
+    """Return a sum."""
+    parts = list[Terms]()
+    for a, b in zip(x.parts, y.parts, strict=True):
+        both = dict(a)
+        for m, c in b.items():
+            both[m] = both.get(m, 0) + c
+        parts.append(both)
+    return Model(tuple(parts), x.radius + y.radius)
+
+
+def negative(x: Model) -> Model:
+    """Return the negative."""
+    return Model(tuple({m: -c for m, c in part.items()} for part in x.parts), x.radius)
+
+
+def subtract(x: Model, y: Model) -> Model:
+    """Return a difference."""
+    return add(x, negative(y))
+
+
+def multiply(x: Model, y: Model) -> Model:
+    """Return a product, without what is of a higher degree."""
+    parts, left, right, rounded = list[Terms](), x.sizes, y.sizes, 0
+    for degree in range(DEGREE + 1):
+        product = dict[int, int]()
+        for k in range(degree + 1):
+            for m, c in x.parts[k].items():
+                for n, d in y.parts[degree - k].items():
+                    product[m + n] = product.get(m + n, 0) + c * d
+        rounded += sum(c & (ONE - 1) > 0 for c in product.values())
+        parts.append({m: c >> PLACES for m, c in product.items()})
+    # A model is no further from zero than its parts and radius, and a coefficient is rounded by less than one.
+    higher = sum(a * b for i, a in enumerate(left) for k, b in enumerate(right) if i + k > DEGREE)
+    apart = higher + x.radius * (sum(right) + y.radius) + sum(left) * y.radius
+    return Model(tuple(parts), -(-apart >> PLACES) + rounded)
+
+
+def series(x: Model, coefficients: Sequence[Fraction], rest: Fraction) -> Model:
+    """Return a polynomial of what is without a constant, and no more than `rest` beside."""
+    value = number(coefficients[-1])
+    for c in coefficients[-2::-1]:
+        value = add(multiply(value, x), number(c))
+    return Model(value.parts, value.radius - (-rest.numerator << PLACES) // rest.denominator)
+
+
+def relative(y: Model) -> tuple[Fraction, Model, Fraction]:
+    """Return a constant, what a model is beside it as a multiple of it, and how large that is; it is less than 1."""
+    demand(y.spread < abs(y.constant), "a program divides by what may be zero, or takes a root of it")
+    c = Fraction(y.constant, ONE)
+    beside = multiply(add(y, number(-c)), number(1 / c))
+    size = Fraction(beside.spread + abs(beside.constant), ONE)
+    demand(size < 1, "a program divides by what may be zero, or takes a root of it")
+    return c, beside, size
+
+
+def inverse(y: Model) -> Model:
+    """Return 1 / y: 1 / (1 + x) = 1 - x + x^2 - ..."""
+    c, x, size = relative(y)
+    terms = [Fraction((-1) ** k) for k in range(DEGREE + 1)]
+    return multiply(series(x, terms, size ** (DEGREE + 1) / (1 - size)), number(1 / c))
+
+
+def divide(x: Model, y: Model) -> Model:
+    """Return a quotient."""
+    return multiply(x, inverse(y))
+
+
+def root(y: Model) -> Model:
+    """Return the root of what is positive: (1 + x)^(1/2) = 1 + x/2 - x^2/8 + ..., with ever smaller coefficients."""
+    c, x, size = relative(y)
+    demand(c > 0, "a program takes a root of what is negative")
+    terms = [Fraction(1)]
+    for k in range(DEGREE + 1):
+        terms.append(terms[-1] * (Fraction(1, 2) - k) / (k + 1))
+    whole = c * ONE * ONE
+    low = isqrt(whole.numerator // whole.denominator)
+    # The root of the constant lies between this and the next multiple.
+    constant = number(Fraction(low, ONE))._replace(radius=2)
+    return multiply(series(x, terms[:-1], abs(terms[-1]) * size ** (DEGREE + 1) / (1 - size)), constant)
+
+
+def is_less(x: Model, y: Model, strictly: bool = True) -> bool:
+    """Tell whether x < y, or whether x <= y, on the whole box."""
+    gap = subtract(y, x)
+    low, high = gap.constant - gap.spread, gap.constant + gap.spread
+    demand(low > 0 or high < 0 or low == high, "a program switches on the box")
+    return low > 0 or (low == high == 0 and not strictly)
+
+
+def select(truth: bool, x: Model, y: Model) -> Model:
+    """Return what a condition chooses, which is decided."""
+    return x if truth else y
+
+
+OPERATIONS: dict[str, Callable[..., Value]] = {
+    "plus": add,
+    "minus": subtract,
+    "product": multiply,
+    "divide": divide,
+    "negative": negative,
+    "sqrt": root,
+    "less": is_less,
+    "less_equal": partial(is_less, strictly=False),
+    "select": select,
+    "both": bool.__and__,
+    "either": bool.__or__,
+    "opposite": op.not_,
+}
+
+
+def run(program: Program, given: Mapping[str, Model], count: int) -> list[Model]:
+    """Return models of a program's outputs, of which there have to be so many."""
+    demand(len(program.outputs) == count, f"a program has {len(program.outputs)} outputs and not {count}")
+    demand(all(name in given for name in program.inputs), "a program asks for what nothing gives")
+    values: list[Any] = [given[name] for name in program.inputs]
+    for operation, operands in program.steps:
+        if operation == "constant":
+            values.append(number(operands))
+            continue
+        chosen = [values[k] for k in operands]
+        models = [[len(part) for part in x.parts] for x in chosen if isinstance(x, Model)]
+        work = sum(map(sum, models))
+        if operation in ("product", "divide", "sqrt"):
+            pairs = sum(a * b for i, a in enumerate(models[0]) for b in models[-1][: DEGREE + 1 - i])
+            # A quotient or root is a few products of what may have all terms.
+            work += pairs if operation == "product" else 12 * sum(models[-1]) ** 2
+        Account.spend(8 + work, PLACES)
+        values.append(OPERATIONS[operation](*chosen))
+    return [values[k] for k in program.outputs]
+
+
+def slope(model: Model, size: Fraction, place: int) -> Fraction:
+    """Return the slope at zero in the input of a place, about."""
+    return Fraction(model.parts[1].get(1 << BITS * place, 0), multiple(size))
+
+
+def beyond(model: Model, sizes: Sequence[Fraction], row: Sequence[Fraction]) -> tuple[list[Fraction], Fraction]:
+    """Return D and c: on the box of these sizes a model is no further than D.|z| + c from row.z. A monomial is shared among
+    its inputs; none of them exceeds its size."""
+    wide = [Fraction(multiple(size), ONE) for size in sizes]
+    shares = [abs(slope(model, x, k) - entry) * x for k, (x, entry) in enumerate(zip(wide, row, strict=True))]
+    for degree, part in enumerate(model.parts[2:], 2):
+        for m, c in part.items():
+            for place in places(m):
+                shares[place] += Fraction(abs(c), ONE * degree)
+    spread = Fraction(abs(model.constant) + model.radius, ONE)
+    return [up(share / x) for share, x in zip(shares, wide, strict=True)], spread
+
+
+def places(m: int) -> Iterator[int]:
+    """Yield the places of a monomial's inputs, each as often as it occurs."""
+    place = 0
+    while m:
+        yield from [place] * (m & (1 << BITS) - 1)
+        m, place = m >> BITS, place + 1

@@ -1,0 +1,132 @@
+"""The theorem about the loop that flies with appendages, near its target: the torque is held between samples, torques from
+outside and errors are bounded, and the motion of body and appendages is a program. Proof: docs/kernel.md, section 12."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from ..appended import Appended, Box, Column, after, combined, follow, image
+from ..loops import AttitudeLoop, wired
+from ..numbers import Rows, definite, demand, inverse, matrix, norm, rational, read_list, read_table
+from ..polynomials import apply, dot, minus, most, var
+from ..reading import Claim
+from ..regions import STATE
+from ..rules import Exceeds, Part, Proof, vanish
+from ..sentences import Statement, above, below, enumerated
+from .attitude import contents
+from .pointing import HALF_TURN
+
+ROUNDS, FOLLOWED = 32, 1024
+"""The most rounds, and up to how many periods of one are followed one by one."""
+
+
+def points_with_appendages(claim: Claim) -> Proof:
+    """Every motion from {V <= level}, with states of the appendages of at most begun.k, has V <= highest at all times, and
+    after the time `settling` it is at all times turned by no more than end.angle and turns no faster than end.rate. The
+    torque is what the law asks for at the last sample and an error, |error| <= error, within its limits where they are told;
+    it is told the attitude turned by error.attitude at most, and the rate off by error.rate; torques from outside are no
+    more than `outside`. Both may grow by `.per.rate` times the body's rate.
+
+    Evidence: modal coordinates, in blocks of one or two, and rounds of bounds: of them at samples (radii), of the states and
+    the torque between samples, and after how many periods the next round begins; the last one has no end."""
+    loop, numbers = AttitudeLoop(claim), claim.numbers
+    yield from vanish("turning", minus(loop.single("turning", 4, wired("q", loop.q), wired("rate", loop.w)), loop.turning))
+    motion = Appended(loop)
+    ellipsoid = inner(loop, numbers["level"])
+    turns = [numbers.get(name) or Fraction(0) for name in ("angle", "start.angle")]
+    demand(max(turns) <= HALF_TURN, "a start is not near the target")
+    start = yield from contents(loop, loop.lyapunov)
+    blocks = read_list(claim.evidence["blocks"])
+    demand(all(type(size) is int for size in blocks), "a size of a block is no whole number")
+    motion.take(matrix(claim.evidence["modes"], motion.n, motion.n), blocks)
+    limits = [numbers.get(name) for name in ("limit", "limit.norm")]
+    begun_with = [numbers[f"begun.{k}"] for k in range(motion.count)]
+    begun, samples, V = motion.begun(ellipsoid, begun_with), 0, loop.lyapunov.at({"q0": 1 - var("v")})
+    times, turned, state = list[Fraction](), list[Fraction](), Column()
+    rounds = read_list(claim.evidence["rounds"])
+    demand(0 < len(rounds) <= ROUNDS, "there is no round, or too many are")
+    for k, one in enumerate(rounds):
+        sizes, torques, sought, periods = read_table(one, "sizes", "torques", "radii", "periods")
+        demand(type(periods) is int and (periods > 0) == (k < len(rounds) - 1), "a round has no proper length")
+        state, torque, radii = positive(sizes, motion.n), positive(torques, 3), positive(sought, len(blocks))
+        period = motion.period(Box(state, torque, combined(state, motion.misread)))
+        times.append(motion.h * samples)
+        turned.append(norm(state[3:6]))
+        if 0 < periods <= FOLLOWED:
+            largest, later = follow(period, begun, periods)
+        else:
+            # What is not left in one period is not left in any.
+            largest = [max(x, y) for x, y in zip(begun, combined(image(period.grown, radii), period.more), strict=True)]
+            later = [min(x, r) for x, r in zip(after(period, begun, periods), radii, strict=True)]
+        felt = image(period.torque, radii)
+        asked = combined(felt, period.asked)
+        yield from exceed(f"samples {k}", radii, largest)
+        yield from exceed(f"between samples {k}", state, combined(image(period.between, radii), period.far))
+        yield from exceed(f"held torque {k}", torque, combined(felt, period.pushed))
+        yield f"highest V {k}", Exceeds(numbers["highest"], most(V, sized(state)))
+        for name, limit, size in zip(("limit", "norm of the torque"), limits, (max(asked), norm(asked)), strict=True):
+            if limit is not None:
+                yield f"{name} {k}", Exceeds(limit, size)
+        begun, samples = later, samples + periods
+    angle, fastest = numbers["end.angle"], numbers["end.rate"]
+    # sin x >= x - x^3/6.
+    yield "end of the angle", Exceeds(angle / 2 - angle**3 / 48, norm(state[3:6]))
+    yield "end of the rate", Exceeds(fastest, norm(state[:3]))
+    yield "settling", Exceeds(numbers["settling"], motion.h * samples)
+
+    def bounded(name: str) -> str:
+        growing = numbers.get(f"{name}.per.rate")
+        more = f" and {below(growing)} N m s times the rate of the body" if growing else ""
+        return f"of up to {below(numbers[name])} N m{more}"
+
+    told = [("attitude that it is told", "error.attitude", "rad"), ("rate", "error.rate", "rad/s")]
+    errors = [f"errors of the command {bounded('error')}"]
+    errors += [f"of the {text} of up to {below(x)} {unit}" for text, name, unit in told if (x := numbers.get(name))]
+    text = (
+        f"every motion from {{V <= {below(numbers['level'])}, q0 > 0}} with states of the appendages of up to"
+        f" {', '.join(map(below, begun_with))} stays in {{V <= {above(numbers['highest'])}}}, and after"
+        f" {above(numbers['settling'])} s it is at all times within {above(angle)} rad of the target and turns no faster"
+        f" than {above(fastest)} rad/s, with the torque held for {below(motion.h)} s, torques from outside"
+        f" {bounded('outside')} and {enumerated(errors)}"
+    )
+    for limit, where in zip(limits, ("about any axis", "in norm"), strict=True):
+        text += "" if limit is None else f", and the law asks for no more than {above(limit)} N m {where}"
+    unlimited = ["unlimited-torque"] * (limits == [None, None])
+    assumed = ["appendages-as-given", "bounded-push", "held-torque", *unlimited, "target-at-rest", "no-wheels"]
+    said = f"; {enumerated(start)}" if start else ""
+    # From the start of a round on, motions are turned by no more than in it and in later ones.
+    within = [(time, max(turned[k:])) for k, time in enumerate(times)]
+    return Statement(text + said, (*assumed, loop.sign_assumed), "appendages", within=tuple(within))
+
+
+def inner(loop: AttitudeLoop, level: Fraction) -> Rows:
+    """Return the matrix of an ellipsoid of (w, q) that holds {V <= level} where q0 > 0, for V = s (1 - q0) + x.Gx. There
+    2 (1 - q0) >= |q|^2."""
+    V, x = loop.lyapunov, [var(name) for name in STATE]
+    s = -V.terms.get(("q0",), Fraction(0))
+    at = dict.fromkeys(STATE, 0)
+    G = [[V.slope(i).slope(k).at(at).number / 2 for k in STATE] for i in STATE]
+    demand(not (V - s * (1 - loop.q[0]) - dot(x, apply(G, x))).terms, "V is not s (1 - q0) and a form")
+    demand(s >= 0 and definite(G, strictly=False), "V is not least on target")
+    under = [[entry + s / 2 * (i == k > 2) for k, entry in enumerate(row)] for i, row in enumerate(G)]
+    demand(definite(under), "V is not least on target")
+    return [[level * x for x in row] for row in inverse(under)]
+
+
+def positive(given: object, count: int) -> Column:
+    """Read so many positive numbers."""
+    column = [rational(x) for x in read_list(given, count)]
+    demand(all(x > 0 for x in column), "a bound is not positive")
+    return column
+
+
+def exceed(name: str, large: Column, small: Column) -> Part[None]:
+    """Each of some numbers is larger than another; they are numbered."""
+    for k, (x, y) in enumerate(zip(large, small, strict=True)):
+        yield f"{name} {k}", Exceeds(x, y)
+
+
+def sized(state: Column) -> dict[str, Fraction]:
+    """Return sizes by the names of the state, and of v = 1 - q0 <= |q|^2, as q0 > 0."""
+    turned = sum((x * x for x in state[3:6]), Fraction(0))
+    return dict(zip(STATE, state[:6], strict=True)) | {"v": turned}

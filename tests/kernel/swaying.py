@@ -1,0 +1,186 @@
+"""Flights of loops with appendages, in floats, steered against every bound of a certificate's evidence."""
+
+from fractions import Fraction
+
+import numpy as np
+
+from starhold.kernel.numbers import rational
+from tests.kernel.programs import run, written
+
+SUBSTEPS = 1
+
+
+def columns(programs, claim, role):
+    return written(programs[claim["programs"][role]])
+
+
+class Swaying:
+    """The loop of a claim, and its bounds; states are columns (w, q, v) beside q0."""
+
+    def __init__(self, content, seed=1, lanes=64):
+        (claim,) = content["claims"]
+        self.claim, self.rng, self.lanes = claim, np.random.default_rng(seed), lanes
+        self.motion, self.law = (columns(content["programs"], claim, role) for role in ("motion", "law"))
+        self.numbers = {name: float(Fraction(x)) for name, x in claim["numbers"].items()}
+        self.subject = {name: float(rational(x)) for name, x in claim["subject"].items()}
+        self.count = len(self.motion["outputs"]) - 3
+        self.h, self.n = self.numbers["period"], 6 + self.count
+        self.W = np.array([[float(Fraction(x)) for x in row] for row in claim["evidence"]["modes"]])
+        self.blocks = claim["evidence"]["blocks"]
+        self.V = programs_of(content, claim)
+
+    def rates(self, x, torque):
+        """The derivatives of (q0, q, w, v)."""
+        q0, q, w, v = x[0], x[1:4], x[4:7], x[7:]
+        given = {f"rate.{k}": w[k] for k in range(3)} | {f"torque.{k}": torque[k] for k in range(3)}
+        given |= {f"state.{k}": v[k] for k in range(self.count)}
+        moved = np.array([np.broadcast_to(y, q0.shape) for y in run(self.motion, given)])
+        turned = 0.5 * np.vstack([-(q * w).sum(0), q0 * w + np.cross(q.T, w.T).T])
+        return np.vstack([turned, moved])
+
+    def command(self, q, w):
+        """The law's torque at what it is told."""
+        none = np.zeros(3)
+        fields = {"attitude": q, "rate": w, "body_rate": w, "target_rate": none, "target_acceleration": none}
+        fields |= {"external_torque": none, "wheel_momentum": none}
+        given = {f"measurement.{name}.{k}": part for name, parts in fields.items() for k, part in enumerate(parts)}
+        given |= {"measurement.is_valid": 1.0} | self.subject
+        return np.array([np.broadcast_to(y, w[0].shape) for y in run(self.law, {k: given[k] for k in self.law["inputs"]})])
+
+    def energy(self, x):
+        """V of states."""
+        given = {f"measurement.attitude.{k}": x[k] for k in range(4)} | {f"measurement.rate.{k}": x[4 + k] for k in range(3)}
+        return self.V(given, self.subject)
+
+    def starts(self):
+        """States on the border of the start set, each as far as it goes along some mode or in some direction."""
+        count, free, level = self.lanes, self.rng, self.numbers["level"]
+        begun = np.array([self.numbers[f"begun.{k}"] for k in range(self.count)])
+        toward = np.where(
+            free.uniform(size=(count, 1)) < 0.7, self.W[free.integers(self.n, size=count)], free.normal(size=(count, self.n))
+        )
+        v = np.where(toward[:, 6:] == 0.0, free.choice([-1.0, 1.0], (count, self.count)), np.sign(toward[:, 6:])) * begun
+        # About the farthest (w, q) of an ellipsoid in a direction, brought to the border.
+        scale = self.reach()
+        along = toward[:, :6] * scale**2
+        along = np.where(np.abs(along).max(1, keepdims=True) > 0.0, along, free.normal(size=(count, 6)) * scale)
+        low, high = np.zeros(count), np.full(count, 1.0) / np.abs(along[:, 3:]).max(1).clip(1e-300) * 0.3
+        high = np.minimum(high, 1e3 * scale[:3].max() / np.abs(along[:, :3]).max(1).clip(1e-300))
+        for _ in range(60):
+            middle = (low + high) / 2.0
+            inside = self.energy(self.state(middle[:, None] * along, v)) <= level
+            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+        return self.state(low[:, None] * along, v)
+
+    def state(self, x, v):
+        q = x[:, 3:].T
+        return np.vstack([np.sqrt(1.0 - (q * q).sum(0)), q, x[:, :3].T, v.T])
+
+    def reach(self):
+        """About how far V lets each of (w, q) be on its own."""
+        sizes = []
+        for k in range(6):
+            x = np.zeros((1, 6))
+            x[0, k] = 1e-4
+            sizes.append(1e-4 * np.sqrt(self.numbers["level"] / self.energy(self.state(x, np.zeros((1, self.count))))[0]))
+        return np.array(sizes)
+
+    def modes(self, x):
+        """The sizes of modal coordinates."""
+        y, at, sizes = self.W @ np.vstack([x[4:7], x[1:4], x[7:]]), 0, []
+        for size in self.blocks:
+            sizes.append(np.linalg.norm(y[at : at + size], axis=0))
+            at += size
+        return np.array(sizes)
+
+    def pushed(self, x, name, toward):
+        """A torque of the largest size that adds to what is largest."""
+        most = self.numbers[name] + self.numbers.get(f"{name}.per.rate", 0.0) * np.linalg.norm(x[4:7], axis=0)
+        z = np.vstack([x[4:7], x[1:4], x[7:]])
+        way = self.gain.T @ (self.W.T @ (toward[:, None] * (self.W @ z)))
+        way = np.where(np.abs(way).max(0) > 0.0, way, self.rng.normal(size=way.shape))
+        return most * way / np.linalg.norm(way, axis=0)
+
+    def against(self, seconds=None):
+        """Fly, and return the largest share that is reached of each bound: of modes, states, torques, V, ends."""
+        x, e = self.starts(), 1e-7
+        rest = np.vstack([np.ones((1, 1)), np.zeros((6 + self.count, 1))])
+        slopes = [(self.rates(rest, e * u[:, None]) - self.rates(rest, -e * u[:, None]))[:, 0] / (2 * e) for u in np.eye(3)]
+        gain = np.array(slopes).T
+        self.gain = np.vstack([gain[4:7], gain[1:4], gain[7:]])
+        found, n = {}, 0
+        last = len(self.claim["evidence"]["rounds"]) - 1
+        most = int((seconds or self.numbers["settling"] * 1.2) / self.h)
+        weight = None
+
+        def note(name, sizes):
+            found[name] = max(found.get(name, 0.0), float(np.max(sizes)))
+
+        for k, one in enumerate(self.claim["evidence"]["rounds"]):
+            sizes, torques, radii = (
+                np.array([float(Fraction(y)) for y in one[p]])[:, None] for p in ("sizes", "torques", "radii")
+            )
+            spread = np.repeat(1.0 / radii[:, 0] ** 2, self.blocks)
+            periods = one["periods"] if k < last else max(50, most - n)
+            for _ in range(periods):
+                if n >= most and k < last:
+                    return found | {"flown": n}
+                if weight is None or n % 400 == 0:
+                    # Now all modes alike, now one of them.
+                    chosen = self.rng.integers(-1, self.n)
+                    weight = spread if chosen < 0 else spread * (np.arange(self.n) == chosen)
+                note("modes", self.modes(x) / radii)
+                note("V", self.energy(x) / self.numbers["highest"])
+                told_q, told_w = self.told(x)
+                asked = self.command(told_q, told_w)
+                for name, size in (("limit", np.abs(asked).max()), ("limit.norm", np.linalg.norm(asked, axis=0).max())):
+                    if name in self.numbers:
+                        note(name, size / self.numbers[name])
+                held = asked + self.pushed(x, "error", weight)
+                for _ in range(SUBSTEPS):
+                    torque = held + self.pushed(x, "outside", weight)
+                    note("torques", np.abs(torque) / torques)
+                    s = self.h / SUBSTEPS
+                    a = self.rates(x, torque)
+                    b = self.rates(x + s / 2 * a, torque)
+                    c = self.rates(x + s / 2 * b, torque)
+                    d = self.rates(x + s * c, torque)
+                    x = x + s / 6 * (a + 2 * b + 2 * c + d)
+                    x[:4] /= np.linalg.norm(x[:4], axis=0)
+                    note("sizes", np.abs(np.vstack([x[4:7], x[1:4], x[7:]])) / sizes)
+                    if n * self.h > self.numbers["settling"]:
+                        note("angle", 2 * np.arcsin(np.linalg.norm(x[1:4], axis=0)) / self.numbers["end.angle"])
+                        note("rate", np.linalg.norm(x[4:7], axis=0) / self.numbers["end.rate"])
+                n += 1
+        return found | {"flown": n}
+
+    def told(self, x):
+        """What the law is told, with errors of the largest size in some directions."""
+        q, w = x[:4], x[4:7]
+        off, rate = (self.numbers.get(f"error.{name}", 0.0) for name in ("attitude", "rate"))
+        if not off and not rate:
+            return q, w
+        a, b = (self.rng.normal(size=w.shape) for _ in range(2))
+        a, b = a / np.linalg.norm(a, axis=0), b / np.linalg.norm(b, axis=0)
+        c, s = np.cos(off / 2), np.sin(off / 2) * a
+        turned = np.vstack([q[0] * c - (q[1:] * s).sum(0), q[0] * s + c * q[1:] + np.cross(q[1:].T, s.T).T])
+        return turned, w + rate * b
+
+
+def programs_of(content, claim):
+    """V as a function of inputs, less what it is at rest on target."""
+    program = columns(content["programs"], claim, "lyapunov")
+
+    def value(given, subject):
+        J = [[subject[f"body.inertia.{min(i, k)}.{max(i, k)}"] for k in range(3)] for i in range(3)]
+        plant = {f"craft.inertia.{i}.{k}": J[i][k] for i in range(3) for k in range(3)}
+        every = subject | plant | given
+        rest = (
+            every
+            | {f"measurement.attitude.{k}": float(k == 0) for k in range(4)}
+            | {f"measurement.rate.{k}": 0.0 for k in range(3)}
+        )
+        now, least = (run(program, {name: table[name] for name in program["inputs"]})[0] for table in (every, rest))
+        return now - least
+
+    return value
