@@ -133,6 +133,7 @@ def test_every_kind_of_claim_can_be_told_where_it_is_undecided(kind: str) -> Non
         "torque-limit": {"limit": 0.1, "kind": "axis", "level": 0.0, "start": 0.0, "slew_angle": 0.0, "rate": 0.0},
         "inertia": {"tolerance": 0.4},
         "pointing": {"torque": 1e-3},
+        "appendages": {"torque": 1e-3},
         "sampling": {"period": 1.0, "radius": 1.2, "eigenvalues": [[1.2, 0.0]], "longest": None, "every_shorter": False},
         "wheels": {"momentum": 0.1},
         "region": {},

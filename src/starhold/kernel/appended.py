@@ -27,15 +27,15 @@ Column = list[Fraction]
 
 
 class Box(NamedTuple):
-    """What states are between samples, the torque, and the state at samples that the law is told, at most."""
+    """A box bounds the states between samples, the torque, and the state at samples that the law is told."""
 
     state: Column
     torque: Column
-    told: Column
+    measured: Column
 
 
 class Left(NamedTuple):
-    """What is left of rates, and of the law's torque, beside the linear ones: D|z| + T|u + d| + c, and D|z| + c."""
+    """The rates, and the law's torque, differ from the linear ones by at most D|z| + T|u + d| + c, and D|z| + c."""
 
     state: Rows
     torque: Rows
@@ -45,8 +45,8 @@ class Left(NamedTuple):
 
 
 class Period(NamedTuple):
-    """What follows from samples with |y_k| <= r_k: the next ones have |y| <= grown r + more, the states until then are at
-    most between r + far, torques with all errors torque r + pushed, and what the law asks for torque r + asked."""
+    """Samples with |y_k| <= r_k are followed by ones with |y| <= grown r + more, the states until then are at
+    most between r + far, torques with all errors torque r + pushed, and the command torque r + commanded."""
 
     grown: Rows
     more: Column
@@ -54,7 +54,7 @@ class Period(NamedTuple):
     far: Column
     torque: Rows
     pushed: Column
-    asked: Column
+    commanded: Column
 
 
 class Appended:
@@ -109,7 +109,7 @@ class Appended:
         turned = [[HALF * s for s in row] + [ZERO] * (self.n - 3) for row in ((v, z, y), (z, v, x), (y, x, v))]
         state, torque = ([row[part] for row, _ in rows] for part in (slice(self.n), slice(self.n, None)))
         rest = [c for _, c in rows]
-        law = [beyond(x, box.told, [-k for k in row]) for x, row in zip(self.command(box.told), self.K, strict=True)]
+        law = [beyond(x, box.measured, [-k for k in row]) for x, row in zip(self.command(box.measured), self.K, strict=True)]
         return Left(
             [*state[:3], *turned, *state[3:]],
             [*torque[:3], *[[ZERO] * 3] * 3, *torque[3:]],
@@ -144,12 +144,12 @@ class Appended:
             terms, last = terms + 1, last * a / (terms + 3)
         self.tail = up(h * last * top)
         forward, power, share = plus(times(A, V), times(self.B, KV), -1), scalar(1, self.n), h
-        end, held, spans = V, [[ZERO] * 3 for _ in A], sized(V, alone, blocks)
-        given, carry, filtered = held, [[ZERO] * self.n for _ in A], [[ZERO] * self.n for _ in blocks]
+        end, held_torque, spans = V, [[ZERO] * 3 for _ in A], sized(V, alone, blocks)
+        given, carry, filtered = held_torque, [[ZERO] * self.n for _ in A], [[ZERO] * self.n for _ in blocks]
         self.start = short(spans)
         for m in range(terms + 1):
             moved, pushed = times(power, forward), times(power, self.B)
-            end, held = plus(end, moved, share), plus(held, pushed, share)
+            end, held_torque = plus(end, moved, share), plus(held_torque, pushed, share)
             spans, given = plus(spans, sized(moved, alone, blocks), share), plus(given, sizes_of(pushed), share)
             carry = plus(carry, sizes_of(power), share)
             filtered = plus(filtered, sized(times(W, power), blocks, alone), share)
@@ -159,7 +159,10 @@ class Appended:
         self.widths = [up(x * (size + 1) / 2) for x, size in zip(largest, blocks, strict=True)]
         self.filter = short([[x + self.tail * width for x in row] for row, width in zip(filtered, self.widths, strict=True)])
         self.carry = short([[x + self.tail for x in row] for row in carry])
-        self.linear, self.held = short(sized(times(W, end), blocks, blocks)), short(sized(times(W, held), blocks, axes))
+        self.linear, self.held_torque = (
+            short(sized(times(W, end), blocks, blocks)),
+            short(sized(times(W, held_torque), blocks, axes)),
+        )
         self.spans, self.given, self.feedback = short(spans), short(given), short(sized(KV, axes, blocks))
 
     def begun(self, X: Rows, appendages: Column) -> Column:
@@ -175,14 +178,14 @@ class Appended:
     def period(self, box: Box) -> Period:
         """Return what a period makes of samples, as long as states and torques are within a box."""
         # So the scalar part of what is told is positive, too.
-        demand(norm(box.told[3:6]) <= HALF, "motions are not near the target")
+        demand(norm(box.measured[3:6]) <= HALF, "motions are not near the target")
         left = self.left(box)
         error, outside = (self.push(name, box.state) for name in ("error", "outside"))
         # The law's torque is -Kz, and beside no more than law r + rest, as it is told a state that is off.
         law = times(left.law, self.start)
         off = plus(sizes_of(self.K), left.law)
-        asked = combined(left.law_rest, image(off, self.misread))
-        rest = combined(asked, [error] * 3)
+        commanded = combined(left.law_rest, image(off, self.misread))
+        rest = combined(commanded, [error] * 3)
         torque, pushed = short(plus(self.feedback, law)), combined(rest, [outside] * 3)
         # What moves the state beside the linear motion from the sample on: what is left, and torques from outside.
         steady = combined(left.rest, image(sizes_of(self.B), [outside] * 3))
@@ -192,9 +195,9 @@ class Appended:
         far = combined(image(self.given, rest), image(self.carry, over), [tail] * self.n)
         inner = plus(times(left.state, between), times(left.torque, torque))
         beside = combined(steady, image(left.state, far), image(left.torque, pushed))
-        grown = short(plus(plus(self.linear, times(self.held, law)), times(self.filter, inner)))
-        more = combined(image(self.held, rest), image(self.filter, beside), [tail * width for width in self.widths])
-        return Period(grown, more, between, far, torque, pushed, asked)
+        grown = short(plus(plus(self.linear, times(self.held_torque, law)), times(self.filter, inner)))
+        more = combined(image(self.held_torque, rest), image(self.filter, beside), [tail * width for width in self.widths])
+        return Period(grown, more, between, far, torque, pushed, commanded)
 
 
 def image(rows: Rows, v: Column) -> Column:

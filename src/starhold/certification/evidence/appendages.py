@@ -118,11 +118,11 @@ class Swinging:
         """Find the claim from the largest start, and add it."""
         kept = cache(self.from_turn)
         place = bisect_left(TURNS, True, key=lambda turn: kept(turn) is not None)
-        found = kept(TURNS[place]) if place < len(TURNS) else None
-        if found is None:
+        bounded = kept(TURNS[place]) if place < len(TURNS) else None
+        if bounded is None:
             self.loop.failed[APPENDED] = "no bounds near the target were found that motions keep"
             return False
-        numbers, rounds, begun, period = found
+        numbers, rounds, begun, period = bounded
         while len(rounds) < MOST_ROUNDS:
             one, (begun, periods) = rounds[-1], lasting(period, begun)
             begun = list(map(min, begun, one.radii))
@@ -154,22 +154,22 @@ class Swinging:
         X = inner(self.motion.loop, Fraction(level))
         moved = image(self.motion.start, self.motion.begun(X, [Fraction(0)] * self.motion.count))[6:]
         swung = [float(f"{SWUNG * float(x):.4g}") for x in moved]
-        begun, rounds, found = self.motion.begun(X, list(map(Fraction, swung))), list[Round](), None
+        begun, rounds, bounded = self.motion.begun(X, list(map(Fraction, swung))), list[Round](), None
         for periods in FIRST:
-            found = self.round(begun, periods, found and found[1])
-            if found is None or not self.keeps_limits(*found):
+            bounded = self.round(begun, periods, bounded and bounded[1])
+            if bounded is None or not self.keeps_limits(*bounded):
                 return None
-            rounds, begun = [*rounds, found[0]], follow(found[1], begun, periods)[1]
-        if found is None or (found := self.round(begun, 0, found[1])) is None:
+            rounds, begun = [*rounds, bounded[0]], follow(bounded[1], begun, periods)[1]
+        if bounded is None or (bounded := self.round(begun, 0, bounded[1])) is None:
             return None
-        rounds, period = [*rounds, found[0]], found[1]
+        rounds, period = [*rounds, bounded[0]], bounded[1]
         numbers = {"level": level, "angle": angle} | self.limits
         return numbers | {f"begun.{k}": x for k, x in enumerate(swung)}, rounds, begun, period
 
     def keeps_limits(self, one: Round, period: Period) -> bool:
         """Return whether the law asks for no more than its limits."""
-        asked = combined(image(period.torque, one.radii), period.asked)
-        sizes = {"limit": max(asked), "limit.norm": norm(asked)}
+        commanded = combined(image(period.torque, one.radii), period.commanded)
+        sizes = {"limit": max(commanded), "limit.norm": norm(commanded)}
         return all(float(sizes[name]) < x for name, x in self.limits.items())
 
     def round(self, begun: Column, periods: int, like: Period | None) -> tuple[Round, Period] | None:

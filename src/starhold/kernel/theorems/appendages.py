@@ -59,12 +59,14 @@ def points_with_appendages(claim: Claim) -> Proof:
             largest = [max(x, y) for x, y in zip(begun, combined(image(period.grown, radii), period.more), strict=True)]
             later = [min(x, r) for x, r in zip(after(period, begun, periods), radii, strict=True)]
         felt = image(period.torque, radii)
-        asked = combined(felt, period.asked)
+        commanded = combined(felt, period.commanded)
         yield from exceed(f"samples {k}", radii, largest)
         yield from exceed(f"between samples {k}", state, combined(image(period.between, radii), period.far))
         yield from exceed(f"held torque {k}", torque, combined(felt, period.pushed))
         yield f"highest V {k}", Exceeds(numbers["highest"], most(V, sized(state)))
-        for name, limit, size in zip(("limit", "norm of the torque"), limits, (max(asked), norm(asked)), strict=True):
+        for name, limit, size in zip(
+            ("limit", "norm of the torque"), limits, (max(commanded), norm(commanded)), strict=True
+        ):
             if limit is not None:
                 yield f"{name} {k}", Exceeds(limit, size)
         begun, samples = later, samples + periods
@@ -79,9 +81,9 @@ def points_with_appendages(claim: Claim) -> Proof:
         more = f" and {below(growing)} N m s times the rate of the body" if growing else ""
         return f"of up to {below(numbers[name])} N m{more}"
 
-    told = [("attitude that it is told", "error.attitude", "rad"), ("rate", "error.rate", "rad/s")]
+    misread = [("attitude that it is told", "error.attitude", "rad"), ("rate", "error.rate", "rad/s")]
     errors = [f"errors of the command {bounded('error')}"]
-    errors += [f"of the {text} of up to {below(x)} {unit}" for text, name, unit in told if (x := numbers.get(name))]
+    errors += [f"of the {text} of up to {below(x)} {unit}" for text, name, unit in misread if (x := numbers.get(name))]
     text = (
         f"every motion from {{V <= {below(numbers['level'])}, q0 > 0}} with states of the appendages of up to"
         f" {', '.join(map(below, begun_with))} stays in {{V <= {above(numbers['highest'])}}}, and after"
