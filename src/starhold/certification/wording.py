@@ -142,7 +142,7 @@ def unclaimed(subject: Mapping[str, Any]) -> str:
     """Return why a certificate claims nothing."""
     if "body" in subject:
         return f"no theorem is about the body {subject['body']}"
-    return "proofs are for laws with a Lyapunov function, one root, or a surface and no wheels"
+    return "but for pointing as it flies, proofs are for laws with a Lyapunov function, one root, or a surface and no wheels"
 
 
 def _even(subject: Mapping[str, Any]) -> bool:
