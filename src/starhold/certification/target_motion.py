@@ -15,7 +15,7 @@ from starhold.loop.closed_loop import ClosedLoop
 from starhold.parts.contract import Motion, Orbit
 
 NOWHERE = Orbit(0.0, inf, inf, inf, 0.0, ZERO)
-"""Of a target that does not look at the orbit."""
+"""The orbit that a target is given which does not depend on one."""
 
 
 def motion_of(loop: ClosedLoop) -> Motion | None:

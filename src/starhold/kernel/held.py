@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import cached_property
 
 from .loops import AXES, NONE, AttitudeLoop
-from .near import CHANGE, MOMENTA, between, near_target
+from .near import CHANGE, MOMENTA, between, form_of, near_target
 from .numbers import Rows, added, beside, definite, demand, inverse, norm, plus, reach, root, scalar, times, transpose, up
 from .plans import PLANNED, Plan
 from .polynomials import Poly, apply, cross, dot, fastest, minus, most, total, var, variables
@@ -135,10 +135,8 @@ class Held(Reader):
         self.steepness = [[p.slope(name).at(at).number for name in STATE] for p in steep]
         self.steep = minus(steep, apply(self.steepness, x))
         # Without the first V is even in q, and motions stay where q0 > 0.
-        self.s = -V.terms.get(("q0",), Fraction(0))
+        self.s, self.G = form_of(loop)
         self.even = self.s == 0
-        self.G = [[V.slope(i).slope(k).at(dict.fromkeys(STATE, 0)).number / 2 for k in STATE] for i in STATE]
-        demand(not (V - self.s * (1 - loop.q[0]) - dot(x, apply(self.G, x))).terms, "V is not s (1 - q0) and a form")
         # What a torque does to V: felt x.
         self.felt = times(self.N, [[2 * entry for entry in row] for row in self.G[RATE]])
         self.parted = minus(self.beside, turning), turning

@@ -8,7 +8,8 @@ from itertools import product
 from typing import NamedTuple
 
 from .loops import AXES, NONE, RATES, AttitudeLoop, slopes
-from .numbers import Rows, beside, inverse, plus, scalar, times
+from .numbers import Rows, beside, demand, inverse, plus, scalar, times
+from .polynomials import apply, dot, var
 from .regions import STATE, with_momentum
 
 CHANGE = "told.change", "told.change.per.rate"
@@ -55,6 +56,15 @@ def spinning(loop: AttitudeLoop, at: list[Fraction]) -> tuple[Rows, Rows]:
     names = {f"h{k + 1}": x for k, x in enumerate(at)}
     law, body = (slopes([with_momentum(p) for p in parts], RATES, names) for parts in (loop.u, loop.balance(NONE)))
     return law, body
+
+
+def form_of(loop: AttitudeLoop) -> tuple[Fraction, Rows]:
+    """Return s and G of V = s (1 - q0) + x.Gx, x = (w, q1, q2, q3); refuse another V."""
+    V, x, at = loop.lyapunov, [var(name) for name in STATE], dict.fromkeys(STATE, 0)
+    s = -V.terms.get(("q0",), Fraction(0))
+    G = [[V.slope(i).slope(k).at(at).number / 2 for k in STATE] for i in STATE]
+    demand(not (V - s * (1 - loop.q[0]) - dot(x, apply(G, x))).terms, "V is not s (1 - q0) and a form")
+    return s, G
 
 
 def between(near: Near, loop: AttitudeLoop, size: Fraction) -> list[Rows]:

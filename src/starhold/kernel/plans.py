@@ -98,13 +98,18 @@ def rounded(parts: Sequence[Rows], W: Fraction) -> Expansion:
 
 def added(a: Expansion, b: Expansion, W: Fraction) -> Expansion:
     """Return the sum."""
-    parts = {key: list(part) for key, part in a.parts.items()}
+    parts = dict(a.parts)
     for key, part in b.parts.items():
-        there = parts.get(key)
-        parts[key] = (
-            part if there is None else [[x + y for x, y in zip(s, t, strict=True)] for s, t in zip(there, part, strict=True)]
-        )
+        include(parts, key, part)
     return expansion(parts, a.fixed + b.fixed, a.beyond + b.beyond, W)
+
+
+def include(parts: dict[tuple[int, ...], Whole], key: tuple[int, ...], part: Whole) -> None:
+    """Add a matrix to the one of this product of components, if there is one."""
+    there = parts.get(key)
+    parts[key] = (
+        part if there is None else [[x + y for x, y in zip(s, t, strict=True)] for s, t in zip(there, part, strict=True)]
+    )
 
 
 def product(a: Expansion, b: Expansion, W: Fraction) -> Expansion:
@@ -116,14 +121,8 @@ def product(a: Expansion, b: Expansion, W: Fraction) -> Expansion:
             if len(one) + len(other) > ORDER:
                 continue
             Account.spend(len(left) * len(right), 2 * PLACES)
-            key = tuple(sorted(one + other))
             part = [[sum([x * y for x, y in zip(row, column, strict=True)]) for column in right] for row in left]
-            there = sums.get(key)
-            sums[key] = (
-                part
-                if there is None
-                else [[x + y for x, y in zip(s, t, strict=True)] for s, t in zip(there, part, strict=True)]
-            )
+            include(sums, tuple(sorted(one + other)), part)
     cut = ORDER + 1
     pairs = [(m + n - cut, x * y) for m, x in enumerate(a.sizes) for n, y in enumerate(b.sizes) if m + n >= cut]
     fixed = (a.known(W) + a.fixed) * b.fixed + a.fixed * b.known(W)

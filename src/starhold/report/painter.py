@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 LIBRARY = ("matplotlib.backends.backend_agg", "matplotlib.figure", "starhold.report.ticks", "starhold.report.accuracy")
-"""What figures are drawn with, beside `starhold.report.figures`."""
+"""The modules that drawing figures loads in addition to `starhold.report.figures`."""
 
 
 class Painter:

@@ -16,7 +16,7 @@ from starhold.laws.predictive.free import Plan
 TURN = 0.3
 """How far (rad) a body turns at most within the horizon, in claims about a plan."""
 DIGITS = 4
-"""Of the units in which motions are measured."""
+"""The digits to which the units of motions are rounded."""
 
 
 def told_of(loop: RecordedLoop, plan: Plan) -> tuple[dict[str, Any], dict[str, Any]]:

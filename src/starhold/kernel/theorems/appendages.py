@@ -7,8 +7,9 @@ from fractions import Fraction
 
 from ..appended import Appended, Box, Column, after, combined, follow, image
 from ..loops import AttitudeLoop, wired
+from ..near import form_of
 from ..numbers import Rows, definite, demand, inverse, matrix, norm, rational, read_list, read_table
-from ..polynomials import apply, dot, minus, most, var
+from ..polynomials import minus, most, var
 from ..reading import Claim
 from ..regions import STATE
 from ..rules import Exceeds, Part, Proof, vanish
@@ -104,11 +105,7 @@ def points_with_appendages(claim: Claim) -> Proof:
 def inner(loop: AttitudeLoop, level: Fraction) -> Rows:
     """Return the matrix of an ellipsoid of (w, q) that holds {V <= level} where q0 > 0, for V = s (1 - q0) + x.Gx. There
     2 (1 - q0) >= |q|^2."""
-    V, x = loop.lyapunov, [var(name) for name in STATE]
-    s = -V.terms.get(("q0",), Fraction(0))
-    at = dict.fromkeys(STATE, 0)
-    G = [[V.slope(i).slope(k).at(at).number / 2 for k in STATE] for i in STATE]
-    demand(not (V - s * (1 - loop.q[0]) - dot(x, apply(G, x))).terms, "V is not s (1 - q0) and a form")
+    s, G = form_of(loop)
     demand(s >= 0 and definite(G, strictly=False), "V is not least on target")
     under = [[entry + s / 2 * (i == k > 2) for k, entry in enumerate(row)] for i, row in enumerate(G)]
     demand(definite(under), "V is not least on target")
