@@ -41,6 +41,9 @@ class Oracle(Driven):
             self.J = self.near(self.J)
         self.true = self.near(self.J) if claim["theorem"] == "points" and "tolerance" in self.numbers else self.J
         self.words = claim["taken"]
+        # What a memory adds is a push of its own, beside the torque at rest in it.
+        asked = self.programs["law"]["inputs"] if "law" in self.programs else ()
+        self.subject |= {name: 0.0 for name in asked if name.startswith("memory.")}
 
     def near(self, J):
         """An inertia no entry of which is off by more than is told."""
@@ -84,7 +87,7 @@ class Oracle(Driven):
 
     def law(self, q, w, e, r, a, H):
         given, h = self.inputs(q, w, e, r, a, H)
-        u = run(self.programs["law"], given)
+        u = run(self.programs["law"], given)[:3]
         return u, u + e - np.cross(w + r, self.J @ (w + r) + h) - self.J @ (a - cross(w, r)), h
 
     def lyapunov(self, q, w):
