@@ -86,10 +86,10 @@ def run_command() -> int:
         # A shell waits for names and needs no values, so the library that converts them is not loaded: completion takes a
         # value that cannot be converted for absent.
         sys.modules["pydantic"] = cast(ModuleType, None)
-    asked = {name: command for name, command in COMMANDS.items() if name in sys.argv[1:2]}
+    chosen = {name: command for name, command in COMMANDS.items() if name in sys.argv[1:2]}
     try:
         # Options of other commands than the one that is asked for take long to make.
-        (make_app(asked) if asked else app)(standalone_mode=True)
+        (make_app(chosen) if chosen else app)(standalone_mode=True)
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else int(ending.code is not None)
     except InputError as error:
