@@ -64,22 +64,25 @@ def test_the_worst_flight_of_another_loop_ends_within_its_bound(seed, kind, tole
     flown_again(seed, kind, tolerance, way, share)
 
 
-def test_flights_without_noise_or_errors_that_are_chosen_come_less_far():
-    """So the search turns each of them against the claim."""
-    claim = claimed(9025, None, "")
-    end = np.array(QUICK[0][3])[:, None]
-    plain, calm, wrong = (Steered(*given(claim), 1, 1) for _ in range(3))
+def test_noise_is_chosen_against_a_claim():
+    claim, end = given(claimed(9025, None, "")), np.array(QUICK[0][3])[:, None]
+    calm = Steered(*claim, 1, 1)
     calm.noisy = lambda motion, ends, count: [np.zeros((6, 1))] * count
-    fly = wrong.fleet_of.fly
+    assert calm.fly(end).angle < 0.995 * QUICK[0][4]
 
-    def forgetting(*begin):
-        wrong.fleet_of.push = lambda k, q, w: np.zeros(w.shape)
+
+def test_pushes_are_chosen_against_a_claim():
+    claim, end = given(claimed(9042, None, "")), np.array(QUICK[1][3])[:, None]
+    steered = Steered(*claim, 1, 1)
+    fleet, fly = steered.fleet_of, steered.fleet_of.fly
+
+    def unsteered(*begin):
+        # As large, another way.
+        fleet.push = lambda k, q, w: -np.roll(end, 1, axis=0) / np.linalg.norm(end)
         return fly(*begin)
 
-    wrong.fleet_of.fly = forgetting
-    most = plain.fly(end).angle
-    assert calm.fly(end).angle < 0.995 * most
-    assert wrong.fly(end).angle < 0.9 * most
+    fleet.fly = unsteered
+    assert 0.5 < steered.fly(end).angle < 0.93 * QUICK[1][4]
 
 
 @pytest.mark.slow
