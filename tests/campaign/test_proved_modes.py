@@ -12,7 +12,7 @@ from starhold.report.text import covered_text
 from starhold.scenario.building import build
 from starhold.studies.bodies.rigid_body import STUDY
 from starhold.studies.compare import fly_law, prove, record
-from tests.campaign.flown import fly, short, uniform
+from tests.campaign.flown import fly, short
 
 LAW = {"type": "lyapunov", "k_rate": 1.6, "k_attitude": 0.7}
 FIRST = LAW | {"name": "first", "k_attitude": 0.12, "until": {"after": "10 s", "angle_below": "15 deg"}}
@@ -68,7 +68,8 @@ def test_flights_are_compared_with_the_claim_of_their_last_mode_from_when_it_beg
 
 
 def test_a_fault_that_the_law_knows_of_begins_other_claims():
-    scenario = mission(fault=[{"time": 30.0, "inertia": [2.1, 3.0, 4.0], "action": "reallocate"}], initial={"attitude": [1.0, 0.05, 0.0, -0.03]})
+    fault = {"time": 30.0, "inertia": [2.1, 3.0, 4.0], "action": "reallocate"}
+    scenario = mission(fault=[fault], initial={"attitude": [1.0, 0.05, 0.0, -0.03]})
     entry = scenario.laws[0]
     loop = build(scenario, entry)
     flight = prove(scenario, entry, loop, fly_law(scenario, entry, loop), pointing=True)
