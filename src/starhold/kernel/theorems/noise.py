@@ -88,7 +88,7 @@ def within_radii(claim: Claim, motion: Held) -> Part[tuple[Statement, tuple[Radi
         missed += samples * tail(motion.random, numbers[DEVIATION])
         beside = f", a random torque from outside up to {below(motion.random)} N m"
     if BESIDE in numbers:
-        vectors = numbers.get(VECTORS, Fraction(1))
+        vectors = numbers[VECTORS] if VECTORS in numbers else Fraction(1)
         demand(vectors >= 1, "there is no other noise")
         missed += vectors * samples * tail(numbers[BESIDE], Fraction(1))
         beside += f", other noise up to {below(numbers[BESIDE])} deviations"
