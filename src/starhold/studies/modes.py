@@ -263,7 +263,8 @@ def flown_stretches(issued: Issued, run: Recording, end: int | None) -> list[Str
     spans = [
         one._replace(first=max(one.first, issued.step), last=one.last if end is None else min(one.last or end, end))
         for one, before in zip(flown, befores, strict=False)
-        if one.mode == issued.mode and issued.before in (None, before)
+        # A switch before the certificate's loop flew is none of it.
+        if one.mode == issued.mode and (issued.before is None or (issued.before == before and one.first >= issued.step))
     ]
     return [one for one in spans if one.last is None or one.first < one.last]
 
