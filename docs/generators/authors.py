@@ -16,6 +16,7 @@ import typer
 
 from generators.kernel import files_table
 from generators.laws import POINT
+from generators.lemmas import lemmas_table
 from generators.proved import beside_table, costs_table
 from generators.sets import sets_table
 from generators.sharpness import sharpness_table
@@ -214,6 +215,7 @@ TABLES = {
     "limits of models": limits_table,
     "kernel files": files_table,
     "invariant sets": sets_table,
+    "lemmas": lemmas_table,
     "dice": lambda: methods_table(Dice),
     "proved and measured": beside_table,
     "costs of sources": lambda: costs_table("cubesat-nadir"),

@@ -163,6 +163,8 @@ def _vector(letter: str, count: int) -> list[Poly]:
     return [var(f"{letter}{k}") for k in range(count)]
 
 
+EASY = 6
+"""Rows of a matrix from which elimination takes long."""
 CHECKED = "vm_cast_no_check (eq_refl true)."
 """The end of a proof by computation, which Rocq does where the proof is accepted."""
 
@@ -176,6 +178,7 @@ def _definite(name: str, a: Rows) -> str:
     """Return that a matrix times a number is positive definite, and its proof: of it less 1 on its diagonal."""
     size, (c, _) = lcm(*(x.denominator for row in a for x in row)), _least(a, len(a))
     size *= ceil(1 / (c * size))
+    size *= _room([[[size * x - (i == k) for k, x in enumerate(row)] for i, row in enumerate(a)]])
     whole = [[size * x for x in row] for row in a]
     squares = _squares([[x - (i == k) for k, x in enumerate(row)] for i, row in enumerate(whole)])
     return _proved(name, f"positive_definite {_rows(_upper(whole))}", f"apply (positive {squares}).", CHECKED)
@@ -193,13 +196,13 @@ def _text(name: str, given: Lemma) -> str:
         share = size / multiple / multiple / prod(known[k][0] for k in of)
         parts.append(Part([[*known].index(k) for k in of], whole, [[share * x for x in row] for row in gram]))
     fractions = chain(*(c.terms.values() for c in cofactors), *(row for part in parts for row in part.gram))
-    K = lcm(*(x.denominator for x in fractions))
+    least = lcm(*(x.denominator for x in fractions))
+    K = least * _room([[[least * x for x in row] for row in part.gram] for part in parts])
     relations, sides = [r for _, (r,) in zeros], [g for _, (g,) in known.values()]
     polys = [p, low, *relations, *sides, *cofactors, *(x for part in parts for x in part.z)]
     write = Writer(_names({name for q in polys for name in q.names}))
     premises = [*(f"{write.sum(r)} = 0" for r in relations), *(f"0 <= {write.sum(g)}" for g in sides)]
     premises.append(f"{write.sum(p)} = 0" if given.low is None else f"{write.sum(low)} <= {write.sum(p)}")
-    # Products of them are whole as well: what is known is, and only its numbers are taken out of the parts.
     data = [_number(K), write.terms(p), write.terms(low), *map(write.list, (relations, sides, [c * K for c in cofactors]))]
     data.append(f"[{'; '.join(write.part(part, K) for part in parts)}]")
     rule, condition = ("vanishes", "level") if given.low is None else ("exceeds", "holds")
@@ -269,12 +272,18 @@ def _squares(gram: Rows) -> str:
     return f"{size} {error} {_rows(taken)}"
 
 
+def _room(grams: Sequence[Rows]) -> int:
+    """Return by what matrices of whole numbers are multiplied so that short squares leave little of each, or 1."""
+    large = [gram for gram in grams if len(gram) > EASY]
+    return next((c for c in (1, 2**40, 2**80) if all(_taken([[c * x for x in row] for row in a])[2] for a in large)), 1)
+
+
 def _taken(gram: Rows) -> tuple[int, int, list[list[int]]]:
     """Return s, r and short u, each from its pivot on, such that a matrix less the sum of 2^s uu' has entries of at most 2^r
     off its diagonal, and count times 2^r on it; no u where there are none."""
     G, count = [[int(x) for x in row] for row in gram], len(gram)
     bits = max((row[k].bit_length() for k, row in enumerate(G)), default=0)
-    for s in range(bits - 40, -1, -20):
+    for s in (*range(bits - 40, 0, -20), 0):
         # Entries of u are rounded, so that those of uu' are off by the largest at most.
         r = (s + bits) // 2 + 1
         taken = _factored([[x - (count * (i == k) << r) for k, x in enumerate(row)] for i, row in enumerate(G)], 2**s)
@@ -286,12 +295,13 @@ def _taken(gram: Rows) -> tuple[int, int, list[list[int]]]:
 def _factored(rest: list[list[int]], m: int) -> list[list[int]]:
     """Return the rows of U, from the diagonal on, such that m U'U is a matrix, but for what is rounded, or none where it is
     not positive."""
-    taken, rows = list[list[int]](), [row[i:] for i, row in enumerate(rest)]
+    rows: list[list[int]] = [row[i:] for i, row in enumerate(rest)]
+    taken = list[list[int]]()
     while rows:
         pivot = isqrt(max(rows[0][0], 0) // m)
         if not pivot:
             return []
-        u = [pivot, *((2 * x + m * pivot) // (2 * m * pivot) for x in rows[0][1:])]
+        u: list[int] = [pivot, *((2 * x + m * pivot) // (2 * m * pivot) for x in rows[0][1:])]
         rows = [
             [x - m * a * b for x, b in zip(row, u[i:], strict=True)]
             for i, (row, a) in enumerate(zip(rows, u, strict=True))

@@ -10,7 +10,12 @@ Declare Scope number_scope.
 Bind Scope number_scope with number.
 Number Notation number Digits digits : number_scope.
 Definition whole n := Z.of_num_int (digits n).
-Definition num n := IZR (whole n).
+(* As real numbers; sealed, so that unequal ones are found to be so without work. *)
+Definition sealed : { f : number -> R | forall n, f n = IZR (whole n) }.
+Proof. exists (fun n => IZR (whole n)). trivial. Qed.
+Definition num := proj1_sig sealed.
+Lemma num_is n : num n = IZR (whole n).
+Proof. exact (proj2_sig sealed n). Qed.
 Inductive row := last | next (n : number) (r : row).
 Notation "(| a , .. , b |)" := (next a .. (next b last) ..).
 Fixpoint entries r := match r with last => nil | next n r => whole n :: entries r end.
@@ -45,8 +50,8 @@ Proof. induction m as [| i m IH]; intros; simpl; [ring |]. rewrite IH, both_is, 
 Lemma value_is x p : value x p = at_ x (spread p).
 Proof.
   assert (H : forall p s, onward x s p = s + at_ x (spread p)).
-  { induction p0 as [| c m p0 IH]; intros; simpl; [ring |]. rewrite IH, product_is. unfold num. ring. }
-  destruct p as [| c m p]; simpl; trivial. rewrite H, product_is. unfold num. ring.
+  { induction p0 as [| c m p0 IH]; intros; simpl; [ring |]. rewrite IH, product_is, num_is. ring. }
+  destruct p as [| c m p]; simpl; trivial. rewrite H, product_is, num_is. ring.
 Qed.
 
 (* Sums and products; equal terms meet in a tree. *)
@@ -336,7 +341,7 @@ Theorem smaller a b c d : (Z.ltb 0 (whole b) && Z.ltb 0 (whole d) && Z.ltb (whol
   num a / num b < num c / num d.
 Proof.
   intro H. apply andb_prop in H. destruct H as [H L]. apply andb_prop in H. destruct H as [H K].
-  apply Z.ltb_lt, IZR_lt in H, K, L. rewrite !mult_IZR in L. unfold num.
+  apply Z.ltb_lt, IZR_lt in H, K, L. rewrite !mult_IZR in L. rewrite !num_is.
   apply Rmult_lt_reg_r with (IZR (whole b)); trivial. apply Rmult_lt_reg_r with (IZR (whole d)); trivial.
   replace (IZR (whole a) / IZR (whole b) * IZR (whole b) * IZR (whole d)) with (IZR (whole a) * IZR (whole d)) by (field; lra).
   replace (IZR (whole c) / IZR (whole d) * IZR (whole b) * IZR (whole d)) with (IZR (whole c) * IZR (whole b)) by (field; lra). trivial.
