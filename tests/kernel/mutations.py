@@ -9,7 +9,9 @@ from starhold.kernel.numbers import RefusedError, rational
 from starhold.kernel.programs import OPERATIONS
 from tests.kernel.certificates import rekeyed, text
 
-WORDS = ["outside torque", "moving target", "wheels", "shortest sign", "hysteresis", "handed over"]
+WORDS = ["outside torque", "moving target", "wheels", "shortest sign", "hysteresis", "handed over", "memory", "plan"]
+MORE = ["tolerance", "share", "noise.torque", "noise.torque.deviation", "told.change", "error.rate", "outside.per.rate"]
+"""Numbers that not every claim has."""
 
 
 def of_program(r, content, claim):
@@ -59,7 +61,7 @@ def of_number(part):
         elif way == "gone":
             del claim[part][name]
         else:
-            claim[part][r.choice(["level", "limit", "angle", "rate", "fastest", "start.rate", "gains.more"])] = str(old)
+            claim[part][r.choice(["level", "limit", "angle", "rate", "fastest", "start.rate", "gains.more", *MORE])] = str(old)
 
     return change
 
@@ -75,7 +77,7 @@ def of_words(r, content, claim):
             ["converges", "converges strictly", "converges near the inertia", "converges whatever the inertia",
              "converges from both quaternions",
              "converges without a preferred axis", "stays stable between samples",
-             "reaches its surface", "points"])  # fmt: skip
+             "reaches its surface", "points", "points with appendages", "detumbles"])  # fmt: skip
     else:
         a, b = r.sample(sorted(claim["programs"]), 2)
         claim["programs"][a], claim["programs"][b] = claim["programs"][b], claim["programs"][a]
@@ -87,7 +89,7 @@ def of_evidence(r, content, claim):
 
     def walk(node):
         for key, part in node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ():
-            if isinstance(part, str) and part[-1:].isdigit():
+            if (isinstance(part, str) and part[-1:].isdigit()) or type(part) is int:
                 spots.append((node, key))
             walk(part)
 
@@ -95,6 +97,10 @@ def of_evidence(r, content, claim):
     way = r.choice(["leaf", "leaf", "leaf", "gone", "moved"])
     if way == "leaf" and spots:
         node, key = r.choice(spots)
+        if type(node[key]) is int:
+            # A weight, a number of periods, a place.
+            node[key] = r.choice([node[key] + 1, node[key] - 1, 2 * node[key], 0, -1, 10**6])
+            return
         old = rational(node[key])
         node[key] = str(-old if old and r.random() < 0.5 else old + Fraction(1, 1000))
     elif claim["evidence"]:

@@ -154,6 +154,21 @@ class Swaying:
                 n += 1
         return found | {"flown": n}
 
+    def holds(self, seconds=60.0):
+        """Whether no flight is against what the claim says of V, torques and the end, nor the set without what it holds."""
+        reached = self.against(min(seconds, 1.2 * self.numbers["settling"]))
+        said = max(reached.get(name, 0.0) for name in ("V", "limit", "limit.norm", "angle", "rate"))
+        return said <= 1.0 + 1e-6 and self.contains()
+
+    def contains(self):
+        """Whether the set holds the turns at rest and the rates on target that are told."""
+        axis, n = self.rng.normal(size=(3, 200)), self.numbers
+        axis, none = axis / np.linalg.norm(axis, axis=0), np.zeros((200, self.count))
+        turned, moving = axis * np.sin(n.get("angle", 0.0) / 2), axis * n.get("rate", 0.0)
+        pairs = [(turned, 0.0 * axis), (0.0 * axis, moving)]
+        pairs += [(axis * np.sin(n["start.angle"] / 2), axis[::-1] * n["start.rate"])] if "start.rate" in n else []
+        return all((self.energy(self.state(np.vstack([w, q]).T, none)) <= n["level"] * (1 + 1e-9)).all() for q, w in pairs)
+
     def told(self, x):
         """What the law is told, with errors of the largest size in some directions."""
         q, w = x[:4], x[4:7]

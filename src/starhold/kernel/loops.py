@@ -34,6 +34,8 @@ HANDED = "handed over"
 """The loop takes over from another one in any of the states that the claim says its set holds."""
 IS_VALID = "measurement.is_valid"
 """This input tells a program whether the estimate that it is given is valid, as it is in every loop here."""
+TOLD_TORQUE = "measurement.external_torque"
+"""The torque from outside that a law is told."""
 NONE = [Poly({})] * 3
 Matrix: TypeAlias = Sequence[Sequence[Poly | Fraction]]
 Wired: TypeAlias = Mapping[str, Poly]
@@ -173,6 +175,12 @@ class AttitudeLoop(Loop):
     def sign_assumed(self) -> str:
         """Return what is assumed of that sign."""
         return "sign-at-once" if self.signs else "quaternion-as-fed"
+
+    @property
+    def untold(self) -> list[str]:
+        """Return what is assumed of a law that reads a torque from outside in a loop that has none."""
+        reads = any(name.startswith(f"{TOLD_TORQUE}.") for name in self.claim.programs["law"].inputs)
+        return ["untold-torque"] * (reads and not self.outside)
 
     @property
     def divisors(self) -> dict[str, Poly]:

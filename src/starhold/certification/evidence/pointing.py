@@ -27,7 +27,7 @@ from starhold.certification.evidence.starts import POINTS, asks_more, begins, fe
 from starhold.certification.matrices import above, floats
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
-from starhold.kernel.loops import OUTSIDE, AttitudeLoop
+from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
 from starhold.kernel.numbers import RefusedError, Rows, demand, norm
 from starhold.kernel.plans import Plan
 from starhold.kernel.regions import AT_REST, RATE, TURN, Radii, Tube, balls, widened
@@ -256,7 +256,7 @@ class Pushed:
 
     def __init__(self, loop: Loop, against: Pushes, noisy: bool = False, given: bool = True) -> None:
         words, outside = [word for word in loop.words if word != OUTSIDE], against.outside
-        if OUTSIDE in loop.words and loop.is_told("measurement.external_torque"):
+        if OUTSIDE in loop.words and loop.is_told(TOLD_TORQUE):
             words.append(OUTSIDE)
         else:
             outside = above(exact(outside) + loop.known.modelled_norm)

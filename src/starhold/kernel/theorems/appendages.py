@@ -95,7 +95,8 @@ def points_with_appendages(claim: Claim) -> Proof:
     for limit, where in zip(limits, ("about any axis", "in norm"), strict=True):
         text += "" if limit is None else f", and the law asks for no more than {above(limit)} N m {where}"
     unlimited = ["unlimited-torque"] * (limits == [None, None])
-    assumed = ["appendages-as-given", "bounded-push", "held-torque", *unlimited, "target-at-rest", "no-wheels"]
+    assumed = ["appendages-as-given", "bounded-push", "held-torque", *unlimited, *loop.untold]
+    assumed += ["target-at-rest", "no-wheels"]
     said = f"; {enumerated(start)}" if start else ""
     # From the start of a round on, motions are turned by no more than in it and in later ones.
     within = [(time, max(turned[k:])) for k, time in enumerate(times)]

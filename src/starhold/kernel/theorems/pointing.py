@@ -128,6 +128,7 @@ def points(claim: Claim) -> Proof:
     text += f", with every J_ik off by up to {below(numbers['tolerance'])} sqrt(J_ii J_kk)" if motion.off else ""
     text += f", {planned}" * bool(planned)
     text += "".join(f", {name} of up to {below(x)}" for name, x in motion.bounded.items()) + noise.text
+    text += ", momentum being that with the inertia as given" * bool(motion.off and loop.wheels)
     assumed = [
         "rigid-body",
         "inertia-near" if motion.off else "inertia-as-given",
@@ -137,7 +138,7 @@ def points(claim: Claim) -> Proof:
         *limited.assumptions,
     ]
     assumed += ["best-plan"] * bool(planned)
-    assumed += ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
+    assumed += loop.untold + ["bounded-outside-torque"] * loop.outside + ["changing-outside-torque"] * bool(motion.change)
     assumed += ["bounded-target" if loop.moving else "target-at-rest"]
     assumed += ["bounded-momentum" if loop.wheels else "no-wheels", loop.sign_assumed]
     said = "".join(f"; {part}" for part in (enumerated(start), limited.text) if part)
