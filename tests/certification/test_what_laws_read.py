@@ -1,5 +1,5 @@
-"""Own laws that read what a claim has not in it, or are not the same at both quaternions: nothing is claimed of their flights
-that these contradict."""
+"""Own laws that read what a claim has not in it, or are not the same at both quaternions: nothing is claimed of flights that
+these contradict."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from starhold.scenario.building import build
 from starhold.simulation.lane import fly, label
 from tests.kernel.certificates import text
 
-LAW = '''
+LAW = """
 from typing import Annotated, NamedTuple
 
 from starhold.algebra.quaternion import vector_part
@@ -47,7 +47,7 @@ def lyapunov(measurement, gains, craft):
 
 def examples():
     return [Gains(0.5, 0.05)]
-'''
+"""
 ALL, ONE, NONE = "scale(3000.0, e)", "(0.0, 3000.0 * e[1], 0.0)", "(0.0, 0.0, 0.0)"
 WELL, EVEN = "2.0 * gains.k * (1.0 - measurement.attitude[0])", "gains.k * dot(q, q)"
 PULLED = {"orbit": {"altitude": "400 km", "inclination": "50 deg"}, "environment": {"gravity_gradient": True}}

@@ -66,7 +66,9 @@ def of_number(part):
         elif way == "gone":
             del claim[part][name]
         else:
-            claim[part][r.choice(["level", "limit", "angle", "rate", "fastest", "start.rate", "gains.more", *MORE])] = str(old)
+            claim[part][r.choice(["level", "limit", "angle", "rate", "fastest", "start.rate", "gains.more", *MORE])] = str(
+                old
+            )
 
     return change
 

@@ -25,7 +25,7 @@ from starhold.laws import mpc
 from starhold.laws.interface import Measurement
 from starhold.parts.craft import make_craft
 from starhold.scenario.building import build
-from tests.kernel.certificates import rekeyed, text
+from tests.kernel.certificates import failing, rekeyed, text
 from tests.kernel.oracle import Oracle
 from tests.kernel.planned import Planned, skew
 from tests.kernel.programs import number
@@ -284,6 +284,22 @@ def test_what_is_not_so_is_refused(what):
     change(content["claims"][0])
     with pytest.raises(RefusedError, match=why):
         check(text(content))
+
+
+HYPOTHESES = {
+    "error of the plan": scaled("numbers", "plan.error", rational("1/1000")),
+    "moves within the limit": scaled("subject", "plan.limit", rational("1/5")),
+}
+
+
+@pytest.mark.parametrize("hypothesis", HYPOTHESES)
+def test_only_this_hypothesis_fails_and_best_plans_contradict_the_claim(hypothesis):
+    content = content_of()
+    (claim,) = content["claims"]
+    assert Oracle(content, claim).plans(100)
+    HYPOTHESES[hypothesis](claim)
+    assert failing(claim, content["programs"]) == {hypothesis}
+    assert not Oracle(content, claim).plans(100)
 
 
 @pytest.mark.parametrize("theorem", ["converges", "converges strictly"])

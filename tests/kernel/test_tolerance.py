@@ -26,7 +26,7 @@ from starhold.kernel.regions import RATE, TURN
 from starhold.parts.craft import tensor
 from starhold.parts.environments.gravity_gradient import gravity_gradient
 from starhold.scenario.building import build
-from tests.kernel.certificates import text
+from tests.kernel.certificates import rekeyed, text
 from tests.kernel.flights import along, moved
 
 MOMENTS, TOLERANCE, FAR, OUTSIDE = [2.0, 3.0, 4.0], 0.03, 0.08, 1e-5
@@ -67,6 +67,17 @@ def test_a_larger_tolerance_needs_another_proof(share):
     worse["claims"][0]["numbers"]["tolerance"] = str(Fraction(TOLERANCE) * Fraction(share))
     with pytest.raises(RefusedError, match="the inertia is known too badly" if share > 5.0 else None):
         check(text(worse))
+
+
+def test_a_law_that_does_nothing_is_refused():
+    """What the inertia adds to a linear acceleration is nothing where there is none."""
+    content = copy.deepcopy(pointing())
+    (claim,) = content["claims"]
+    program = content["programs"][claim["programs"]["law"]]
+    program["steps"].append(["constant", "0"])
+    program["outputs"] = [len(program["inputs"]) + len(program["steps"]) - 1] * 3
+    with pytest.raises(RefusedError, match="V decreases by a share"):
+        check(text(rekeyed(content)))
 
 
 def held(tolerance):

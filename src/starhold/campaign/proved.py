@@ -195,9 +195,7 @@ def _starts_inside(about: Subject, lot: Lot) -> NDArray[np.bool_]:
     # The true start, not as measured.
     quiet, n = about.issued.loop.without("sensor", "estimator"), about.claim.numbers
     shown = shown_at(quiet, quiet.start._replace(attitude=begun.attitude, rate=begun.rate))
-    return (height_of(about.claim, quiet, shown) <= n["start"]) & (
-        momentum_of(quiet, shown) <= n.get("momentum", math.inf)
-    )
+    return (height_of(about.claim, quiet, shown) <= n["start"]) & (momentum_of(quiet, shown) <= n.get("momentum", math.inf))
 
 
 def _apart(about: Subject, loop: ClosedLoop) -> tuple[bool, bool]:
