@@ -230,7 +230,7 @@ class Oracle(Driven):
             return True
         if level is not None and self.lyapunov(other, zero) - V0 > level:
             return True
-        return all(self.lyapunov(other, zero) > self.lyapunov(turned(self.rng), zero) for _ in range(30))
+        return level is None or all(self.lyapunov(other, zero) > self.lyapunov(turned(self.rng), zero) for _ in range(30))
 
     def contents(self, V0, level):
         n, zero = self.numbers, np.zeros(3)

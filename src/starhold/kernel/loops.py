@@ -301,4 +301,4 @@ def around(cases: Piecewise, rest: Mapping[str, int]) -> Case:
 
 def slopes(parts: Sequence[Poly], names: Sequence[str], at: Mapping[str, Poly | Fraction | int] | None = None) -> Rows:
     """Return the derivatives with respect to variables, at a point where one is told."""
-    return [[p.slope(name).at(at or {}).number for name in names] for p in parts]
+    return [[(one.at(at) if at else one).number for one in map(p.slope, names)] for p in parts]

@@ -28,11 +28,11 @@ from starhold.certification.matrices import above, floats
 from starhold.certification.unmodelled import Pushes, change_of_modelled, driven_errors
 from starhold.kernel.held import CHANGE, Held
 from starhold.kernel.loops import OUTSIDE, TOLD_TORQUE, AttitudeLoop
-from starhold.kernel.numbers import RefusedError, Rows, demand, norm
+from starhold.kernel.numbers import RefusedError, Rows, demand, norm, plus, times, transpose
 from starhold.kernel.plans import Plan
 from starhold.kernel.regions import AT_REST, RATE, TURN, Radii, Tube, balls, widened
 from starhold.kernel.theorems.noise import SHARE
-from starhold.kernel.theorems.pointing import ROUNDS, image, periods
+from starhold.kernel.theorems.pointing import ROUNDS, periods, spread
 from starhold.kernel.theorems.response import first_of, responds
 from starhold.parts.craft import tensor
 
@@ -150,7 +150,9 @@ class Chain:
                 break
             shape, shares = ellipsoid
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
-            rate = max(highest_ratio(image(X, a, A, pushes), X) for A in corners)
+            more = spread(a, pushes)
+            moved = (plus(more, times(A, times(X, transpose(A))), 1 / (1 - sum(a))) for A in corners)
+            rate = max(highest_ratio(after, X) for after in moved)
             reach = highest_ratio(widened(tube.region.X, away), X)
             inner = self.motion.tube(tube.region.within(X, away))
             end = self.ends(inner, X, away)

@@ -80,10 +80,9 @@ def points(claim: Claim) -> Proof:
         X, shares, (rate, reach) = matrix(shape, 6, 6), [rational(x) for x in read_list(parts, 3)], map(rational, rest)
         free = 1 - sum(shares)
         demand(min(free, rate, reach, *shares) > 0 and rate < 1, "an ellipsoid is not properly told")
-        pushed = motion.linear(tube)
+        left = plus([[rate * x for x in row] for row in X], spread(shares, motion.linear(tube)), -1)
         for corner, A in enumerate(corners):
-            after = image(X, shares, A, pushed)
-            yield f"ellipsoid {k} {corner}", Definite(plus([[rate * x for x in row] for row in X], after, -1))
+            yield f"ellipsoid {k} {corner}", Definite(plus(left, times(A, times(X, transpose(A))), -1 / free))
         yield f"entry {k}", Definite(plus([[reach * x for x in row] for row in X], widened(tube.region.X, away), -1))
         fall = 1 - rate * free
         samples += periods(fall, rate * (1 - free) / fall, reach, Fraction(1))
@@ -145,9 +144,10 @@ def points(claim: Claim) -> Proof:
     return Statement(text + said, tuple(dict.fromkeys(assumed)), "pointing", within=tuple(within))
 
 
-def image(X: Rows, shares: Sequence[Fraction], A: Rows, pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
-    """Return the matrix of an ellipsoid that holds Ax + the sum of B v, of x.X^-1 x <= 1 and |v| <= b."""
-    grown = [[entry / (1 - sum(shares)) for entry in row] for row in times(A, times(X, transpose(A)))]
+def spread(shares: Sequence[Fraction], pushes: Sequence[tuple[Rows, Fraction]]) -> Rows:
+    """Return what the sum of B v, |v| <= b, adds to the matrix AXA' / (1 - the sum of shares) of an ellipsoid that holds
+    Ax + that, of x.X^-1 x <= 1."""
+    grown = scalar(0, 6)
     for (B, b), share in zip(pushes, shares, strict=True):
         grown = plus(grown, times(B, transpose(B)), b * b / share)
     return grown
