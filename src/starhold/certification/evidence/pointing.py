@@ -151,7 +151,7 @@ class Chain:
             shape, shares = ellipsoid
             X, a = [[rounded(x, DIGITS) for x in row] for row in shape.tolist()], [rounded(x, DIGITS) for x in shares]
             more = spread(a, pushes)
-            moved = (plus(more, times(A, times(X, transpose(A))), 1 / (1 - sum(a))) for A in corners)
+            moved = (plus(more, times(A, times(X, transpose(A))), Fraction(1) / (1 - sum(a, Fraction(0)))) for A in corners)
             rate = max(highest_ratio(after, X) for after in moved)
             reach = highest_ratio(widened(tube.region.X, away), X)
             inner = self.motion.tube(tube.region.within(X, away))
