@@ -146,8 +146,8 @@ def bounded_motion(numbers: Numbers, begun: str, more: str, misread: Sequence[tu
     return (
         f"every motion from {{{begun}}}{more} stays in {{V <= {above(numbers['highest'])}}}, and after"
         f" {above(numbers['settling'])} s it is at all times within {above(numbers['end.angle'])} rad of the target and"
-        f" turns no faster than {above(numbers['end.rate'])} rad/s, with the torque held for {below(numbers['period'])} s, torques"
-        f" from outside {most('outside')} and {enumerated(errors)}"
+        f" turns no faster than {above(numbers['end.rate'])} rad/s, with the torque held for {below(numbers['period'])} s,"
+        f" torques from outside {most('outside')} and {enumerated(errors)}"
     )
 
 
