@@ -131,8 +131,8 @@ def _pulled(span: Any) -> Unmet:
 
 
 def _told(span: Any) -> Unmet:
-    told = any(fitted.part.flag("MODELLED") for fitted in span.loop.used("environment"))
-    return [(told, "the law is told of a torque from outside")]
+    modelled = any(fitted.part.flag("MODELLED") for fitted in span.loop.used("environment"))
+    return [(modelled, "the law is told of a torque from outside")]
 
 
 def _unsure(span: Any) -> Unmet:
