@@ -2,6 +2,7 @@
 idle."""
 
 import copy
+import random
 from fractions import Fraction
 
 import pytest
@@ -9,7 +10,9 @@ import pytest
 from starhold.kernel.numbers import rational
 from starhold.kernel.programs import digest
 from tests.kernel.certificates import failing
+from tests.kernel.mutations import refusals
 from tests.kernel.swaying import Swaying, content_of
+from tests.tiers import fewer
 
 
 def scaled(*numbers):
@@ -98,3 +101,13 @@ def test_only_this_hypothesis_about_appendages_fails_and_a_flight_contradicts_th
     change(content, claim)
     assert failing(claim, content["programs"]) == {hypothesis}
     assert not all(Swaying(content, seed, 32).holds(20.0 if name == "bent" else 300.0) for seed in range(3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bent", "biased"])
+def test_nothing_false_is_accepted(name):
+    def true(content, claim):
+        return claim["theorem"] == "points with appendages" and Swaying(content, 1, 32).holds(20.0)
+
+    count = fewer(200)
+    assert refusals(content_of(name), random.Random(name), count, true) > count / 2

@@ -3,6 +3,7 @@
 import copy
 import json
 import math
+import random
 import time
 from dataclasses import replace
 from functools import cache
@@ -26,9 +27,11 @@ from starhold.laws.interface import Measurement
 from starhold.parts.craft import make_craft
 from starhold.scenario.building import build
 from tests.kernel.certificates import failing, rekeyed, text
+from tests.kernel.mutations import refusals
 from tests.kernel.oracle import Oracle
 from tests.kernel.planned import Planned, skew
 from tests.kernel.programs import number
+from tests.tiers import fewer
 
 
 @cache
@@ -353,3 +356,12 @@ def test_the_program_may_be_another_one_only_with_its_moves():
     constant[1] = str(rational(constant[1]) * rational("1001/1000"))
     with pytest.raises(RefusedError, match="not the first move"):
         check(json.dumps(rekeyed(content)))
+
+
+@pytest.mark.slow
+def test_nothing_false_is_accepted():
+    def true(content, claim):
+        return Oracle(content, claim).holds(12)
+
+    count = fewer(100)
+    assert refusals(content_of(), random.Random(7), count, true) > count / 2
