@@ -56,7 +56,7 @@ def test_a_law_that_leaves_an_axis_alone_has_margins_about_the_others(tmp_path):
 
 def test_margins_of_an_unstable_loop_are_nan_with_a_reason():
     with pytest.warns(
-        UserWarning, match=r"law sliding: a pole of a step of the linear loop has size 1\.\d+, so the loop is not"
+        UserWarning, match=r"law sliding: a pole of the sampled linear loop has magnitude 1\.\d+, so the loop is not"
     ):
         found = sh.margins("cubesat-slew", "sliding", 0.25)
     assert all(np.isnan(about.gain) for about in found)

@@ -131,7 +131,7 @@ class RigidBodyStudy(BodyStudy):
         return covered(issued.certificate, issued.loop, run, issued.step, last)
 
     def ends(self, issued: Issued, loop: ClosedLoop, time: float) -> int | None:
-        # A certificate ends where the loop changes next; the last of several events at one step decides.
+        # A certificate applies until the loop changes; of several events at one step the last one decides.
         latest = {event.step: event for event in loop.events if event.step * loop.period <= time}
         return min((step for step, event in latest.items() if _differs(event, issued)), default=None)
 
@@ -143,7 +143,7 @@ STUDY = RigidBodyStudy()
 
 
 def _differs(event: Event, issued: Issued) -> bool:
-    """Return whether after an event the loop that flies, or the law's model of it, differs from the one a certificate is
+    """Return whether the true loop, or the law's model of it, differs after an event from the loop that a certificate is
     about."""
     if event.step != issued.step or issued.step:
         return event.step > issued.step
@@ -169,7 +169,7 @@ def certify_law(scenario: Scenario, entry: LawEntry, loop: ClosedLoop, pointing:
 
 
 def wanted_of(scenario: Scenario, pointing: bool) -> Wanted:
-    """Return the claims of a scenario's [certify] table; pointing: also how near to the target."""
+    """Return the claims that a scenario's [certify] table asks for; pointing: whether to add the proved pointing bound."""
     from starhold.certification.certify import Wanted
 
     table = scenario.table.certify
@@ -186,8 +186,8 @@ def certified_loops(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> di
 
 
 def handed_over(entry: LawEntry, loop: ClosedLoop) -> dict[str, Ends]:
-    """Return the rates (rad/s) and angles (rad) below which the switches of a law hand over, by the names of their
-    certificates."""
+    """Return the rates (rad/s) and angles (rad) below which the switches of a law hand over to the next mode, by the names
+    of their certificates."""
     from starhold.certification.hand_over import ends
 
     switches = hand_overs(loop, entry.name) if mode_laws(loop.law, loop.gains) else []
@@ -200,7 +200,7 @@ def _named(scenario: Scenario, entry: LawEntry, loop: ClosedLoop) -> list[tuple[
 
 
 def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
-    """Return the initial loop and each later loop that the law knows, with the control step from which it flies."""
+    """Return the initial loop and each later loop that the law knows, with the control step at which it begins."""
     known = [(0, replace(loop, events=()))]
     if loop.remembers:
         return known
@@ -211,7 +211,7 @@ def _known(loop: ClosedLoop, steps: int) -> list[tuple[int, ClosedLoop]]:
             continue
         now = replace(loop, events=(), craft=event.craft, gains=event.gains, parts=event.parts)
         if step:
-            # One more step, for the changes that come with the event.
+            # One more step, for changes at the event itself.
             carry = fly(loop, step)[1]
             phase = next(phase for phase in loop.phases(steps) if phase.first == step)
             carry = phase.entered(carry)
