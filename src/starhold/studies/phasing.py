@@ -100,7 +100,9 @@ def _notes(loop: ClosedLoop, cells: Sequence[Cell], laws: Sequence[str]) -> list
         n for n in parts if n in shown and {c.stage for c in cells if c.stage.startswith(f"{n}: ")} == {f"{n}: {TORQUE}"}
     ]
     notes += [f"{name}: the sheet gives its total torque, not what each of its units does." for name in whole]
-    notes += [f"{f.called}: it only delays or limits the command; the sheet leaves it out." for f in loop.used("actuator")]
+    notes += [
+        f"{f.called}: the sheet leaves it out, as if it passed the command on unchanged." for f in loop.used("actuator")
+    ]
     silent = [name for name in laws if name not in shown]
     notes += [f"{name}: this law commands nothing at its first instant; the sheet begins with a torque." for name in silent]
     if not loop.used("sensor"):
