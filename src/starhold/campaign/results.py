@@ -101,12 +101,13 @@ class Within:
 
 @dataclass(frozen=True)
 class ByClaim:
-    """A claim about a law's loop as it flies, compared with its flights. text: the claim, or the reason why there is none;
-    runs: the number of flights compared; left: the numbers of flights that do not meet its premises, by reason; share: the
-    share of flights for which the claim holds, None for all; misled: the number of flights outside it in which the
-    measurement error exceeded what the claim assumes for this share, None where measurements are not recorded; within: the
-    metrics that the claim bounds."""
+    """A claim about a law's loop as it flies, compared with its flights. about: the name of its certificate, which names the
+    law and, for a law of modes, the mode; text: the claim, or the reason why there is none; runs: the number of flights
+    compared; left: the numbers of flights that do not meet its premises, by reason; share: the share of flights for which
+    the claim holds, None for all; misled: the number of flights outside it in which the measurement error exceeded what the
+    claim assumes for this share, None where measurements are not recorded; within: the metrics that the claim bounds."""
 
+    about: str
     text: str
     runs: int = 0
     left: Mapping[str, int] = field(default_factory=dict[str, int])
@@ -151,8 +152,8 @@ class LawResult:
     """Sensitivity indices by metric, if the sampling was designed for them."""
     again: tuple[Again, ...] = ()
     brackets: tuple[Bracket, ...] = ()
-    claim: ByClaim | None = None
-    """The comparison with a claim; None unless a proof was requested."""
+    claims: tuple[ByClaim, ...] = ()
+    """The comparisons with claims, one for each mode of a law of modes; empty unless a proof was requested."""
 
     def __repr__(self) -> str:
         judged = "".join(f"; {verdict.name} {verdict.outcome}" for verdict in self.verdicts)
@@ -185,7 +186,7 @@ class CampaignResult:
     @property
     def contradicted(self) -> bool:
         """Whether a flight contradicts a proof, which is an error in starhold."""
-        every = (one for law in self.laws for one in (*law.brackets, law.claim) if one is not None)
+        every = (one for law in self.laws for one in (*law.brackets, *law.claims))
         return any(one.contradicted for one in every)
 
     def frame(self) -> DataFrame:

@@ -102,9 +102,10 @@ class BodyStudy:
         """Return the departures of a run from the proved claims of a certificate, by kind of claim."""
         return {}
 
-    def covered(self, issued: Issued, loop: Any, run: Recording) -> tuple[float, float] | None:
-        """Return the first and last time (s) at which the claim about the loop as it flies covers a run, or None."""
-        return None
+    def covered(self, issued: Issued, loop: Any, run: Recording) -> tuple[tuple[float, float], ...]:
+        """Return the intervals (s) in which the claim about the loop as it flies covers a run, one for each time that the
+        claim's loop flies; empty where it never does."""
+        return ()
 
     def ends(self, issued: Issued, loop: Any, time: float) -> int | None:
         """Return the control step at which the loop of a flight of this duration (s) ceases to be the certificate's, or

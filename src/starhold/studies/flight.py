@@ -50,8 +50,8 @@ class Flight:
     """The certificates of the law on this spacecraft, initially and after faults."""
     departures: tuple[Mapping[str, tuple[Departure, ...]], ...] = ()
     """The departures of this flight from the proved claims of each certificate, by kind of claim."""
-    covered: tuple[tuple[float, float] | None, ...] = ()
-    """For each certificate, the first and last time (s) at which its claim about the loop as it flies covers this flight."""
+    covered: tuple[tuple[tuple[float, float], ...], ...] = ()
+    """For each certificate, the intervals (s) in which its claim about the loop as it flies covers this flight."""
 
     modes: tuple[Begun, ...] = ()
     """The modes that flew, in order, for a law with modes."""
