@@ -171,7 +171,7 @@ def counts_text() -> str:
     return (
         f"{len(catalogue())} [laws](docs/laws.md) for attitude and {len(catalogue(POINT))} of station keeping, "
         f"{others} other [parts](docs/parts.md), {len(builtin_names())} scenarios,\n"
-        f"{len(known)} [commands](docs/commands.md), and {len(PAPERS)} [publications](docs/publications.md) made again."
+        f"{len(known)} [commands](docs/commands.md), and {len(PAPERS)} reproduced [publications](docs/publications.md)."
     )
 
 
