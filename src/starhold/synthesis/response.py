@@ -36,10 +36,8 @@ class Bandwidth(NamedTuple):
     """The form takes the natural frequency and damping of the linear loop: exact about the axis of the largest moment of
     inertia, more about the others."""
 
-    bandwidth: Annotated[
-        float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="natural frequency, the least of all axes")
-    ]
-    damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
+    bandwidth: Annotated[float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="lowest natural frequency of all axes")]
+    damping: Annotated[float, Gain("1", above=0.0, text="lowest damping ratio of all axes")] = 0.7
 
 
 class Settling(NamedTuple):
@@ -47,7 +45,7 @@ class Settling(NamedTuple):
     target at rest without external torque."""
 
     time: Annotated[float, Gain("s", above=0.0, text="after which angle and rate stay within their tolerances")]
-    damping: Annotated[float, Gain("1", above=0.0, text="damping ratio, the least of all axes")] = 0.7
+    damping: Annotated[float, Gain("1", above=0.0, text="lowest damping ratio of all axes")] = 0.7
     torque: Annotated[float | None, TORQUE] = None
     momentum: Annotated[float | None, MOMENTUM] = None
     attitude: Annotated[Quaternion | None, TURN] = None
