@@ -231,7 +231,7 @@ def pieces(value: Any) -> tuple[Case, ...]:
 def jointly(
     values: Iterable[Any], most: int | None = None
 ) -> list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]]:
-    """Return the joint cases of several piecewise polynomials: conditions and one polynomial for each value. Raise
+    """Return the joint cases of several piecewise polynomials: conditions and one polynomial for each value. Raise Raise
     ValueError for more than `most` cases."""
     cells: list[tuple[tuple[tuple[Condition, bool], ...], list[Polynomial]]] = [((), [])]
     for value in values:

@@ -93,7 +93,7 @@ class Facts:
 
     @property
     def sight(self) -> Sight:
-        """What flight software sees; available only in the control step of a loop."""
+        """The view of flight software; available only in the control step of a loop."""
         assert self._sight is not None
         return self._sight
 

@@ -54,7 +54,7 @@ FORMS: dict[str, Any] = {"best": Best}
 
 def design(plant: Libration, spec: Best) -> Gains:
     """Return gains with rate = sqrt(C - 2 Omega^2), at which the peak demand is 2 Omega sqrt(C - Omega^2) radius. Raise
-    ValueError if C is not above 2 Omega^2."""
+    Raise ValueError if C is not above 2 Omega^2."""
     rate, growth = least_rate(plant), plant.rate**2 + 2.0 * plant.stiffness
     x = (2.0 * growth, 2.0 * math.sqrt(growth))
     return Gains(spec.radius, rate, spec.alpha, spec.k, *x, spec.feedback, spec.boundary_layer, spec.model)

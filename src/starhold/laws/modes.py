@@ -293,7 +293,7 @@ class Modes:
         return resting
 
     def record(self, memory: Memory, period: Scalar) -> Sample | LossSample:
-        """The recorded quantities."""
+        """Return the recorded quantities."""
         mode = Sample(memory.mode + 1.0, maximum(memory.age, 0.0) * period)
         return mode if self.on_loss is None else LossSample(*mode, memory.losses.trips, memory.losses.tripped)
 

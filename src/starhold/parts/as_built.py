@@ -84,7 +84,7 @@ def axes_of(mounting: Vector, errors: Matrix | Vector) -> Axes:
 
 
 def along(axes: Axes, vector: Vector) -> Vector:
-    """The components of a vector along the actual axes of a sensor."""
+    """Return the components of a vector along the actual axes of a sensor."""
     return apply(axes, vector) if axes else vector
 
 

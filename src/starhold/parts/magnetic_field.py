@@ -94,7 +94,7 @@ def prepared(epoch: Date, period: float = 1.0, rows: tuple[Row, ...] = ROWS) -> 
     """Return the numbers of the field for a flight that begins at an epoch (UTC), during which the coefficients are
     constant. period: the control period (s), for `field_at`.
 
-    ValueError for an epoch that is no date, or not from 2025 to 2030."""
+    Raise ValueError for an epoch that is no date, or not from 2025 to 2030."""
     days = _known(epoch)
     highest = max(row[0] for row in rows)
     pairs = [[(0.0, 0.0) for _ in range(max(m, 1), highest + 1)] for m in range(highest + 1)]
@@ -121,7 +121,7 @@ def strongest(epoch: Date, distance: float) -> float:
 
 
 def _known(epoch: Date) -> float:
-    """The days since J2000. ValueError for an epoch that is no date, or beyond the coefficients."""
+    """Return the days since J2000. Raise ValueError for an epoch that is no date, or beyond the coefficients."""
     days = days_of(epoch)
     if not FIRST <= days <= LAST:
         raise ValueError(f"the magnetic field is known from 2025 to 2030, not at the epoch {date_text(epoch)}")

@@ -103,23 +103,23 @@ class Environment(Protocol):
     ACROSS_FIELD: bool
 
     def torque(self, state: State, params: Any, craft: Any, memory: Any, /) -> Vector:
-        """The torque on the body (N m, body axes)."""
+        """Return the torque on the body (N m, body axes)."""
         ...
 
     def acceleration(self, state: State, params: Any, craft: Any, memory: Any, /) -> Vector | None:
-        """The acceleration of the body, in the axes of its position; None for numbers that do not move it."""
+        """Return the acceleration of the body, in the axes of its position; None if the parameters do not move it."""
         ...
 
     def perturbation(self, params: Any, craft: Any, distance: float, /) -> tuple[float, float]:
-        """The largest `acceleration` (m/s2) and its largest gradient (1/s2) at this distance (m) or a larger one."""
+        """Return the largest `acceleration` (m/s2) and its largest gradient (1/s2) at this distance (m) or a larger one."""
         ...
 
     def remember(self, params: Any, /) -> Any:
-        """The memory at the start."""
+        """Return the memory at the start."""
         ...
 
     def update(self, memory: Any, state: State, params: Any, dice: Dice, step: int, /) -> Any:
-        """The memory for the control step that begins."""
+        """Return the memory for this control step."""
         ...
 
 
@@ -149,12 +149,13 @@ class Effector(Protocol):
         ...
 
     def reaction(self, state: Any, command: Any, body: State, params: Any, /) -> Vector:
-        """The torque on the body (N m), with -w x h of its momentum h and without the terms in the body's angular
+        """Return the torque on the body (N m), with -w x h of its momentum h and without the terms in the body's angular
         acceleration."""
         ...
 
     def push(self, state: Any, command: Any, body: State, params: Any, /) -> Vector | None:
-        """The acceleration of the body by its force, in the axes of its position; None for numbers that do not move it."""
+        """Return the acceleration of the body by its force, in the axes of its position; None if the parameters do not move
+        it."""
         ...
 
     def inertia(self, state: Any, params: Any, /) -> Matrix:
@@ -199,32 +200,33 @@ class Sensor(Protocol):
     Reading: type
 
     def measure(self, state: State, memory: Any, params: Any, dice: Dice, step: int, /) -> tuple[Any, Any]:
-        """The reading, and the memory for the next."""
+        """Return the reading, and the memory for the next one."""
         ...
 
     def remember(self, params: Any, state: State, /) -> Any:
-        """The memory at the start."""
+        """Return the memory at the start."""
         ...
 
 
 class Estimator(Protocol):
-    """Computes the state from readings. `NEEDS`: the names of the readings that it takes; `Estimate` is a NamedTuple whose
-    fields have the names of the estimated fields of the body's state. `SEVERAL`: a dict from the name of a reading taken
-    from several sensors to the parameter with a row for each sensor after the first, "" for none. `ASSUMES`: a dict from a
-    reading to parameters that default to those of the sensor. `STARTABLE`: whether it takes its first attitude from the
-    estimate of another estimator, read as `fix`, once that is valid."""
+    """An estimator computes the state from readings. `NEEDS`: the names of the readings that it takes; `Estimate` is a
+    NamedTuple whose fields have the names of the estimated fields of the body's state. `SEVERAL`: a dict from the name of a
+    reading taken from several sensors to the parameter with a row for each sensor after the first, "" for none. `ASSUMES`:
+    a dict from a reading to parameters that default to those of the sensor. `STARTABLE`: whether it takes its first
+    attitude from the estimate of another estimator, read as `fix`, once that is valid."""
 
     NEEDS: tuple[str, ...]
     STARTABLE: bool
     Estimate: type
 
     def estimate(self, readings: Any, memory: Any, params: Any, craft: Any, period: Scalar, /) -> tuple[Any, Any]:
-        """Return the estimate and the memory for the next; `readings` has an attribute for each name, with the reading of
-        the first sensor, and `every`, the readings of all sensors in the order of the file; craft is the nominal model."""
+        """Return the estimate and the memory for the next one; `readings` has an attribute for each name, with the reading
+        of the first sensor, and `every`, the readings of all sensors in the order of the file; craft is the nominal
+        model."""
         ...
 
     def remember(self, params: Any, state: State, /) -> Any:
-        """The memory at the start."""
+        """Return the memory at the start."""
         ...
 
 
@@ -245,8 +247,8 @@ class Target(Protocol):
 
 
 class Actuator(Protocol):
-    """Turns the command of a law into the one that acts. Without `rates` it changes the command only at control instants;
-    with `rates` it has an output that follows its input."""
+    """An actuator turns the command of a law into the one that acts. Without `rates` it changes the command only at control
+    instants; with `rates` it has an output that follows its input."""
 
     def command(self, command: Vector, params: Any, /) -> Vector:
         """Return the command that is passed on."""

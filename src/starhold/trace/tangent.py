@@ -24,7 +24,7 @@ def tangent(program: Program, varied: Collection[str]) -> Program:
     """Return a program that also computes the slopes of the numbers in the varied memories. Beside each stands a memory
     NAME.d for the slopes of its numbers.
 
-    ValueError where a number's bits are read, which have no slope."""
+    Raise ValueError if a number's bits are read, which have no slope."""
     made = _Tangent(varied)
     body = made.block(program.main.body, {})
     main = program.main._replace(body=prune(body, ())[0])

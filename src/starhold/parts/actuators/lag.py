@@ -29,7 +29,7 @@ class Params(NamedTuple):
 
 
 def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params: Params) -> Vector:
-    """d(output)/dt towards the command."""
+    """Return d(output)/dt towards the command."""
     return clip_axes(scale(1.0 / params.lag, subtract(target, output)), params.rate_limit)
 
 

@@ -25,8 +25,8 @@ class Params(NamedTuple):
 
 
 def rates(output: Vector, target: Vector, begun: Vector, substep: Scalar, params: Params) -> Vector:
-    """d(output)/dt: the straight line from the output at the start of the substep to the command, or as far towards it as
-    the limit allows."""
+    """Return d(output)/dt: the straight line from the output at the start of the substep to the command, or as far towards
+    it as the limit allows."""
     return clip_axes(scale(1.0 / substep, subtract(target, begun)), params.rate_limit)
 
 

@@ -145,7 +145,7 @@ def renormalised(state: PointState) -> PointState:
 
 
 def is_sound(state: PointState, setup: Any) -> Truth:
-    """Whether the motion is finite and within the divergence bound."""
+    """Return whether the motion is finite and within the divergence bound."""
     near = less(dot(state.position, state.position), setup.divergence_bound * setup.divergence_bound)
     return both(is_finite(dot(state.velocity, state.velocity)), near)
 
@@ -156,7 +156,7 @@ def observe(state: PointState, scene: Scene) -> PointMeasurement:
 
 
 def sample(state: PointState, goal: None, applied: Vector, command: Vector) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.position, state.velocity, applied, command)
 
 

@@ -316,7 +316,7 @@ def applied(state: State, command: Vector, body: Any, params: Prepared) -> Vecto
 
 
 def reaction(state: State, command: Vector, body: Any, params: Prepared) -> Vector:
-    """The torque of the units on the body (N m)."""
+    """Return the torque of the units on the body (N m)."""
     carried = add(momentum(state, params), apply(inertia_change(state, params), body.rate))
     return subtract(applied(state, command, body, params), cross(body.rate, carried))
 
@@ -357,7 +357,7 @@ def _spinning(one: Turned, rate: Scalar, gimbal: Scalar, rotor: Scalar, accelera
 
 
 def momentum(state: State, params: Prepared) -> Vector:
-    """The units' angular momentum relative to the body (N m s)."""
+    """Return the units' angular momentum relative to the body (N m s)."""
     total = ZERO
     for one, rate, stored in zip(turned(state, ZERO, params), state.rate, state.momentum, strict=True):
         turning = scale(one.unit.about_gimbal * rate, one.unit.gimbal)
@@ -366,7 +366,7 @@ def momentum(state: State, params: Prepared) -> Vector:
 
 
 def record(state: State, command: Vector, body: Any, params: Prepared) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     units = turned(state, body.rate, params)
     gimbals, rotors = motors(state, units, command, params)
     demanded = steer(units, command, params)
@@ -374,7 +374,7 @@ def record(state: State, command: Vector, body: Any, params: Prepared) -> Sample
 
 
 def fastest(params: Params) -> float:
-    """The bandwidth (1/s) of the fastest gimbal servo."""
+    """Return the bandwidth (1/s) of the fastest gimbal servo."""
     return params.bandwidth
 
 

@@ -100,7 +100,7 @@ def springs(state: State, params: Numbers) -> tuple[Scalar, ...]:
 
 
 def reaction(state: State, command: Any, body: Any, params: Numbers) -> Vector:
-    """The torque of the modes on the body (N m)."""
+    """Return the torque of the modes on the body (N m)."""
     return subtract(weighted(springs(state, params), params.coupling), cross(body.rate, momentum(state, params)))
 
 
@@ -120,12 +120,12 @@ def rates(state: State, command: Any, body: Any, acceleration: Vector, params: N
 
 
 def momentum(state: State, params: Numbers) -> Vector:
-    """The modes' angular momentum relative to the body (N m s)."""
+    """Return the modes' angular momentum relative to the body (N m s)."""
     return weighted(state.rate, params.coupling)
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.deflection, state.rate)
 
 

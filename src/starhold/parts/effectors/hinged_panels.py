@@ -269,7 +269,7 @@ def _accelerations(swung: list[_Swung], moments: list[Scalar], params: Numbers) 
 
 
 def reaction(state: State, command: Any, body: Any, params: Numbers) -> Vector:
-    """The torque of the panels on the body (N m)."""
+    """Return the torque of the panels on the body (N m)."""
     swung, shift = _swung(state, params)
     w, moving = body.rate, _moving(swung, params)
     carried = add(apply(inertia_change(state, params), w), momentum(state, params))
@@ -322,7 +322,7 @@ def rates(state: State, command: Any, body: Any, acceleration: Vector, params: N
 
 
 def momentum(state: State, params: Numbers) -> Vector:
-    """The panels' angular momentum relative to the body (N m s)."""
+    """Return the panels' angular momentum relative to the body (N m s)."""
     total = ZERO
     for one in _swung(state, params)[0]:
         total = add(total, scale(one.rate, one.turned))
@@ -330,7 +330,7 @@ def momentum(state: State, params: Numbers) -> Vector:
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.angle, state.rate)
 
 

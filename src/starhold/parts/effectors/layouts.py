@@ -8,7 +8,7 @@ from starhold.algebra.vector import Vector
 
 
 def three_orthogonal() -> tuple[Vector, ...]:
-    """Three wheels along the body axes."""
+    """Return three wheels along the body axes."""
     return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 

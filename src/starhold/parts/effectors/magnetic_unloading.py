@@ -63,7 +63,7 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     mounted = as_built.turn_of(params.mounting_error)
     return Numbers(*params[:4], magnetic_field.prepared(params.epoch, period), mounted)
 
@@ -84,7 +84,7 @@ remember, reaction, rates, momentum = (
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.dipole, reaction(state, command, body, params))
 
 

@@ -71,7 +71,7 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     field, mounted = magnetic_field.prepared(params.epoch, period), as_built.turn_of(params.mounting_error)
     return Numbers(params.dipole_limit, params.limited, field, mounted)
 
@@ -118,7 +118,7 @@ def _filled(dipole: Scalar, limit: Scalar) -> Scalar:
 
 
 def reaction(state: State, command: Any, body: Any, params: Any) -> Vector:
-    """The torque on the body (N m)."""
+    """Return the torque on the body (N m)."""
     return cross(state.dipole, to_body(body.attitude, state.field))
 
 
@@ -133,12 +133,12 @@ def momentum(state: State, params: Any) -> Vector:
 
 
 def applied(state: State, command: Any, body: Any, params: Numbers) -> Vector:
-    """The torque on the body (N m)."""
+    """Return the torque on the body (N m)."""
     return reaction(state, command, body, params)
 
 
 def record(state: State, command: Any, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     return Sample(state.dipole)
 
 

@@ -169,7 +169,7 @@ def _share(firing: Scalar, left: Scalar, substep: Scalar) -> Scalar:
 
 
 def reaction(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
-    """The torque on the body (N m)."""
+    """Return the torque on the body (N m)."""
     return as_built.in_body(params.mounted, times(params.torque, command))
 
 
@@ -194,13 +194,13 @@ def momentum(state: State, params: Numbers) -> Vector:
 
 
 def applied(state: State, command: Vector, body: Any, params: Numbers) -> Vector:
-    """The mean torque of the control period that begins (N m)."""
+    """Return the mean torque of the control period that begins (N m)."""
     given = scale(1.0 / params.period, times(params.torque, times(state.firing, state.left)))
     return as_built.in_body(params.mounted, given)
 
 
 def record(state: State, command: Vector, body: Any, params: Numbers) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     x, y, z = state.impulse
     return Sample(times(state.firing, state.left), state.impulse, params.propellant * (x + y + z))
 

@@ -51,7 +51,7 @@ def checked_axes(axes: Sequence[Sequence[float]]) -> Array:
 
 
 def checked_column(name: str, value: Any, count: int, least: float | None, infinite: bool = False) -> tuple[float, ...]:
-    """Return a number for each wheel, from one for each or one for all; `least` None requires positive numbers. Raise
+    """Return a number for each wheel, from one for each or one for all; `least` None requires positive numbers. Raise Raise
     ValueError if one is out of range."""
     given = np.asarray(value, dtype=float)
     if given.shape not in ((), (count,)):

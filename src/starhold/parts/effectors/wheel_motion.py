@@ -88,12 +88,12 @@ def _sides(axis: Vector) -> tuple[Vector, Vector]:
 
 
 def has_friction(wheels: Wheels) -> bool:
-    """Whether a bearing has friction of any kind."""
+    """Return whether a bearing has friction of any kind."""
     return any((*wheels.viscous, *wheels.coulomb, *wheels.sticking))
 
 
 def without_friction(wheels: Wheels) -> Wheels:
-    """The wheels on ideal bearings, and balanced."""
+    """Return the wheels on ideal bearings, and balanced."""
     none = (0.0,) * len(wheels.axes)
     return wheels._replace(viscous=none, coulomb=none, sticking=(), stribeck_speed=(), unbalanced=())
 
@@ -129,7 +129,7 @@ def at_top_speed(wheels: Wheels) -> Wheels:
 
 
 def top_speeds(wheels: Wheels) -> Numbers:
-    """The speeds (rad/s) at the momentum limits."""
+    """Return the speeds (rad/s) at the momentum limits."""
     return tuple(limit / inertia for limit, inertia in zip(wheels.momentum_limit, wheels.inertia, strict=True))
 
 

@@ -135,7 +135,7 @@ def command(applied: Vector, params: Wheels) -> Numbers:
 
 
 def reaction(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
-    """The torque of the wheels on the body (N m)."""
+    """Return the torque of the wheels on the body (N m)."""
     h, rate = state.momentum, body.rate
     torque = on_body(motor(command, h, rate, params, _rubs(params)), h, rate, params)
     return add(torque, shaken(state.angle, h, rate, params)) if params.unbalanced else torque
@@ -149,7 +149,7 @@ def rates(state: State, command: Numbers, body: Any, acceleration: Vector, param
 
 
 def momentum(state: State, params: Wheels) -> Vector:
-    """The rotors' momentum in body axes (N m s)."""
+    """Return the rotors' momentum in body axes (N m s)."""
     return wheel_momentum(state.momentum, params)
 
 
@@ -159,7 +159,7 @@ def measured_momentum(state: State, params: Wheels) -> Vector:
 
 
 def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
-    """The recorded quantities."""
+    """Return the recorded quantities."""
     h = state.momentum
     return Sample(
         h, motor(command, h, body.rate, params), command, available(command, h, limited(command, h, body.rate, params))
@@ -167,7 +167,7 @@ def record(state: State, command: Numbers, body: Any, params: Wheels) -> Sample:
 
 
 def applied(state: State, command: Numbers, body: Any, params: Wheels) -> Vector:
-    """The torque of motors and friction on the body (N m)."""
+    """Return the torque of motors and friction on the body (N m)."""
     return scale(-1.0, weighted(motor(command, state.momentum, body.rate, params), params.axes))
 
 
@@ -289,13 +289,13 @@ def _fraction(x: Scalar) -> Scalar:
 
 
 def on_body(momentum_rate: Numbers, momentum: Numbers, rate: Vector, wheels: Wheels) -> Vector:
-    """The torque of the wheels on the body (N m): -sum a_i h_i' - rate x sum a_i h_i."""
+    """Return the torque of the wheels on the body (N m): -sum a_i h_i' - rate x sum a_i h_i."""
     turning = add(weighted(momentum_rate, wheels.axes), cross(rate, wheel_momentum(momentum, wheels)))
     return scale(-1.0, turning)
 
 
 def wheel_momentum(momentum: Numbers, wheels: Wheels) -> Vector:
-    """The wheels' momentum in body axes (N m s): sum a_i h_i."""
+    """Return the wheels' momentum in body axes (N m s): sum a_i h_i."""
     return weighted(momentum, wheels.axes)
 
 

@@ -28,7 +28,7 @@ class Params(NamedTuple):
 
 
 def torque(state: Any, params: Params, craft: Craft, memory: Any) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return to_body(state.attitude, params.torque) if params.axes else params.torque
 
 

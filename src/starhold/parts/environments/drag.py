@@ -186,7 +186,7 @@ def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> V
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     course = to_body(state.attitude, memory.course)
     # All forces point against the velocity relative to the air.
     shown = cosines(params.normals, course)

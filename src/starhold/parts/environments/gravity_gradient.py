@@ -28,7 +28,7 @@ Params = NoParams
 
 
 def torque(state: Any, params: NoParams, craft: Craft, memory: Any) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     n2, inverse_square = attraction(state.position, craft)
     return gravity_gradient(to_body(state.attitude, state.position), 3.0 * n2 * inverse_square, craft)
 

@@ -32,12 +32,12 @@ def remember(params: Params) -> Vector:
 
 
 def update(memory: Vector, state: Any, params: Params, dice: Dice, step: int) -> Vector:
-    """The torque of the control step that begins (N m)."""
+    """Return the torque of this control step (N m)."""
     return dice.vector(0, params.deviation)
 
 
 def torque(state: Any, params: Params, craft: Any, memory: Vector) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return memory
 
 

@@ -43,7 +43,7 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     return Numbers(params.dipole, magnetic_field.prepared(params.epoch, period))
 
 
@@ -58,7 +58,7 @@ def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return cross(params.dipole, to_body(state.attitude, memory))
 
 

@@ -82,7 +82,7 @@ class Memory(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an impossible plate, a bad epoch, and a force without a mass."""
+    """Return the numbers of a flight. Raise ValueError for an impossible plate, a bad epoch, and a force without a mass."""
     shares = [row[7:] for row in params.plates]
     for number, (specular, diffuse) in enumerate(shares, 1):
         if not (specular >= 0.0 and diffuse >= 0.0 and specular + diffuse <= 1.0):
@@ -136,7 +136,7 @@ def acceleration(state: Any, params: Numbers, craft: Craft, memory: Memory) -> V
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Memory) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
 
     def pushed(_: Vector) -> tuple[Vector]:
         toward, seen, squares = _seen(state, params, memory)

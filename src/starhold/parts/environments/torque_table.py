@@ -73,7 +73,7 @@ def update(memory: Vector, state: Any, params: Numbers, dice: Dice, step: int) -
 
 
 def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
-    """Torque on the body (N m, body axes)."""
+    """Return the torque on the body (N m, body axes)."""
     return to_body(state.attitude, memory) if params.axes else memory
 
 

@@ -49,13 +49,9 @@ class Params(NamedTuple):
     """The epoch, the standard deviations of directions that give the weights, and the least angle between two of them."""
 
     epoch: Annotated[Date, EPOCH] = START
-    sun: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation of its direction")] = math.radians(
-        0.5
-    )
-    field: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation of its direction")] = math.radians(
-        1.0
-    )
-    nadir: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation of the nadir")] = math.radians(0.5)
+    sun: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation")] = math.radians(0.5)
+    field: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation")] = math.radians(1.0)
+    nadir: Annotated[float, Parameter("rad", above=0.0, text="assumed standard deviation")] = math.radians(0.5)
     apart: Annotated[float, APART] = math.radians(5.0)
     ephemeris: Annotated[int, EPHEMERIS] = 0
 
@@ -68,7 +64,7 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     # Only ratios of weights matter; the largest is 1.
     least = min(params.sun, params.field, params.nadir)
     return Numbers(known_from(params, params.epoch, params.ephemeris, least), math.sin(params.apart) ** 2)

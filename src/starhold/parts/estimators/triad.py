@@ -58,7 +58,7 @@ class Numbers(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known."""
     light = sun.prepared(params.epoch, params.ephemeris)
     return Numbers(light, magnetic_field.prepared(params.epoch), math.sin(params.apart) ** 2)
 

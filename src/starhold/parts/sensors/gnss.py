@@ -47,7 +47,7 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for too long a delay."""
+    """Return the numbers of a flight. Raise ValueError for too long a delay."""
     return Numbers(params.position, params.velocity, as_built.late_by(params.delay, period, params.jitter))
 
 

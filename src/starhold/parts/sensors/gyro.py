@@ -100,7 +100,7 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a control step. ValueError for too long a delay."""
+    """Return the numbers of a control step. Raise ValueError for too long a delay."""
     walk = params.bias_walk * math.sqrt(period / HOUR)
     stays, size = math.exp(-period / params.correlation_time), params.bias_instability
     return Numbers(

@@ -78,8 +78,8 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for an epoch at which the field is not known, for a bad outage and too long a
-    delay."""
+    """Return the numbers of a flight. Raise ValueError for an epoch at which the field is not known, for a bad outage and
+    too long a delay."""
     field, outage = magnetic_field.prepared(params.epoch, period), in_steps(params.outage, period, params.interval)
     return Numbers(
         _deviation(params, period),

@@ -75,8 +75,8 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """The numbers of a flight. ValueError for a boresight without direction, a bad epoch, a bad outage and too long a
-    delay."""
+    """Return the numbers of a flight. Raise ValueError for a boresight without direction, a bad epoch, a bad outage and too
+    long a delay."""
     cosine = field_cosine(params.half_angle)
     outage = in_steps(params.outage, period, params.interval)
     axes = as_built.axes_of(params.mounting_error, ZERO)
