@@ -102,7 +102,7 @@ static const parameters_t parameters = {
 
 /* -------------------------------- parts.targets.inertial -------------------------------- */
 
-/* The attitude, at rest. */
+/* Return the attitude, at rest. */
 static goal_t inertial_goal(const inertial_params_t *params)
 {
     return (goal_t){.attitude = params->attitude};

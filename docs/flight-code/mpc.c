@@ -111,8 +111,8 @@ typedef struct {
     double scalar1;
 } share_result_t;
 
-/* The limits of a move v: |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, where
-   low <= v <= high. */
+/* Limits of a move v: |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, low <= v <=
+   high. */
 typedef struct {
     vector_t centre;
     double bound;
@@ -208,7 +208,7 @@ typedef struct {
 } interior_result_t;
 
 /* Result of a run: the number of Riccati sweeps, whether the optimum was reached, and whether limits are
-   active in it. */
+   active. */
 typedef struct {
     double sweeps;
     bool solved;
@@ -254,7 +254,7 @@ enum {
 
 /* -------------------------------- parts.targets.inertial -------------------------------- */
 
-/* The attitude, at rest. */
+/* Return the attitude, at rest. */
 static goal_t inertial_goal(const inertial_params_t *params)
 {
     return (goal_t){.attitude = params->attitude};
@@ -1215,7 +1215,7 @@ static vector_t slack(const limits_t *limits, vector_t v)
         0.5 * (limits->bound - d.z) * (limits->bound + d.z)};
 }
 
-/* Return a symmetric matrix with the curvature of the barrier added, and the barrier's gradient: the
+/* Return a symmetric matrix plus the curvature of the barrier, and the barrier's gradient: the
    interior-point step. */
 static repelled_result_t repelled(const limits_t *limits, vector_t v, vector_t multipliers, double barrier,
     doubles6_t m)
@@ -2152,8 +2152,8 @@ static void begin(double *numbers, double barrier)
     }
 }
 
-/* Return the share of the step that keeps slacks and multipliers positive; the steps of the multipliers
-   are stored in `trial`. */
+/* Return the share of the step that keeps slacks and multipliers positive; put the multipliers' steps into
+   `trial`. */
 static double length_1(double *numbers, double barrier)
 {
     const limits_t bounds = limits_1(numbers);

@@ -216,7 +216,7 @@ static quaternion_t nearer(quaternion_t q, quaternion_t other)
 
 /* -------------------------------- parts.targets.orbital --------------------------------- */
 
-/* The frame at this position and velocity. */
+/* Return the frame at this position and velocity. */
 static goal_t orbital_goal(const state_t *state, quaternion_t before)
 {
     const vector_t h = cross(state->position, state->velocity);

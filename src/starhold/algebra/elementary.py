@@ -232,8 +232,7 @@ def sin(x: Scalar) -> Scalar:
 
 @whole(_symbolic("atan2"), lambda y, x: x / (x * x + y * y), lambda y, x: -y / (x * x + y * y))
 def atan2(y: Scalar, x: Scalar) -> Scalar:
-    """Return the angle (rad) from the first axis to (x, y), to 1 unit, with the sign of y; zeros and infinities are treated
-    as in C."""
+    """Return the angle (rad) from the first axis to (x, y), to 1 unit, with the sign of y; zeros and infinities as in C."""
     across, along = absolute(y) + 0.0, absolute(x) + 0.0
     steep = less(along, across)
     small, large = where(steep, along, across), where(steep, across, along)

@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 BITS = 256
-"""Working precision in bits: each squaring doubles the rounding error, and there is one per binary digit of the matrix
-norm."""
+"""Working precision in bits: each squaring doubles the rounding error, once per binary digit of the norm."""
 
 
 def exponential(a: Array) -> Array:

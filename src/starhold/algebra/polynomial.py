@@ -25,8 +25,7 @@ Monomial: TypeAlias = tuple[str, ...]
 
 
 def exact(number: Any) -> Coefficient:
-    """Return a number as a rational of the same value, and a ball as it is. Raise ValueError for numbers that are not
-    finite."""
+    """Return a number as a rational of the same value, a ball as it is. Raise ValueError unless it is finite."""
     if isinstance(number, (fmpq, arb)):
         return number
     try:

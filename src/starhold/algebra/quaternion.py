@@ -47,8 +47,7 @@ def normalise(q: Quaternion) -> Quaternion:
 
 
 def renormalise(q: Quaternion) -> Quaternion:
-    """Restore a quaternion of nearly unit length by one Newton step: an error e of |q|^2 becomes an error 3/8 e^2 of
-    |q|."""
+    """Restore a quaternion of nearly unit length by a Newton step: an error e of |q|^2 leaves 3/8 e^2 in |q|."""
     return stretch(1.5 - 0.5 * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), q)
 
 

@@ -37,8 +37,8 @@ def modified_rodrigues(q: Quaternion, factor: Scalar = 1.0) -> Vector:
 
 
 def short_turn(half: Vector) -> Quaternion:
-    """Return the quaternion of half a rotation vector (rad). The error is below |half|^7 / 5000, which is below rounding up
-    to 0.02 rad."""
+    """Return the quaternion of half a rotation vector (rad). Its error, |half|^7 / 5000, is below rounding up to 0.02
+    rad."""
     square = dot(half, half)
     scalar = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0)))
     x, y, z = scale(1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0)), half)

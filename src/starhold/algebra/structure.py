@@ -27,8 +27,7 @@ def move(state: _State, step: float, rate: Any) -> _State:
 
 
 def runge_kutta(slope: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the substep function of the classical fourth-order Runge-Kutta method for d(state)/dt = slope(state,
-    *more)."""
+    """Return the substep of the classical fourth-order Runge-Kutta method for d(state)/dt = slope(state, *more)."""
 
     def advance(state: Any, h: Any, *more: Any) -> Any:
         a = slope(state, *more)

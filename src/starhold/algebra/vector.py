@@ -94,8 +94,7 @@ def gyroscopic_torque(m: Matrix | Vector, a: Vector) -> Vector:
 
 
 def solve(m: Matrix | Vector, a: Vector) -> Vector:
-    """Return the x with m x = a; not defined for a singular matrix. A vector in place of the matrix stands for a diagonal
-    one."""
+    """Return the x with m x = a; not defined for a singular matrix. A vector stands for a diagonal matrix."""
     rows: Any = m
     return (a[0] / rows[0], a[1] / rows[1], a[2] / rows[2]) if _is_diagonal(m) else apply(inverse(rows), a)
 
@@ -149,8 +148,7 @@ def diagonal(a: Vector) -> Matrix:
 
 
 def along_axis(axis: Vector, along: Scalar, across: Scalar) -> Matrix:
-    """Return the symmetric matrix that multiplies vectors along a unit vector by `along`, and those across it by
-    `across`."""
+    """Return the symmetric matrix that multiplies vectors along a unit vector by `along`, others across it by `across`."""
     more = along - across
     return (
         add((across, 0.0, 0.0), scale(more * axis[0], axis)),

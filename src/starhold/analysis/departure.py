@@ -209,8 +209,7 @@ def _misled(claim: Claim, span: Span) -> list[Departure]:
 
 
 def _misreadings(claim: Claim, span: Span) -> list[Array]:
-    """Return for each estimate a mask of the samples at which its error exceeds the bound claimed for a share of
-    flights."""
+    """Return for each estimate a mask of samples at which its error exceeds the bound claimed for a share of flights."""
     if not claim.numbers.get("share"):
         return []
     misread = list[Array]()

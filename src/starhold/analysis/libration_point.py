@@ -105,8 +105,7 @@ class Noted(NamedTuple):
 def make_meter(
     steps: int, period: float, limit: str, units: Units, goal: CircleGoal | EquilibriumGoal, tolerance: float
 ) -> Meter:
-    """Return the meter of flights of `steps` control periods (scaled), or of as many samples at such intervals, in SI
-    units.
+    """Return the meter of flights of `steps` control periods (scaled), or of as many samples at such intervals, in SI.
 
     limit: how the control is limited; tolerance: scaled distance that counts as near."""
     circle = isinstance(goal, CircleGoal)
@@ -160,8 +159,7 @@ def measure(run: Recording, units: Units, goal: CircleGoal | EquilibriumGoal, to
 
 @cache
 def _note(limit: str, circle: bool, late: bool) -> Any:
-    """Return the equation of the notes, before the last mark or from it on; the same function for all loops that one kernel
-    serves."""
+    """Return the equation of the notes, before the last mark or from it on; the same for all loops of one kernel."""
 
     def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, goal: Goal) -> Noted:
         position, control, command = quantities["position"], quantities["control"], quantities["command"]

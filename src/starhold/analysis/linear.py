@@ -30,8 +30,7 @@ DISTURBANCE = tuple(f"disturbance_{axis}" for axis in AXES)
 MOST_HELD = 1000
 """The longest delay in control periods."""
 CALLS, SOLVED = 30, 10
-"""The number of calls of the law at rest in which its memory settles, and of linear solutions for numbers that still
-change."""
+"""Calls of the law at rest in which its memory settles, and linear solutions for numbers that still change."""
 LONG = 2**40
 """The number of calls after which transients must have decayed."""
 SETTLED = 1e-9

@@ -105,8 +105,7 @@ def _about(linear: Linear, k: int, measured: Response) -> Margins:
 
 
 def _log_size(values: Any) -> Any:
-    """Return the logarithm of the modulus of numbers, some of which may be 0, because a law need not act about every
-    axis."""
+    """Return the logarithm of the modulus of numbers, which may be 0, because a law need not act about every axis."""
     return np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
 
 

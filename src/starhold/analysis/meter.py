@@ -186,8 +186,7 @@ class Meter:
         return metrics
 
     def program(self, columns: Columns, limit: float) -> Program:
-        """Return the program of the notes from the last of `marks` on, for samples with these columns; see
-        `over_samples`."""
+        """Return the program of the notes from the last mark on, for samples with these columns; see `over_samples`."""
         return over_samples(self.notes[1], self.first, (self.numbers, limit), columns)
 
     def _late(self, metric: Metric, instants: Array) -> NDArray[np.bool_]:
@@ -289,8 +288,7 @@ def recorded_of(loop: ClosedLoop) -> dict[str, Quantity]:
 
 
 def _recorded(parts: Composition, decided: Any, step: Any, setup: Any) -> Iterator[Any]:
-    """Return the recorded quantities of effectors, from the last to the first, and of the body, whose names take
-    precedence."""
+    """Return the recorded quantities of effectors, the last first, and of the body, whose names take precedence."""
     body, records, _, _ = make_step(parts).sample(decided, step, setup)
     return reversed((body, *records))
 

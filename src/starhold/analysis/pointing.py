@@ -41,8 +41,7 @@ class Figures(NamedTuple):
 
 def indices(errors: Array, length: int, apart: int) -> dict[str, Array]:
     """Return the vectors of each index of PERFORMANCE, (runs, number, 3). errors: (runs, instants, 3); length: instants of
-    a window; apart: instants from the start of one window to that of the other, for drift. Raise ValueError if they do not
-    fit."""
+    a window; apart: instants between the starts of the two windows of drift. Raise ValueError if they do not fit."""
     instants = errors.shape[1]
     if min(length, apart) < 1 or length + apart > instants:
         raise ValueError(f"windows of {length} instants, {apart} apart, among {instants}")

@@ -271,8 +271,7 @@ def measure(
 
 @cache
 def _note(limit: str, still: bool, late: bool, overshoot: bool, iterations: bool) -> Any:
-    """Return the equation of the notes, before the last quarter or in it; the same function for all loops that one kernel
-    serves."""
+    """Return the equation of the notes, before the last quarter or in it; the same for all loops of one kernel."""
 
     def note(seen: Noted, quantities: Mapping[str, Any], now: Any, most_command: Any, bounds: Bounds) -> Noted:
         q, torque, command = (quantities[name] for name in ("attitude_error", "torque", "command"))

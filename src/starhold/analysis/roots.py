@@ -1,5 +1,4 @@
-"""Searches over the initial angle for the root of the modal law with the fastest slew within limits, and fits the
-result."""
+"""Searches for the root of the modal law with the fastest slew within limits, over the initial angle, and fits it."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -61,8 +60,7 @@ class Unmet(NamedTuple):
 
 
 class TwoPieceFit(NamedTuple):
-    """The fit c exp(d angle) + e (1/s; angle in rad), with one triple c, d, e up to the split (rad) and another beyond
-    it."""
+    """The fit c exp(d angle) + e (1/s; angle in rad), with c, d, e up to the split (rad) and beyond it."""
 
     below: tuple[float, float, float]
     above: tuple[float, float, float]

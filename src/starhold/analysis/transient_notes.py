@@ -13,8 +13,7 @@ from starhold.analysis.meter import CROSSING, Metric
 
 
 class Ends(NamedTuple):
-    """The ends of a transient: the inverse of sin^2(angle / 2), and of rate^2 ((rad/s)^-2); and the time between notes
-    (s)."""
+    """The ends of a transient: inverses of sin^2(angle / 2) and of rate^2 ((rad/s)^-2); and the time between notes (s)."""
 
     angle: float
     rate: float

@@ -115,8 +115,7 @@ def falling(
 
 
 def _fly_to_surface(loop: ClosedLoop, certificate: Certificate, claim: Claim, flights: int, seed: int) -> Trial:
-    """Fly from random states with s.Js/2 <= level, long enough to reach the surface without external torque, and return the
-    trial."""
+    """Fly from random states with s.Js/2 <= level long enough to reach the undisturbed surface; return the trial."""
     J, programs = tensor(loop.craft.inertia), claim.programs
     least, greatest = (float(x) for x in np.linalg.eigvalsh(J)[[0, -1]])
     free = replace(_undisturbed(loop, certificate), sign_policy="as_published")
@@ -253,8 +252,7 @@ def stable_period(loop: ClosedLoop) -> float | None:
 
 
 def _slopes(loop: ClosedLoop, step: float) -> Array:
-    """Return the derivative (3, 6) of the torque with respect to rate and rotation at rest, from differences of this
-    size."""
+    """Return the derivative (3, 6) of the torque by rate and rotation at rest, from differences of size `step`."""
     steps = [tuple(map(float, step * e)) for e in np.eye(3)]
     pairs = [(ZERO, x) for x in steps] + [(x, ZERO) for x in steps]
     negative = [tuple(tuple(-x for x in part) for part in pair) for pair in pairs]

@@ -12,8 +12,7 @@ from starhold.parts.contract import IS_VALID
 
 
 class Validity(NamedTuple):
-    """Notes on instants without a valid estimate: their number, the length of the present run of them, and the longest
-    run."""
+    """Notes on instants without a valid estimate: their number, the length of the present run, and the longest run."""
 
     invalid: float
     row: float

@@ -226,8 +226,7 @@ def _numbers(metadata: dict[str, str]) -> int:
 
 
 class Lines:
-    """The lines of a message that are neither empty nor comments, in order; `number` is the number of the last line
-    read."""
+    """The lines of a message that are neither empty nor comments, in order; `number` is that of the last line read."""
 
     def __init__(self, text: str) -> None:
         self.number = 0

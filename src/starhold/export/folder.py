@@ -123,8 +123,7 @@ def _make(folder: Path) -> None:
 
 
 def write(exported: Exported, folder: Path, scenario: str, law: str) -> None:
-    """Write the files into an existing folder, each atomically, the manifest last. Raise InputError if one cannot be
-    written."""
+    """Write the files into an existing folder, each atomically, the manifest last. Raise InputError if one fails."""
     for name, text in exported.files.items():
         if Path(name).parent != Path():
             _make(folder / Path(name).parent)

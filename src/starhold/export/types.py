@@ -141,8 +141,7 @@ def free(name: str) -> str:
 
 
 def title(cls: Any) -> str:
-    """Return the name of a struct, that of its class; parts have classes of the same names, to which the part's name is
-    added."""
+    """Return the name of a struct, that of its class; classes of parts with equal names get the part's name too."""
     name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower().strip("_")
     ambiguous = name in ("params", "memory", "numbers", "reading") or (name == "state" and ".bodies." not in cls.__module__)
     return f"{cls.__module__.rpartition('.')[2]}_{name}" if ambiguous else name

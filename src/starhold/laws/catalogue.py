@@ -184,8 +184,7 @@ def as_law(module: ModuleType, path: Path | None = None) -> Law:
 
 
 def _command_of(body: Any, module: ModuleType, path: Path | None) -> str:
-    """Return the name of the command of a law's body. An unknown body may be in a file of that name beside the law's
-    file."""
+    """Return the name of the command of a law's body. An unknown body may be in a file of that name beside the law's."""
     try:
         return parts.find("body", body).module.COMMAND
     except (KeyError, TypeError):

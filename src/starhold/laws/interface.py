@@ -30,8 +30,7 @@ Claim: TypeAlias = Literal["global", "almost-global", "local", "none"]
 
 @dataclass(frozen=True)
 class Card(contract.Card):
-    """The card of a law: title, formula, sources, assumptions, the stability that it claims, and facts that its users
-    need."""
+    """The card of a law: title, formula, sources, assumptions, claimed stability, and facts that its users need."""
 
     claims: Claim
     """The claimed stability: global, almost-global, local or none; any claim needs assumptions."""

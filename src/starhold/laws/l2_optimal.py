@@ -50,8 +50,7 @@ FORMS: dict[str, Any] = {"best": Best}
 
 
 def design(plant: Libration, spec: Best) -> Gains:
-    """Return gains with rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). Raise ValueError if C is less than 2
-    Omega^2."""
+    """Return gains with rate = sqrt(C - 2 Omega^2), slope = sqrt(Omega^2 + 2 C). Raise ValueError if C < 2 Omega^2."""
     rates = least_rate(plant), math.sqrt(plant.rate**2 + 2.0 * plant.stiffness)
     return Gains(spec.radius, rates[0], spec.alpha, spec.beta, rates[1], spec.pull, spec.boundary_layer)
 

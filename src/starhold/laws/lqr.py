@@ -112,8 +112,7 @@ lyapunov = matrix_pd.lyapunov
 def design(craft: Craft, spec: FormI | FormII | FormIII | Numeric) -> Gains:
     """Return the gains of a form. Raise ValueError if the weights or the inertia do not allow it.
 
-    The gains of forms I, II and III are exactly symmetric, and so are those of numeric weights if they are symmetric in
-    theory."""
+    Gains that are symmetric in theory, such as those of forms I, II and III, are exactly symmetric."""
     inertia, share = tensor(craft.inertia), 0.0
     with np.errstate(all="ignore"):
         if isinstance(spec, FormI):

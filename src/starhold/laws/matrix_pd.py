@@ -79,8 +79,7 @@ def lyapunov(measurement: Measurement, gains: Gains, craft: Craft) -> Scalar:
 
 
 def examples() -> list[Gains]:
-    """Return gains for any inertia, with a stiffness that is a multiple of the identity (b alone), and a diagonal or full
-    damping."""
+    """Return gains for any inertia: stiffness a multiple of the identity (b alone), and a diagonal or full damping."""
     stiffness = (0.009, 0.009, 0.009)
     full = ((0.09, 0.01, 0.0), (0.01, 0.12, 0.02), (0.0, 0.02, 0.15))
     return [Gains((0.09, 0.12, 0.15), stiffness), Gains(full, stiffness)]

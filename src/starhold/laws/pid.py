@@ -50,8 +50,7 @@ def check(gains: Gains, craft: Craft) -> None:
     """Raise ValueError if the linear loop is not stable.
 
     About a principal axis of moment J its characteristic polynomial is J s^3 + k_rate s^2 + k_attitude/2 s + k_integral/2;
-    by Routh's criterion it is stable if k_rate k_attitude > J k_integral, which is most restrictive for the largest
-    moment."""
+    by Routh's criterion it is stable if k_rate k_attitude > J k_integral, hardest for the largest moment."""
     most = gains.k_rate * gains.k_attitude / principal_moments(craft.inertia)[2]
     if not gains.k_integral < most:
         allowed = f"k_rate k_attitude / J_max = {most:.6g} N m/s"

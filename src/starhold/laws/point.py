@@ -16,8 +16,7 @@ MODELS = ("linear", "nonlinear")
 
 
 def least_rate(plant: Libration) -> float:
-    """Return the rate (scaled) at which a circle demands the least control, sqrt(C - 2 Omega^2). Raise ValueError if there
-    is none."""
+    """Return the rate (scaled) of a circle's least demand, sqrt(C - 2 Omega^2). Raise ValueError if there is none."""
     if plant.stiffness <= 2.0 * plant.rate**2:
         raise ValueError(f"no rate has a least demand where C = {plant.stiffness:g} is not above 2")
     return plant.rate * best_rate(plant)

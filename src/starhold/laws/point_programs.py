@@ -32,7 +32,6 @@ def point_programs(law: Law, gains: Any, craft: Libration, full: bool, limit: st
 
 
 def point_subject(gains: Any, craft: Libration, known: Libration) -> dict[str, str]:
-    """Return the exact numbers that the programs may read: the gains, the craft's numbers, and those of the law's nominal
-    model."""
+    """Return the exact numbers that the programs may read: the gains, the craft, and the law's nominal model."""
     named = [*labelled("gains", gains), *labelled("plant", craft), *labelled("craft", known)]
     return {name: x.hex() for name, x in named if isfinite(x)}

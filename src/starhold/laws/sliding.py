@@ -48,7 +48,7 @@ class Gains(NamedTuple):
 class Layered(NamedTuple):
     """The form takes the natural frequency and damping ratio of the linear loop in a boundary layer, which has two real
     roots, those of the surface and of the layer. It is exact about every axis for a diagonal inertia, whose reaching
-    torques are in proportion to the moments; else it is exact about the axis of the largest moment, and faster about the
+    torques are in proportion to the moments; else exact about the axis of the largest moment, and faster about the
     others."""
 
     bandwidth: Annotated[float, Gain("rad/s", above=0.0, plain=(1e3, "deg/s"), text="lowest natural frequency of all axes")]

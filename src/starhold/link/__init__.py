@@ -1,2 +1,1 @@
-"""A plant to which flight software connects: one protocol, over a network, a serial line or the pipes of a child
-process."""
+"""A plant to which flight software connects: one protocol, over a network, a serial line or pipes."""

@@ -218,8 +218,7 @@ class Plant:
 
 
 def status(plant: Plant) -> str:
-    """Return a summary of a flight in real time in one line: the current step, the latest latencies and the missed
-    periods."""
+    """Return one line on a flight in real time: the current step, the latest latencies and the missed periods."""
     latest = plant.latencies[-KEPT:]
     latency = f"{1e3 * np.median(latest):.3g} ms, at most {1e3 * max(latest):.3g} ms" if latest else "none yet"
     late = f"plant late by {1e3 * plant.behind:.3g} ms"

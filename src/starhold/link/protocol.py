@@ -184,8 +184,7 @@ class Decoder:
 
 
 def _sizes(number: int) -> tuple[int, ...]:
-    """Return the allowed payload lengths of a kind of message from flight software; none for a kind that it does not
-    send."""
+    """Return the allowed payload lengths of a kind of message from flight software; none if it does not send it."""
     rule = RULES.get(cast(Kind, number))
     return () if rule is None or not rule.software else tuple(8 * count for count in rule.counts)
 

@@ -95,8 +95,7 @@ def fly_plainly(loop: ClosedLoop, steps: int, run: int | None = None) -> Any:
 
 
 class Arguments:
-    """The numbers in the form of a kernel's memories: those that all lanes share, those that differ between lanes, and
-    tables."""
+    """The numbers in a kernel's memories: those that all lanes share, those that differ between lanes, and tables."""
 
     def __init__(self, *values: Any) -> None:
         self.values = values
@@ -190,7 +189,7 @@ def make_program(kind: Callable[..., Program], parts: Composition, *arguments: A
 def make_kernel(
     kind: Callable[..., Program], parts: Composition, width: int, *arguments: Any, passes: bool | None = None
 ) -> Kernel:
-    """Return the kernel of a program kind(step, *arguments), compiled once for all arguments of the same form. passes: see
+    """Return the kernel of a program kind(step, *arguments), compiled once for arguments of one form. passes: see
     `load`."""
     key = (kind, parts, width, passes, form(arguments))
     if key not in _KERNELS:

@@ -63,8 +63,7 @@ def limit(unit: str) -> Parameter:
 
 
 def is_given(*numbers: Any) -> bool:
-    """Return whether any of these is nonzero; a number that is being recorded counts as nonzero, because runs may draw
-    it."""
+    """Return whether any of these is nonzero; a recorded number counts as nonzero, because runs may draw it."""
     return any(not isinstance(number, float | int) or number for number in leaves(numbers))
 
 
@@ -132,8 +131,7 @@ class Waiting(NamedTuple):
 
 
 def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
-    """Return the dead time and the jitter of a sensor, () for neither. Raise ValueError for a dead time that is too
-    long."""
+    """Return dead time and jitter of a sensor, () for neither. Raise ValueError for a dead time that is too long."""
     if delay > LONGEST * period:
         raise ValueError(f"the delay must be at most {LONGEST} control periods, {LONGEST * period:g} s")
     steps = delay / period
@@ -144,8 +142,7 @@ def late_by(delay: float, period: float, jitter: float = 0.0) -> Late:
 
 
 def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
-    """Return the initial memory of a delayed sensor, with the sensor's own: before the start these fields of the state were
-    constant."""
+    """Return the initial memory of a delayed sensor, with the sensor's own: before the start these fields were constant."""
     count = late.periods + bool(late.share or late.jitter) if late else 0
     return Waiting(sensor, (tuple(getattr(state, name) for name in names),) * count) if late else sensor
 

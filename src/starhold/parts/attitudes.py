@@ -13,16 +13,15 @@ from starhold.algebra.vector import IDENTITY, ZERO, Matrix, Vector, add, apply, 
 
 
 def attitudes_of(readings: Any) -> list[tuple[Quaternion, Truth]]:
-    """Return each attitude among an estimator's readings, and whether it is new; without such a flag it is new at each
-    step."""
+    """Return each attitude among an estimator's readings, and whether it is new: without a flag, at each step."""
     shown = [one for one in getattr(readings, "every", (readings,)) if hasattr(one, "attitude")]
     return [(one.attitude, less(0.5, getattr(one, "attitude_is_new", 1.0))) for one in shown]
 
 
 def together(seen: Sequence[tuple[Quaternion, Truth]], weights: Sequence[Matrix]) -> tuple[Quaternion, Matrix, Truth]:
     """Return the most likely attitude given those that are new, the covariance of its error (rad2, body axes), and whether
-    one is new; weights: the inverse covariances of the attitudes' errors. For a filter this is equivalent to using them one
-    after the other."""
+    one is new; weights: the inverse covariances of the attitudes' errors. For a filter this equals using them one after the
+    other."""
     (near, new), *others = seen
     for attitude, fresh in others:
         near, new = chosen(new, near, attitude), either(new, fresh)

@@ -114,13 +114,11 @@ def is_blind(state: Any, cones: Cones, step: int) -> Truth:
 
 
 def _by_limb(position: Vector, along: Vector, light: Vector, cones: Cones) -> Truth:
-    """Return whether the Earth blinds: the boresight's angle from its centre is less than the limb's angle plus the
-    cone."""
+    """Return whether the Earth blinds: the boresight is nearer to its centre than the limb's angle plus the cone."""
     inverse = sqrt(1.0 / dot(position, position))
     up, sine = scale(inverse, position), minimum(RADIUS * inverse, 1.0)
     cosine, toward = sqrt(maximum(1.0 - sine * sine, 0.0)), -inverse * dot(position, along)
-    # The direction of the limb's point nearest the boresight, times the sine of the boresight's angle from the Earth's
-    # centre.
+    # The direction of the limb's point nearest the boresight, times the sine of that one's angle from the centre.
     beside = add(along, scale(toward, up))
     lit = less(0.0, sine * norm(beside) * dot(up, light) + cosine * dot(beside, light))
     (c, s), (dark_c, dark_s) = cones.lit, cones.dark

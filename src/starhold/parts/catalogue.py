@@ -74,8 +74,8 @@ _BODIES: dict[str, Part] = {}
 
 
 def find(role: str, name: str) -> Part:
-    """Return the installed part of this role and name, or the body of this name read from a file. Raise KeyError if there
-    is none."""
+    """Return the installed part of this role and name, or the body of this name from a file. Raise KeyError if there is
+    none."""
     installed = parts(role)
     return _BODIES[name] if role == "body" and name not in installed else installed[name]
 
@@ -91,8 +91,7 @@ def body_from_file(path: Path) -> Part:
 
 
 def fit(role: str, name: str, *numbers: Any, called: str = "", start: Any = None) -> Fitted:
-    """Return an installed part with these parameters, for a loop; start: the initial state of an effector. Raise KeyError
-    for an unknown part."""
+    """Return an installed part with these parameters; start: an effector's state. Raise KeyError for an unknown part."""
     part = find(role, name)
     return Fitted(part, part.params(*numbers), called, start)
 

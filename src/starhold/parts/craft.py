@@ -53,8 +53,7 @@ def make_craft(inertia: Any, torque_limit: float = math.inf, gravity: float = EA
 
 
 def inverse(inertia: Matrix | Vector) -> Matrix | Vector:
-    """Return the inverse of an inertia in the same form. It is an equation, so that every way of making a craft gives the
-    same bits."""
+    """Return the inverse of an inertia in the same form. As an equation it gives the same bits everywhere."""
     rows: Any = inertia
     return inverse_matrix(rows) if isinstance(rows[0], tuple) else (1.0 / rows[0], 1.0 / rows[1], 1.0 / rows[2])
 

@@ -20,8 +20,7 @@ APART = Parameter("rad", at_least=0.0, at_most=math.pi / 2, text="least angle be
 
 
 class Estimate(NamedTuple):
-    """The attitude, the uncorrected rate of the gyro, the age of the last attitude measurement, and whether there was
-    one."""
+    """The attitude, the gyro's uncorrected rate, the age of the last attitude measurement, and whether there was one."""
 
     attitude: Annotated[Quaternion, Quantity("1", "estimated attitude, inertial to body, scalar first", "quaternion")]
     rate: Annotated[Vector, Quantity("rad/s", "angular velocity as the gyro measures it, body axes", "axis")]
@@ -30,8 +29,8 @@ class Estimate(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """The attitude and the gyro's reading (rad/s) of the previous control step, the attitude's age (s), and the number of
-    control steps."""
+    """Attitude and gyro reading (rad/s) of the previous control step, the attitude's age (s), and the control steps so
+    far."""
 
     attitude: Quaternion
     rate: Vector

@@ -41,8 +41,7 @@ _PRECESSION = 5028.796195 / 3600.0
 _ABERRATION = 20.49552 / 1296000.0
 """Aberration at one astronomical unit, in turns."""
 _MILLENNIUM = 10.0 * CENTURY * DAY
-# Amplitude (1e-8 rad), phase at J2000 (rad) and rate (rad per millennium). The first two change with time: factors of its
-# powers.
+# Amplitude (1e-8 rad), phase at J2000 (rad) and rate (rad per millennium). The first two are polynomials in time.
 _SUN = """3341656 4.6692568 6283.07585, 34894 4.6261 12566.1517, 3497 2.7441 5753.3849, 3418 2.8289 3.5231,
 3136 3.6277 77713.7715, 2676 4.4181 7860.4194, 2343 6.1352 3930.2097, 1324 0.7425 11506.7698, 1273 2.0371 529.691,
 1199 1.1096 1577.3435, 990 5.233 5884.927, 902 2.045 26.298, 857 3.508 398.149, 780 1.179 5223.694, 753 2.533 5507.553,

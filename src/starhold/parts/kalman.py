@@ -83,8 +83,8 @@ class Gains(NamedTuple):
 
 
 class Correction(NamedTuple):
-    """The gains for the residual of an attitude, which give the new covariances; the gains for the actual residual, and the
-    residual."""
+    """The gains for the residual of an attitude, which give the new covariances; those for the actual residual, and
+    this."""
 
     whole: Gains
     gain: Gains

@@ -126,8 +126,7 @@ class Fitted:
         return self.params if make is None else make(self.params, period)
 
     def remembered(self, *about: Any) -> Any:
-        """Return its initial memory, or an effector's initial state, from its parameters and the arguments that its role
-        adds."""
+        """Return its initial memory, or an effector's state, from its parameters and the arguments that its role adds."""
         if self.start is not None:
             return self.start
         make = self.part.hook("remember")

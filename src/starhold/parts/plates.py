@@ -39,8 +39,7 @@ class Plates(NamedTuple):
 
 
 def plates_of(rows: Any) -> Plates:
-    """Return the plates of a table. Raise ValueError for a table without rows, a negative area or a normal without
-    direction."""
+    """Return the plates of a table. Raise ValueError for no rows, a negative area or a normal without direction."""
     if not rows:
         raise ValueError("the table of plates needs a row")
     normals: list[Vector] = []

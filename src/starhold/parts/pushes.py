@@ -19,8 +19,7 @@ MASS = Parameter(
 
 
 def inverse_mass(moves_orbit: int, mass: float) -> Any:
-    """Return one over the mass (1/kg) for a part that moves the orbit, None for another. Raise ValueError if the mass is
-    missing."""
+    """Return one over the mass (1/kg) for a part that moves the orbit, else None. Raise ValueError without a mass."""
     if isinstance(mass, float) and math.isinf(mass) and moves_orbit:
         raise ValueError("a force that moves the orbit needs the spacecraft's mass: mass in [spacecraft]")
     return 1.0 / mass if moves_orbit else None

@@ -96,8 +96,7 @@ def to_unit(word: Word) -> Scalar:
 
 
 def to_angle(word: Word) -> Scalar:
-    """Return k 2^-52 - 1/2 exactly, with k the lowest 52 bits of a word: an angle in quarter turns, within an eighth of a
-    turn."""
+    """Return k 2^-52 - 1/2 exactly, with k the lowest 52 bits of a word: an angle in quarter turns, up to 1/2."""
     return _one_to_two(word) - 1.5
 
 
@@ -143,7 +142,7 @@ def transform(a: Word, b: Word) -> tuple[Scalar, Scalar]:
 
 def normals(key: tuple[Word, Word], step: Word, first: int, count: int) -> tuple[Scalar, ...]:
     """Return the Gaussians with the numbers `first` to `first` + `count` - 1 of a step, independent of each other and of
-    those of any other step, run or seed; key: (seed, run). Each depends only on its number; 2 n and 2 n + 1 share a
+    those of any other step, run or seed; key: (seed, run). Each depends on its number alone; 2 n and 2 n + 1 share a
     call."""
     words = threefry(key, *((step, call) for call in range(first // 2, (first + count + 1) // 2)))
     pairs = each(transform, tuple(zip(*words, strict=True)))

@@ -81,8 +81,7 @@ class Body(Protocol):
         ...
 
     def is_sound(self, state: State, setup: Any, /) -> Truth:
-        """Return whether the motion is finite and slow enough for the integration; setup has `substep` and
-        `divergence_bound`."""
+        """Return whether the motion is finite and slow enough to integrate; setup has `substep` and `divergence_bound`."""
         ...
 
     def observe(self, state: State, scene: Scene, /) -> Any:
@@ -154,7 +153,7 @@ class Effector(Protocol):
         ...
 
     def push(self, state: Any, command: Any, body: State, params: Any, /) -> Vector | None:
-        """Return the acceleration of the body by its force, in the axes of its position; None if the parameters do not move
+        """Return the body's acceleration by its force, in the axes of its position; None if the parameters do not move
         it."""
         ...
 

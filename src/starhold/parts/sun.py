@@ -57,8 +57,7 @@ class Sun(NamedTuple):
 
 
 def prepared(epoch: Date, ephemeris: int = 0) -> Numbers:
-    """Return the numbers of the Sun for a flight that begins at an epoch (UTC), by the almanac's formulas or by precise
-    series.
+    """Return the numbers of the Sun for a flight that begins at an epoch (UTC), by the almanac or by precise series.
 
     Raise ValueError for an epoch that is no date, or not from 1950 to 2050."""
     days = days_of(epoch)
@@ -112,8 +111,7 @@ def in_view(position: Vector, seen: Sun) -> Scalar:
 
 
 def _of_disc(height: Scalar) -> Scalar:
-    """Return the share of a disc above a straight edge, for the height of its centre above the edge in radii, from -1 to
-    1."""
+    """Return the share of a disc above a straight edge, for its centre's height above that in radii, from -1 to 1."""
     cosine = sqrt(maximum(1.0 - height * height, 0.0))
     arc = 0.5 * rotation_vector((cosine, height, 0.0, 0.0))[0]
     return 0.5 + (1.0 / pi) * (arc + height * cosine)

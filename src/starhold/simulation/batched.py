@@ -159,8 +159,7 @@ class _Vector:
         return memories | {"shared": arguments.shared, "tables": arguments.tables}
 
     def _some(self, kernel: Kernel, memories: Any, first: int, count: int) -> int:
-        """Fly up to `count` control steps from `first` on, to the next sample or by whole groups between samples; return
-        their number."""
+        """Fly up to `count` control steps from `first` on, to the next sample or by whole groups; return their number."""
         into = first % self.every
         if into or count < self.every:
             groups, each, place = 1, min(count, self.every - into), 0 if into == 0 else -1

@@ -1,5 +1,4 @@
-"""Flies lanes on a GPU with the same results as on the CPU, metrics included: only numbers before and after a flight are
-copied."""
+"""Flies lanes on a GPU, metrics included: only numbers before and after a flight are copied."""
 
 from __future__ import annotations
 

@@ -140,8 +140,7 @@ class Stepper:
 
     @property
     def diverged(self) -> Any:
-        """Whether the motion has diverged: it is not finite, too fast for the integration, or beyond the divergence
-        bound."""
+        """Whether the motion has diverged: not finite, too fast for the integration, or beyond the divergence bound."""
         return self._read("carry")[self._batch.rows.lost_at] >= 0.0
 
     def step(self, command: ArrayLike | None = None) -> Readings:

@@ -169,8 +169,8 @@ class Station:
 
     def area_per_mass(self, rate: float | None = None, specular: float | None = None) -> float:
         """Return the least sail area per mass for this circle (m2/kg), at the best rate if none is given: peak demand over
-        pressure times the radius of the largest ball of forces. With another specular reflectivity, the diffuse one is at
-        most the rest."""
+        pressure times the radius of the largest ball of forces. With another specular share, the diffuse one is at most the
+        rest."""
         mirror = self.specular if specular is None else specular
         return self.peak(rate) / (self.pressure * ball(mirror, min(self.diffuse, 1.0 - mirror)).radius)
 

@@ -5,8 +5,7 @@ columns of R_k: Bhat_k = B_k R_k has full column rank r_k. With P_k the annihila
 
     A_{k+1} = P_k A_k P_k^+,    B_{k+1} = P_k A_k Bhat_k:
 
-the directions reached by the inputs are the inputs of the remaining states. The last level has no remaining states. From
-there back up,
+the directions reached by the inputs are the inputs of the rest. The last level has no rest. From there back up,
 
     G_k = Bhat_k^+ + K_{k+1} P_k (last: Bhat_k^+),    K_k = R_k (G_k A_k - Phi_k G_k),    K = K_0.
 
@@ -15,9 +14,9 @@ Phi_k. On the kernel of G_k, where P_k is a coordinate, A_k - B_k K_k acts as P_
 A_{k+1} - B_{k+1} K_{k+1}. By induction the spectrum of A - B K is the union of those of all Phi_k.
 
 Conditions. P_k^+ is the pseudo-inverse P'(P P')^-1, which is P' for orthonormal rows only: a right inverse S of P is valid
-exactly if Bhat_k^+ S = 0. Another left inverse of Bhat_k with its own S changes A_{k+1} by a multiple of B_{k+1}, and
-K_{k+1} accordingly, but not G_k. So K depends only on Phi_k and R_k, not on the annihilators, and the units of the states
-matter only for rounding: the levels are computed for a balanced A, columns of B of similar size and orthonormal bases.
+exactly if Bhat_k^+ S = 0. Another left inverse of Bhat_k with its S changes A_{k+1} by a multiple of B_{k+1}, and K_{k+1}
+accordingly, but not G_k. So K depends only on Phi_k and R_k, and units of the states matter only for rounding: the levels
+are computed for a balanced A, columns of B of similar size and orthonormal bases.
 
 Complex poles shared by two levels. A level with one direction left over shares a pair p, p* with the level above: p in its
 own Phi_k in direction e of Bhat_k, p* in direction R_k e of the level above. Then G_k is complex, but K is still real.
@@ -58,8 +57,7 @@ GIVEN = 1e-9
 
 
 class UncontrollableError(ValueError):
-    """The pair is uncontrollable: no feedback moves its modes s (h,), for w A = s w and w B = 0 for the unit rows w of left
-    (h, n)."""
+    """No feedback moves the modes s (h,) of the pair: w A = s w and w B = 0 for the unit rows w of left (h, n)."""
 
     def __init__(self, modes: NDArray[Any], left: NDArray[Any]) -> None:
         self.modes, self.left = modes, left
@@ -74,9 +72,8 @@ class Placement(NamedTuple):
     """A feedback u = -K x, K (m, n), and the intermediate results.
 
     spectra: Phi_k (r_k, r_k) of each level, the inputs' first, complex only where two levels share a pair of poles;
-    directions: R_k; strength: the smallest singular value of each B_k relative to the norm of the balanced A (for the
-    first, relative to its own largest), zero if the pair is not controllable; error: of the closed-loop poles, see
-    `displacement`."""
+    directions: R_k; strength: the smallest singular value of each B_k over the norm of the balanced A (for the first, over
+    its own largest), zero if the pair is not controllable; error: of the closed-loop poles, see `displacement`."""
 
     K: Array
     spectra: tuple[NDArray[Any], ...]
@@ -101,8 +98,7 @@ class _Level(NamedTuple):
 
 
 def levels(A: ArrayLike, B: ArrayLike) -> list[int]:
-    """Return the number of poles of each level, the inputs' first, n in total. A: (n, n), B: (n, m). Errors as in
-    `place`."""
+    """Return the number of poles of each level, the inputs' first, n in all. A: (n, n), B: (n, m). Errors as in `place`."""
     return [len(level.rows) for level in _decomposed(*_pair(A, B), None, None)[0]]
 
 
@@ -131,9 +127,8 @@ def place(
     factor). None, for all or for one, means the default: P_k orthonormal; R_k = E if B_k has full column rank, else an
     orthonormal basis of its row space, which is the pseudo-inverse of T_k in the skeleton B_k = Bhat_k T_k.
 
-    Raise ValueError for a wrong argument, or if the error of the closed-loop poles exceeds `allowed`, as for nearly
-    uncontrollable pairs, long chains from few inputs and poles of very different size. Raise UncontrollableError if the
-    pair is uncontrollable."""
+    Raise UncontrollableError, or ValueError for a wrong argument or an error of the closed-loop poles above `allowed`, as
+    for nearly uncontrollable pairs, long chains from few inputs and poles of very different size."""
     a, b = _pair(A, B)
     if (poles is None) == (spectra is None):
         raise ValueError("give either poles or spectra")
@@ -178,13 +173,11 @@ def reached(A: ArrayLike, B: ArrayLike, K: ArrayLike) -> Complexes:
 
 
 def displacement(A: ArrayLike, B: ArrayLike, K: ArrayLike, poles: ArrayLike) -> float:
-    """Return the relative distance of the eigenvalues of A - B K from poles (n,), to first order, with no rounding except
-    that of K.
+    """Return the relative distance of eigenvalues of A - B K from poles (n,), to first order, without rounding except K's.
 
-    For simple poles it is the largest distance over the pole's size. Poles closer than NEAR, equal ones above all, are not
-    smooth functions of K, but the polynomial with these roots is: for k of them, about their mean, it is the change of its
-    coefficient of degree k - j over the j-th power of their size. If that size is zero, the size of the largest pole is
-    used, or else that of A.
+    For simple poles it is the largest distance over the pole's size. Poles closer than NEAR are not smooth functions of K,
+    but the polynomial with these roots is: for k of them, about their mean, it is the change of its coefficient of degree k
+    - j over the j-th power of their size (if that is zero, of the largest pole's, or else of A's).
 
     These changes a are the numerators of the partial fractions of (reached - wanted) / wanted, characteristic polynomials
     with exact coefficients. With n simple poles, each pole reached is within n |a| of a wanted one (Gershgorin)."""
@@ -237,8 +230,7 @@ def _closed(a: Array, b: Array, gain: Array) -> arb_mat:
 
 
 def _roots(spectra: Sequence[Array]) -> list[acb]:
-    """Return the eigenvalues of all the matrices, in working precision: in doubles those of Jordan blocks have few
-    digits."""
+    """Return eigenvalues of all the matrices, in working precision: in doubles those of Jordan blocks have few digits."""
     from flint import acb_mat, arb_mat, ctx
 
     with ctx.workprec(BITS):

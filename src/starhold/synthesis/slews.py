@@ -201,8 +201,7 @@ def fly(torque: Callable[..., Any], trials: Sequence[tuple[Search, float, float]
 
 
 def _steps(rate: float, spec: Any, horizon: float) -> int:
-    """Return the number of steps of a slew whose loop has this fastest rate (1/s). Raise ValueError if it is too fast for
-    the integration."""
+    """Return the steps of a slew whose loop has this fastest rate (1/s). Raise ValueError if it is too fast."""
     least = max(rate, math.hypot(*spec.rate)) * horizon / (STEPS * RESOLVED)
     many = next((m for m in (1, 4, 16, MOST) if m >= least), None)
     if many is None:

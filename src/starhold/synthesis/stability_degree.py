@@ -102,8 +102,7 @@ def degree(K_a: ArrayLike, K_w: ArrayLike, ratios: ArrayLike) -> Array:
 
 def boundary(ratios: ArrayLike) -> float:
     """Return c of the curve K_a = c K_w^2: above it the oscillation about the axis of the largest moment determines eta,
-    below it the slow aperiodic motion about that of the smallest. ratios: (3,). Raise ValueError unless they are
-    positive."""
+    below it the slow aperiodic motion about that of the smallest. ratios: (3,). Raise ValueError unless positive."""
     a, b = _extremes(ratios)
     return (2.0 - a / b) / (8.0 * b)
 
@@ -158,8 +157,7 @@ def brute_force(ratios: ArrayLike, alpha: float, omega: float, budget: float, po
 
 
 def scale(moments: ArrayLike, torque: float, momentum: float) -> Scale:
-    """Return the units for principal moments (3,) (kg m2), a wheel's largest torque Hdot_max (N m) and momentum H_max (N m
-    s).
+    """Return units for principal moments (3,) (kg m2), a wheel's largest torque Hdot_max (N m) and momentum H_max (N m s).
 
     Raise ValueError if these are not positive and finite, or no rigid body has these moments."""
     if np.shape(moments) != (3,):
@@ -222,8 +220,7 @@ def _not_negative(name: str, value: float) -> float:
 
 
 def _best_stiffness(K_w: Array, most: Array, ratios: ArrayLike, points: int, rounds: int) -> tuple[Array, Array]:
-    """Return for each damping (n,) the best stiffness up to `most` (n,), from a grid refined around its best, and its
-    eta."""
+    """Return the best stiffness up to `most` (n,) for each damping (n,), from a grid refined around its best, and eta."""
     low, high = np.zeros_like(most), most
     rows = np.arange(len(K_w))
     best = low, low

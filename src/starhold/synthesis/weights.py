@@ -16,8 +16,7 @@ because their units differ. Gains then span at most as much, and stay positive d
 have sixteen digits."""
 
 SAME = 1e-10
-"""Principal moments that differ by at most this share of the largest count as equal: only rounding determines their
-axes."""
+"""Principal moments that differ by at most this share of the largest are equal: rounding alone decides their axes."""
 
 BALANCES = ("none", "least", "q4", "q5", "q6", "r1", "r2", "r3")
 """Weights that `balance` may change: none, all by the least change in logarithm, or the one named."""
@@ -32,8 +31,7 @@ def balance(moments: Array, q: Array, r: Array, how: str) -> tuple[Array, Array]
     """Return weights q (6,) and r (3,) for moments (3,) changed so that kappa vanishes: the one that `how` names, or all by
     the least change.
 
-    Raise ValueError if kappa vanishes for no value of the named weight; for the axis of the middle moment it always
-    does."""
+    Raise ValueError if kappa vanishes for no value of the named weight; for the middle moment's axis it always does."""
     share = np.roll(moments, -2) - np.roll(moments, -1)
     parts = share / np.sqrt(q[3:] / r)
     if abs(parts.sum()) <= 4.0 * np.finfo(float).eps * np.abs(parts).sum():

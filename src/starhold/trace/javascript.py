@@ -1,5 +1,4 @@
-"""Prints a program as JavaScript (ES2017), for one lane: a function for each recorded one, of which the last is to be
-called.
+"""Prints a program as JavaScript (ES2017), for one lane: a function for each recorded one; the last is to be called.
 
 Its arguments are the memories as Float64Arrays, then counts as numbers and words as pairs [high, low] of 32-bit integers,
 which is the form of words everywhere here. It needs no library and no module, and gives the bits of plain Python.

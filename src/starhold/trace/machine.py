@@ -27,8 +27,7 @@ def _llvm() -> Any:
 
 
 def _machine() -> Any:
-    """Return a target machine for this processor with all its features. An engine takes ownership of it, so each needs its
-    own."""
+    """Return a target machine for this processor with all features. An engine takes ownership, so each needs its own."""
     llvm = _llvm()
     target, features = llvm.Target.from_default_triple(), llvm.get_host_cpu_features().flatten()
     return target.create_target_machine(opt=3, cpu=llvm.get_host_cpu_name(), features=features)

@@ -52,8 +52,8 @@ class Slot(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """A loop repeats the body at most `most` times; with `done`, until that holds at the start of an iteration, where
-    `head` computes it."""
+    """A loop repeats the body at most `most` times, or until `done`, which `head` computes, holds at the start of an
+    iteration."""
 
     counter: str
     most: Value

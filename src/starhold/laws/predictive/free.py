@@ -66,8 +66,7 @@ def free_moves(state: Any, command: Any, end: Any, inertia: Array, period: float
 
 
 def motion(inertia: Array, rate: Array, period: float) -> tuple[Array, Array]:
-    """Return A (6, 6) and B (6, 3) of small (w, q) about a motion at a constant rate (rad/s), sampled with a held
-    torque."""
+    """Return A (6, 6) and B (6, 3) of small (w, q) about a constant rate (rad/s), sampled with a held torque."""
     inverse, turn = np.linalg.inv(inertia), np.array(skew(tuple(rate)))  # pyright: ignore
     spun = np.array(skew(tuple(inertia @ rate))) - turn @ inertia  # pyright: ignore
     rates = np.zeros((9, 9))

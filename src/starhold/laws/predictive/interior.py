@@ -88,8 +88,7 @@ def _turn(problem: Problem, now: Turn, count: Scalar, most: Scalar) -> Turn:
 
 
 def _length(problem: Problem, barrier: Scalar) -> Scalar:
-    """Return the share of the step that keeps slacks and multipliers positive; the steps of the multipliers are stored in
-    `trial`."""
+    """Return the share of the step that keeps slacks and multipliers positive; put the multipliers' steps into `trial`."""
     store, bounds = carve(problem), limits(problem)
 
     def stage(k: Index, length: Scalar) -> tuple[Scalar]:

@@ -31,8 +31,7 @@ Truths: TypeAlias = tuple[Truth, Truth, Truth]
 
 
 class Limits(NamedTuple):
-    """The limits of a move v: |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, where low <= v <=
-    high."""
+    """Limits of a move v: |v - centre| <= bound (N m; inf: none), in norm (ball) or on each axis, low <= v <= high."""
 
     centre: Vector
     bound: Scalar
@@ -117,8 +116,7 @@ def slack(limits: Limits, v: Vector) -> Vector:
 
 
 def repelled(limits: Limits, v: Vector, multipliers: Vector, barrier: Scalar, m: Symmetric) -> tuple[Symmetric, Vector]:
-    """Return a symmetric matrix with the curvature of the barrier added, and the barrier's gradient: the interior-point
-    step."""
+    """Return a symmetric matrix plus the curvature of the barrier, and the barrier's gradient: the interior-point step."""
     d, s = subtract(v, limits.centre), slack(limits, v)
     push = times((divide(barrier, s[0]), divide(barrier, s[1]), divide(barrier, s[2])), d)
     y0, y1, y2 = multipliers
@@ -171,8 +169,7 @@ def box_inverse(m: Symmetric, fixed: Truths) -> Symmetric:
 
 
 def plane_inverse(m: Symmetric, n: Vector, multiplier: Scalar) -> Symmetric:
-    """Return the inverse, on the plane normal to n, of a symmetric matrix plus `multiplier` times the identity; zero along
-    n."""
+    """Return the inverse, on the plane normal to n, of a symmetric matrix plus `multiplier` times E; zero along n."""
     t = _tangent(n)
     u = cross(n, t)
     mt, mu = apply(m, t), apply(m, u)

@@ -40,8 +40,7 @@ PATIENCE = 12
 
 
 class Solved(NamedTuple):
-    """Result of a run: the number of Riccati sweeps, whether the optimum was reached, and whether limits are active in
-    it."""
+    """Result of a run: the number of Riccati sweeps, whether the optimum was reached, and whether limits are active."""
 
     sweeps: Scalar
     solved: Truth

@@ -2,8 +2,7 @@
 
 Each unit has a gimbal about an axis g fixed in the body, and in it a rotor about s, which turns with the gimbal; t = g x s.
 With h the momentum of the rotor relative to the body about s, Js, Jt, Jg the moments of gimbal and rotor together about s,
-t and g, Jr that of the rotor about s, w_s and w_t the body's rate about s and t, p = h + (Js - Jt) w_s, and x the gimbal's
-angle,
+t and g, Jr the rotor's about s, w_s and w_t the body's rate about s and t, p = h + (Js - Jt) w_s, and x the gimbal's angle,
 
     h' = rotor motor - Jr (s.w' + w_t x'),        Jg (x'' + g.w') = gimbal motor + p w_t
 
@@ -175,8 +174,7 @@ class Turned(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Prepared:
-    """Return the numbers that equations take. Raise ValueError for impossible units, or units without torque about three
-    axes."""
+    """Return the numbers that equations take. Raise ValueError for units that cannot be, or lack torque about an axis."""
     units: list[Unit] = []
     reach, squares = np.zeros((3, 3)), 0.0
     for number, row in enumerate(params.units, 1):

@@ -65,8 +65,8 @@ class Sample(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """Return the numbers that equations take. Raise ValueError without a mode, for a frequency that is not positive or a
-    negative damping."""
+    """Return the numbers that equations take. Raise ValueError for no mode, a frequency not above 0 or a damping below
+    0."""
     if not params.modes:
         raise ValueError("there is no mode")
     for number, (frequency, damping, *_) in enumerate(params.modes, 1):

@@ -93,8 +93,7 @@ class Panel(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """The panels, the mass of the whole (kg) and its inverse, and the inertia of the panels in their rest positions (kg
-    m2)."""
+    """The panels, the mass of the whole (kg) and its inverse, and the panels' inertia in their rest positions (kg m2)."""
 
     panels: tuple[Panel, ...]
     mass: Scalar

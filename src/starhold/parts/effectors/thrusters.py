@@ -117,8 +117,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def _forces(layout: tuple[Row, ...], torque: Vector) -> tuple[tuple[Vector, ...], ...]:
-    """Return the net force (N) of the thrusters for each axis in the positive and in the negative sense, () without a
-    layout."""
+    """Return the net force (N) of the thrusters for each axis in positive and negative sense, () without a layout."""
     forces, torques = ([[ZERO] * 3, [ZERO] * 3] for _ in range(2))
     for axis, sense, *numbers in layout:
         if axis not in (1.0, 2.0, 3.0) or sense not in (1.0, -1.0):

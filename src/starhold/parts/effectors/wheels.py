@@ -357,8 +357,7 @@ def capacity(state: State, params: Wheels) -> float:
 
 
 def sure_torque(params: Wheels, kind: Literal["axis", "norm"]) -> float:
-    """Return the torque (N m) available in every direction with the wheels' allocation, in norm or about each body axis at
-    once."""
+    """Return the torque (N m) available in every direction by the allocation, in norm or about each axis at once."""
     return authority(at_top_speed(as_known(params)), kind, peak=params.allocation == ALLOCATIONS.index("least-peak"))
 
 

@@ -120,8 +120,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def _layers(table: tuple[Layer, ...], flux: float) -> tuple[float, float, float, Buffer]:
-    """Return the density (kg/m3) at the lowest height (m) of a table, the scale height (m) of the lowest layer, and the
-    bends."""
+    """Return density (kg/m3) and height (m) of a table's lowest row, the scale height (m) above it, and the bends."""
     given = {(height, at): density for height, at, density in table}
     heights, fluxes = (np.unique(column) for column in np.array(table)[:, :2].T)
     if len(heights) < 2 or len(given) != len(table) or len(table) != len(heights) * len(fluxes):
@@ -203,8 +202,7 @@ def bound(params: Params, envelope: Envelope) -> Push:
         fallen = (distance - nearest) / thinning + sum(bend * max(nearest - begin, 0.0) for begin, bend in rows)
         slopes = accumulate((bend for _, bend in rows), initial=-1.0 / thinning)
         density, distance, thinning = density * math.exp(fallen), nearest, -1.0 / max(slopes)
-    # rho (v + turn r)^2 is largest at the lowest point, or higher up if the density hardly decreases and the air turns
-    # fast.
+    # rho (v + turn r)^2 is largest at the lowest point, or higher up in fast air of nearly constant density.
     place = max(nearest, 2.0 * thinning - wind / turn) if turn else nearest
     density = density * math.exp((distance - place) / thinning)
     size = largest_torque(numbers.normals, numbers.arms)

@@ -38,8 +38,7 @@ def acceleration(state: Any, params: Params, craft: Craft, memory: Any) -> Vecto
 
 
 def perturbation(params: Params, craft: Craft, distance: float) -> tuple[float, float]:
-    """Return the largest acceleration (m/s2), and its largest gradient (1/s2), from a distance (m) on: both above the
-    poles."""
+    """Return the largest acceleration (m/s2) and gradient (1/s2) of it from a distance (m) on: both above the poles."""
     size = params.j2 * craft.gravity * (params.radius / distance) ** 2 / distance**2
     return 3.0 * abs(size), 12.0 * abs(size) / distance
 

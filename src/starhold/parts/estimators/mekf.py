@@ -235,8 +235,7 @@ def latest(readings: Any, params: Numbers) -> tuple[list[Head], Numbers]:
 
 
 def directed(readings: Any, memory: Memory, params: Numbers, period: Scalar) -> list[vectors.Pair]:
-    """Return the directions; there are none until the step after the first attitude, which may have been computed from
-    them."""
+    """Return the directions, none until the step after the first attitude, which may have been computed from them."""
     if not params.directions:
         return []
     begun = less(1.5, memory.stage)

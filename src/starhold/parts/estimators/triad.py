@@ -64,8 +64,7 @@ def prepare(params: Params, period: float) -> Numbers:
 
 
 def estimate(readings: Any, memory: Memory, params: Numbers, craft: Craft, period: Scalar) -> tuple[Estimate, Memory]:
-    """Return the attitude from both directions if they are available, else the one propagated by the gyro, and the new
-    memory."""
+    """Return the attitude from both directions if available, else the one propagated by the gyro, and the new memory."""
 
     def observe(time: Scalar) -> tuple[Quaternion, Truth]:
         there = both(less(0.5, readings.sun_is_seen), less(0.5, getattr(readings, "magnetic_field_is_new", 1.0)))

@@ -153,8 +153,7 @@ def _current(
 
 
 def _weight(current: Scalar, threshold: Scalar) -> Scalar:
-    """Return the weight of a diode, in proportion to its current, so that the Earth's light on the far side hardly
-    matters."""
+    """Return a diode's weight, in proportion to its current, so that the Earth's light on the far side hardly matters."""
     return where(less(threshold, current), current, 0.0)
 
 

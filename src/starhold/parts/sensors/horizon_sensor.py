@@ -71,8 +71,7 @@ class Reading(NamedTuple):
 
 
 def prepare(params: Params, period: float) -> Numbers:
-    """Return the numbers of a flight. Raise ValueError for a boresight without direction, a bad outage and too long a
-    delay."""
+    """Return the numbers of a flight. Raise ValueError for a zero boresight, a bad outage and too long a delay."""
     return Numbers(
         params.noise,
         unit_boresight(params.boresight),

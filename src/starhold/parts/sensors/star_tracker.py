@@ -67,9 +67,9 @@ class Params(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Standard deviations (rad), the unit vector of the boresight, control steps from update to update, the delay, and
-    control steps of the outage; the blinding cones, the squared rate limit (rad2/s2) and the rotation of its mounting, ()
-    for none."""
+    """Standard deviations (rad), unit vector of the boresight, control steps from update to update, delay, and control
+    steps of the outage; the blinding cones, the squared rate limit (rad2/s2) and the rotation of its mounting, () for
+    none."""
 
     cross: Scalar
     roll: Scalar
@@ -124,8 +124,8 @@ def check_start(params: Numbers, start: Any, craft: Craft) -> None:
 
 
 def remember(params: Numbers, state: Any) -> Any:
-    """Return the initial memory: an update is due, and the delayed reading is the initial attitude. Until it arrives the
-    reading is the inertial axes."""
+    """Return the initial memory: an update is due. Until the delayed initial attitude arrives, readings are the inertial
+    axes."""
     return as_built.awaited(Memory(NO_TURN, 0.0), params.late, state, SEEN)
 
 
@@ -152,8 +152,7 @@ def measure(state: Any, memory: Any, params: Numbers, dice: Dice, step: int) -> 
 
 
 def error(params: Params) -> Errors:
-    """Return the mounting error as a bound, if attitudes are not delayed; the craft's rotation during a delay has no
-    bound."""
+    """Return the mounting error if attitudes are not delayed; the craft's rotation during a delay has no bound."""
     silent = params.outage != NEVER or params.sun_cone or params.moon_cone or any(params.limb_cones)
     if params.delay or as_built.is_given(params.jitter) or silent or params.rate_limit < math.inf:
         return UNBOUNDED
