@@ -17,7 +17,7 @@ from starhold.algebra.scalar import Scalar
 from starhold.algebra.several import each
 from starhold.algebra.structure import leaves
 from starhold.algebra.vector import IDENTITY, Matrix, Vector, add, apply, clip_axes, diagonal, multiply, scale
-from starhold.parts.contract import Parameter
+from starhold.parts.contract import NoMemory, Parameter
 from starhold.parts.random import Dice
 
 Turn: TypeAlias = Quaternion | tuple[()]
@@ -145,6 +145,11 @@ def awaited(sensor: Any, late: Late, state: Any, names: Sequence[str]) -> Any:
     """Return the initial memory of a delayed sensor, with the sensor's own: before the start these fields were constant."""
     count = late.periods + bool(late.share or late.jitter) if late else 0
     return Waiting(sensor, (tuple(getattr(state, name) for name in names),) * count) if late else sensor
+
+
+def see_start(params: Any, state: Any) -> Any:
+    """Return the initial memory of a sensor of directions without memory of its own: the initial state if it is delayed."""
+    return awaited(NoMemory(), params.late, state, PLACE)
 
 
 def arrived(state: Any, memory: Any, late: Late, names: Sequence[str], dice: Dice, place: int) -> tuple[Any, Any, Any]:

@@ -63,7 +63,7 @@ def torque(state: Any, params: Numbers, craft: Craft, memory: Vector) -> Vector:
 
 
 def bound(params: Params, envelope: Envelope) -> Push:
-    """Return a bound on the norm of the torque, for a dipole across the strongest field of the orbit."""
+    """Return a bound on the norm of the torque, for a dipole across the strongest field at the least height of the orbit."""
     return Push(norm(params.dipole) * magnetic_field.strongest(params.epoch, envelope.distance))
 
 
